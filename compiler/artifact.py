@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.ir import Program
+from .core.ir import Image, Program
 from .core.writing import making_parents, write_together
 from .languages import interface
 from .languages.interface import Interface
@@ -63,22 +63,32 @@ class Artifact:
         return str(self.manifest["entry_point"])
 
     @property
-    def interface(self) -> Interface:
-        """Return what the kernel is bound to, in its language."""
-        dialect, gather = self.plan.target.dialect, self.program.gather
-        assert dialect is not None, "the interpreter binds nothing"
-        assert gather is not None, "kernels have windows"
-        channels, taken = int(self.manifest["output"]["channels"]), dialect.integers[interface.DENOISE]
-        return interface.denoiser(gather.images, self.weights.size, channels, dialect.home, taken)
-
-    @property
     def digest(self) -> str:
         """Return the hash that names this artifact: of source and weights."""
         return str(self.manifest["digest"])
 
     @property
+    def images(self) -> tuple[Image, ...]:
+        """Return the images that the window is filled from, in order."""
+        assert self.program.gather is not None, "kernels have windows"
+        return self.program.gather.images
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels of the result."""
+        return int(self.manifest["output"]["channels"])
+
+    @property
+    def interface(self) -> Interface:
+        """Return what the kernel is bound to, in its language."""
+        dialect = self.plan.target.dialect
+        assert dialect is not None, "the interpreter binds nothing"
+        size, taken = self.weights.size, dialect.integers[interface.DENOISE]
+        return interface.denoiser(self.images, size, self.channels, dialect.home, taken)
+
+    @property
     def kernels(self) -> tuple[Artifact, ...]:
-        """Return what is run, in this order: one kernel, or two passes."""
+        """Return the kernels in the order in which they run: one, or two passes."""
         return (self.before, self) if self.before else (self,)
 
     def contents(self) -> Mapping[str, bytes]:
@@ -115,6 +125,11 @@ class OneSource:
         """Return the hash that names this artifact: of its source."""
         return str(self.manifest["digest"])
 
+    @property
+    def kernels(self) -> tuple[Any, ...]:
+        """Return the kernels in the order in which they run: this one."""
+        return (self,)
+
     def contents(self) -> Mapping[str, bytes]:
         """Return all files except the manifest, by name."""
         return {self.source_name: self.source.encode()}
@@ -134,6 +149,12 @@ class Files(Protocol):
 def weight_bytes(artifact: Artifact) -> bytes:
     """Return the weights as they are written."""
     return artifact.weights.astype("<f4").tobytes()
+
+
+def schedule_text(picked: Mapping[str, Any]) -> str:
+    """Return what a manifest says about its schedule, for a reader."""
+    found = f"{picked['name']}: {picked['idea']}"
+    return f"{found} (not {picked['asked']}: {picked['reason']})" if "reason" in picked else found
 
 
 def manifest_text(artifact: Files) -> str:

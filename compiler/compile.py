@@ -20,7 +20,7 @@ import numpy as np
 from ..refimpl.errors import InputError
 from ..refimpl.reading import SIZES, parse_json
 from . import artifact
-from .artifact import Artifact
+from .artifact import Artifact, schedule_text
 from .core import ir
 from .core.enclosure import round_up as round_up
 from .core.ir import LEAST, OUTPUT_ENCODING, Gather, Program
@@ -30,7 +30,6 @@ from .core.sums import is_split
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
 from .proof.whole import has_one_zero
-from .schedules import schedules
 from .schedules.emit import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
 from .schedules.schedules import PLAIN, Pick, Schedule
@@ -171,7 +170,7 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
         f"bound     {_bound_text(bound, program)}",
         *(_wrapped("assumes", plan.assumes) if plan.assumes and bound.output else []),
         *([SUMS] if is_split(gather) and plan.shares_bound else []),
-        *([] if picked.schedule.name == PLAIN else [f"schedule  {schedules.text(picked.manifest())}"]),
+        *([] if picked.schedule.name == PLAIN else [f"schedule  {schedule_text(picked.manifest())}"]),
         f"arguments {arguments[0]}",
         *(f"          {line}" for line in arguments[1:]),
     ]

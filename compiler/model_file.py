@@ -90,6 +90,11 @@ _ENTRY = {"dtype", "shape", "data_offsets"}
 def save_model(path: str | os.PathLike[str], model: Model) -> None:
     """Write a model that [`load_model`] reads back to the same bits."""
     check_model(model)
+    _write(Path(path), model_bytes(model))
+
+
+def model_bytes(model: Model) -> bytes:
+    """Return a model as the content of its file, the same for equal models."""
     tensors: dict[str, NDArray[Any]] = {}
     for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
         tensors[f"layer{layer}.weight"], tensors[f"layer{layer}.bias"] = weight, bias
@@ -103,8 +108,7 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
     }
     if isinstance(model.siren, Imported):
         texts |= _imported_texts(model.siren) | {"version": IMPORTED_VERSION}
-        _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
-        return
+        return _encode(MODEL_FORMAT, tensors, texts)
     texts |= {
         "features": json.dumps(model.features),
         "omega_0_first": repr(model.siren.omega_0_first),
@@ -115,7 +119,7 @@ def save_model(path: str | os.PathLike[str], model: Model) -> None:
         texts |= {name: repr(getattr(model.siren, name)) for name in WHOLE_TEXTS} | {"version": WHOLE_VERSION}
     if model.siren.activation != SINE:
         texts |= {"activation": model.siren.activation, "version": ACTIVATION_VERSION}
-    _write(Path(path), _encode(MODEL_FORMAT, tensors, texts))
+    return _encode(MODEL_FORMAT, tensors, texts)
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:

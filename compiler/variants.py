@@ -38,6 +38,7 @@ from .core.enclosure import round_up
 from .core.ir import Program
 from .core.lower import lower
 from .core.profiles import SineContract
+from .languages.interface import FULL as FULL
 from .plan import Plan, analysed, plan_program
 from .proof import bounds
 from .proof.bounds import Enclosure
@@ -46,9 +47,6 @@ from .schedules.schedules import PLAIN
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-FULL = "full"
-"""Name of the network as it was trained."""
 
 PLUS = "+"
 """What joins two approximations in a name."""

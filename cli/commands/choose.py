@@ -144,7 +144,8 @@ def _kept_or_measured(
 ) -> Curve:
     """Return the curve from the cache folder, or measure it and keep it; say which."""
     from ...compiler import variants
-    from ...kernels.run import cache, curve, measure_curve
+    from ...kernels import cache
+    from ...kernels.run import curve, measure_curve
     from ...kernels.run.curve import Curve
 
     names = measure_curve.names_for(model)

@@ -78,7 +78,6 @@ def denoise(
     The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
     result is the same to the last bit on every executor; its digest is printed, to be compared.
     """
-    from ...compiler.variants import FULL, with_rank
     from ...kernels import denoise_on, open_executor
     from ...kernels.run.tune import first_time
     from ...refimpl.encoding import from_display
@@ -92,7 +91,9 @@ def denoise(
     _say_what_is_no_number(frame, noisy, network)
     check_domain(frame, noisy, network, anyway)
     with open_executor(executor.value) as runner:
-        result = denoise_on(runner, network, noisy, profile, schedule, with_rank(variant or FULL, rank))
+        result = denoise_on(
+            runner, network, noisy, profile, schedule, chosen_variant(variant, rank), keeps=True
+        )
         first = first_time(runner, result.kernel, result.seconds_compile)
     if keep_layers:
         linear = from_display(result.image, network.normalization.exposure_stops)
@@ -119,6 +120,17 @@ def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:
         if layer in read:
             rule = "NaN is read as 0, an infinity as the end of the range"
             say(f"{path}: {count} pixels of {layer} are not finite: {rule}")
+
+
+def chosen_variant(variant: str | None, rank: int) -> str:
+    """Return the variant of a network that two options name; the compiler is imported only for one."""
+    from ...compiler.languages.interface import FULL
+
+    if not rank:
+        return variant or FULL
+    from ...compiler.variants import with_rank
+
+    return with_rank(variant or FULL, rank)
 
 
 def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None:

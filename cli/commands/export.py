@@ -270,10 +270,10 @@ def _export(
 
 def _tell(made: Export) -> None:
     """Say which schedule an export has, which limits it keeps, and what its bound rests on."""
-    from ...compiler.schedules.schedules import text
+    from ...compiler.artifact import schedule_text
 
     for picked in filter(None, (kernel.get("schedule") for kernel in made.manifest["kernels"])):
-        say(f"schedule {text(picked)}")
+        say(f"schedule {schedule_text(picked)}")
     for limit in made.manifest["limits"]:
         say(f"{limit['name']}: {limit['needs']} of {limit['most']}")
     if made.manifest["assumes"]:

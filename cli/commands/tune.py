@@ -77,7 +77,7 @@ def tune(
     square = (size, size)
     with _alone(), open_executor(executor.value) as runner:
         plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
-        known = None if force else tuning.remembered(runner, plan, square)
+        known = None if force else tuning.remembered(runner, tuning.Subject.of(plan), square)
         found = known or tuning.tune(runner, plan, square)
         picks = {n: tuning.choose(runner, plan, square, n) for n in (1, MANY)}
     show(found)
@@ -90,7 +90,7 @@ def tune(
 @contextmanager
 def _alone() -> Iterator[None]:
     """Keep out another process that tunes on this machine: each would measure the other's load."""
-    from ...kernels.run import cache
+    from ...kernels import cache
 
     folder = cache.folder()
     try:

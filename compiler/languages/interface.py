@@ -22,6 +22,12 @@ GUIDE, SMOOTH = "guide", "smooth"
 FOLLOW = "follow"
 """What the kernel of a history does: it adds a picture."""
 
+PLAIN = "plain"
+"""Name of the schedule that every target has: the kernel that is made to be read."""
+
+FULL = "full"
+"""Name of the variant of a network that leaves nothing out [variants.py]."""
+
 READ, WRITE = "read", "write"
 """What a kernel does with an array."""
 

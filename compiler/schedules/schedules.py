@@ -27,6 +27,7 @@ from ..core.ir import Gather, Program
 from ..core.profiles import SineContract
 from ..core.weights import Slot
 from ..languages.dialect import Dialect
+from ..languages.interface import PLAIN as PLAIN
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..proof.spectra import Spectra
@@ -36,9 +37,6 @@ Images = Mapping[str, NDArray[np.float32]]
 
 ALL = slice(None)
 """All rows of a picture."""
-
-PLAIN = "plain"
-"""Name of the schedule that every target has: the kernel that is made to be read."""
 
 
 def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.float64]:
@@ -172,12 +170,6 @@ class Pick:
         found = {**found, "rows": rows} if rows > 1 else found
         found |= self.details
         return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
-
-
-def text(picked: Mapping[str, Any]) -> str:
-    """Return what a manifest says about its schedule, for a reader."""
-    found = f"{picked['name']}: {picked['idea']}"
-    return f"{found} (not {picked['asked']}: {picked['reason']})" if "reason" in picked else found
 
 
 def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:

@@ -19,8 +19,8 @@ from pathlib import Path
 from ...compiler.model_file import load_model, save_model
 from ...refimpl.light.scenes import canonical
 from ...refimpl.network.denoise import Model
+from ..cache import FOLDER_VARIABLE
 from ..devices.registry import open_executor
-from ..run.cache import FOLDER_VARIABLE
 from ..run.pipeline import Pipeline
 from . import first_run
 

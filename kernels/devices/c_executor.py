@@ -1,21 +1,26 @@
 """Kernels as C, built by the system's compiler and called in this process: rows of a picture in threads.
 
 1. Write the kernel's source and a function around it [`GLUE`] into a folder that goes with the executor.
-2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`].
+2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`]; what was
+   compiled before by this compiler for this processor is taken from the cache [cache.py].
 3. Call it on blocks of rows, one a thread: ctypes lets other threads run meanwhile.
 4. The schedule that suits the processor follows from the registers that the compiler uses [`SCHEDULES`].
 """
 
 from __future__ import annotations
 
+import base64
 import ctypes
 import itertools
 import os
+import platform
 import shlex
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -24,7 +29,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import (
     DENOISE,
     ENCODE,
@@ -32,13 +36,14 @@ from ...compiler.languages.interface import (
     GUIDE,
     INTEGERS,
     PATH,
+    PLAIN,
     SMOOTH,
     WEIGHTS,
     Interface,
 )
-from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, words
+from .. import cache
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Denoiser, Executor, Kernel, Memory, is_denoiser, words
 from .images import widest
 
 COMPILER_VARIABLE = "CC"
@@ -233,15 +238,20 @@ class CExecutor(Executor):
         self._count = itertools.count()
         self._options = list(OPTIONS)
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
+        self._compiler = [*self._command, version, *_file_facts(self._command[0]), processor()]
         try:
-            self._try()
+            tried = cache.kept("c-trial", [*self._compiler, TRIAL], self._try)
+            self._options, lanes, byte_products = tried["options"], tried["lanes"], tried["bytes"]
         except ExecutorUnavailable:
             self._folder.cleanup()
             raise
+        self.byte_schedule = BYTE_SCHEDULE if byte_products else ""
+        self.schedule = SCHEDULES.get(lanes, PLAIN)
+        self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
 
-    def _try(self) -> None:
-        """Find out what the compiler takes, and whether its programs compute as they must."""
+    def _try(self) -> dict[str, Any]:
+        """Return what the compiler takes; raise where its programs do not compute as they must."""
         program = Path(self._folder.name) / "trial"
         # Not all compilers know all options; what the program prints decides, not which options they accept.
         for options in ([*STRICT, NATIVE], STRICT, []):
@@ -264,13 +274,11 @@ class CExecutor(Executor):
             rule = "what it compiles does not compute as IEEE 754 says"
             way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
-        self.byte_schedule = BYTE_SCHEDULE if byte_products == "1" else ""
-        self.schedule = SCHEDULES.get(int(lanes), PLAIN)
-        self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
+        return {"options": self._options, "lanes": int(lanes), "bytes": byte_products == "1"}
 
     def _prepare(self, kernel: Kernel) -> _Prepared:
         columns, rows, weights = 1, 1, None
-        if isinstance(kernel, Artifact):
+        if is_denoiser(kernel):
             self._check_stack(kernel.manifest["private_bytes"])
             columns, rows = kernel.manifest["schedule"]["pixels"], kernel.manifest["schedule"].get("rows", 1)
             weights = np.ascontiguousarray(kernel.weights)
@@ -292,14 +300,19 @@ class CExecutor(Executor):
 
     def _library(self, kernel: Kernel, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
-        folder = Path(self._folder.name)
-        (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
         # A library that was built before may still be loaded: each has a name of its own.
-        library = folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
-        done = self._compile(library, glue, ["-shared"])
-        if done.returncode or not library.is_file():
-            told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
-            raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
+        library = Path(self._folder.name) / f"{kernel.digest[:32]}-{next(self._count)}.so"
+
+        def built() -> str:
+            (library.parent / _header(kernel)).write_text(kernel.source, encoding="utf-8")
+            done = self._compile(library, glue, ["-shared"])
+            if done.returncode or not library.is_file():
+                told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
+                raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
+            return base64.b64encode(library.read_bytes()).decode()
+
+        content = cache.kept("c-library", [*self._compiler, self._options, kernel.source, glue], built)
+        library.write_bytes(base64.b64decode(content))
         function = ctypes.CDLL(str(library)).wamnet_rows
         function.restype = None
         return function
@@ -321,7 +334,7 @@ class CExecutor(Executor):
                 f"c: the compiler {self._command[0]!r} cannot be run ({error.strerror}); {WAY_OUT}"
             ) from None
 
-    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+    def check_size(self, artifact: Denoiser, size: tuple[int, int]) -> None:
         """Refuse images whose indices `int` does not hold."""
         most = widest(artifact)
         if size[0] * size[1] * most >= INDEX_LIMIT:
@@ -355,6 +368,24 @@ class CExecutor(Executor):
         """End the threads and remove the folder."""
         self._threads.shutdown()
         self._folder.cleanup()
+
+
+def processor() -> str:
+    """Return what code for this very processor depends on, as far as the system tells."""
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
+        kinds = ("vendor_id", "cpu family", "model", "stepping", "flags", "CPU ", "Features")
+        return "".join(line for line in lines.splitlines(True) if line.startswith(kinds))
+    return " ".join(platform.uname())
+
+
+def _file_facts(command: str) -> tuple[str, ...]:
+    """Return where a program is, its size and time: another one compiles otherwise."""
+    path = shutil.which(command) or command
+    with suppress(OSError):
+        facts = Path(path).resolve().stat()
+        return path, str(facts.st_size), str(facts.st_mtime_ns)
+    return (path,)
 
 
 def _header(kernel: Kernel) -> str:

@@ -23,30 +23,35 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS, UNSIGNED, Interface
-from ...compiler.scenes.encode_kernel import EncodeArtifact
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.plane_kernel import PlaneArtifact
-from ...compiler.scenes.smooth_kernel import SmoothKernels
-from ...compiler.schedules.emit import output_channels
-from ...compiler.schedules.schedules import PLAIN
-from ...compiler.training.step_kernel import StepKernel
+from ...compiler.languages.interface import (
+    DENOISE,
+    ENCODE,
+    IMAGE,
+    PATH,
+    PLAIN,
+    RESULT,
+    SCENE_NUMBERS,
+    SUMS,
+    UNSIGNED,
+    Interface,
+)
 from ...refimpl.errors import InputError
 from ...refimpl.network.dataset import known
-from .images import Images, black, checked, gather_of
+from .images import Images, black, checked
 
 if TYPE_CHECKING:
+    from ...compiler.scenes.encode_kernel import EncodeArtifact
+    from ...compiler.scenes.path_kernel import PathArtifact
+    from ...compiler.scenes.plane_kernel import PlaneArtifact
+    from ...compiler.scenes.smooth_kernel import SmoothKernels
+    from ...compiler.training.step_kernel import StepKernel
     from .passes import Passes
-
-Kernel = Artifact | PathArtifact | EncodeArtifact | PlaneArtifact
-"""A kernel of any role."""
 
 Size = tuple[int, int]
 """Height and width."""
@@ -60,6 +65,63 @@ and shifts take far longer than tiles of floats."""
 
 INDEX_LIMIT = 2**31
 """Numbers of an image must be fewer where a kernel's indices are `int`."""
+
+
+class Kernel(Protocol):
+    """A kernel of any role, as a device sees it."""
+
+    @property
+    def target(self) -> str:
+        """Return the name of the target."""
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names the kernel."""
+
+    @property
+    def source(self) -> str:
+        """Return the source."""
+
+    @property
+    def entry_point(self) -> str:
+        """Return the name of the kernel's function."""
+
+    @property
+    def interface(self) -> Interface:
+        """Return the arrays and integers that the kernel takes."""
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """Return the manifest, as JSON's types."""
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """Return the kernels in the order in which they run: this one, or two passes."""
+
+
+class Denoiser(Kernel, Protocol):
+    """The kernel of a network: it fills windows from images, and writes so many channels."""
+
+    @property
+    def weights(self) -> NDArray[np.float32]:
+        """Return the weights in the kernel's order."""
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Return the images that the window is filled from, in order."""
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels of the result."""
+
+    @property
+    def kernels(self) -> tuple[Denoiser, ...]:
+        """Return the kernels in the order in which they run: this one, or two passes."""
+
+
+def is_denoiser(kernel: Kernel) -> TypeGuard[Denoiser]:
+    """Tell whether a kernel is that of a network."""
+    return kernel.interface.role == DENOISE
 
 
 @dataclass(frozen=True)
@@ -117,6 +179,7 @@ class Executor(ABC):
     homes of weights, apart from the target's usual one, whose kernels it runs
     [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
+    `interprets`: it runs programs as they are, without kernels.
     """
 
     name: str
@@ -131,6 +194,7 @@ class Executor(ABC):
     homes: tuple[str, ...] = ()
     paints: bool = False
     smooths: bool = False
+    interprets: bool = False
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}
@@ -195,7 +259,7 @@ class Executor(ABC):
         """Return (planes, rows, columns) of the sums that a kernel writes: the part's, or more than it."""
         return len(kernel.planes), part.rows, part.width
 
-    def check_size(self, artifact: Artifact, size: Size) -> None:
+    def check_size(self, artifact: Denoiser, size: Size) -> None:
         """Refuse images of a size (height, width) that the device cannot hold."""
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
@@ -216,7 +280,7 @@ class Executor(ABC):
 
     def build(self, kernel: Kernel, size: Size = (1, 1)) -> None:
         """Make a kernel, or both of its passes, ready to run on images of `size`; again costs nothing."""
-        passes = kernel.kernels if isinstance(kernel, Artifact) else (kernel,)
+        passes = kernel.kernels
         new = [each.digest for each in passes if each.digest not in self._built]
         try:
             for each in passes:
@@ -241,18 +305,17 @@ class Executor(ABC):
 
     def _run_once(self, kernel: Kernel, size: Size) -> None:
         """Run a kernel once on black images."""
-        if isinstance(kernel, PathArtifact):
-            (self._paint if kernel.images else self._trace)(
-                kernel, Part(size[1], size[0], 0, size[0], 0, 1, 0)
-            )
-        elif isinstance(kernel, PlaneArtifact):
+        role, one = kernel.interface.role, cast("Any", kernel)
+        if role == PATH:
+            (self._paint if one.images else self._trace)(one, Part(size[1], size[0], 0, size[0], 0, 1, 0))
+        elif role == ENCODE:
+            self._encode(one, np.zeros((len(one.planes), *size), np.float32), 1)
+        elif role == DENOISE:
+            self._run(one, black(one, size))
+        else:
             from .planes import run_once
 
-            run_once(self, kernel, size)
-        elif isinstance(kernel, EncodeArtifact):
-            self._encode(kernel, np.zeros((len(kernel.planes), *size), np.float32), 1)
-        else:
-            self._run(kernel, black(kernel, size))
+            run_once(self, one, size)
 
     def forget(self) -> None:
         """Drop the kernels that were built: the next build is the driver's."""
@@ -267,7 +330,7 @@ class Executor(ABC):
                 for built in dropped:
                     self._discard(built.prepared)
 
-    def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
+    def run(self, artifact: Denoiser, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
         images = checked(artifact, inputs)
         self._check_target(artifact)
@@ -276,7 +339,7 @@ class Executor(ABC):
         self.build(artifact, (height, width))
         return self._run(artifact, images)
 
-    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
+    def _run(self, artifact: Denoiser, images: Images) -> NDArray[np.float32]:
         """Run a built artifact on checked images."""
         height, width = next(iter(images.values())).shape[:2]
         with self._session((height, width)), ExitStack() as made:
@@ -296,14 +359,14 @@ class Executor(ABC):
         made.callback(self._release, memory)
         return memory
 
-    def _chain(self, artifact: Artifact, images: Mapping[str, Memory], written: Sequence[Memory]) -> None:
+    def _chain(self, artifact: Denoiser, images: Mapping[str, Memory], written: Sequence[Memory]) -> None:
         """Start an artifact's kernels one after another: what one has written is the image of the next."""
         for kernel, result in zip(artifact.kernels, written, strict=True):
             arrays = {f"{IMAGE}{name}": memory for name, memory in images.items()}
             integers = {"width": result.shape[1], "height": result.shape[0]}
             prepared = self._built[kernel.digest].prepared
             self._start(kernel, prepared, {**arrays, RESULT: result}, integers)
-            images = {image.name: result for image in gather_of(artifact).images}
+            images = {image.name: result for image in artifact.images}
 
     def trace(
         self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None
@@ -421,7 +484,7 @@ class Executor(ABC):
 
         return followed(self, kernel, arrays)
 
-    def passes(self, encode: EncodeArtifact, denoise: Artifact, size: Size) -> Passes:
+    def passes(self, encode: EncodeArtifact, denoise: Denoiser, size: Size) -> Passes:
         """Return passes over a picture of `size` (height, width), whose images stay on the device."""
         from .passes import Passes
 
@@ -464,6 +527,6 @@ def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> ND
     return numbers.copy()
 
 
-def shapes(artifact: Artifact, size: Size) -> list[tuple[int, ...]]:
+def shapes(artifact: Denoiser, size: Size) -> list[tuple[int, ...]]:
     """Return the shapes (H, W, C) of what an artifact's kernels write."""
-    return [(*size, output_channels(kernel.program)) for kernel in artifact.kernels]
+    return [(*size, kernel.channels) for kernel in artifact.kernels]

@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
-from ...compiler.core.ir import Gather, Image
-from ...compiler.schedules.emit import output_channels
+from ...compiler.core.ir import Image
 from ...refimpl.errors import InputError
+
+if TYPE_CHECKING:
+    from .executor import Denoiser
 
 Images = Mapping[str, NDArray[np.float32]]
 """Images (H, W, C) by name."""
 
 
-def gather_of(artifact: Artifact) -> Gather:
-    """Return how the artifact's window is filled."""
-    gather = artifact.program.gather
-    assert gather is not None, "compile_program refuses programs without one"
-    return gather
-
-
-def images_of(artifact: Artifact) -> tuple[Image, ...]:
+def images_of(artifact: Denoiser) -> tuple[Image, ...]:
     """Return the images that a caller gives: those of the first kernel."""
-    return gather_of(artifact.kernels[0]).images
+    return artifact.kernels[0].images
 
 
-def checked(artifact: Artifact, inputs: Images) -> Images:
+def checked(artifact: Denoiser, inputs: Images) -> Images:
     """Return the images in the kernel's order, contiguous, or say what is wrong with them."""
     wanted = images_of(artifact)
     if sorted(inputs) != sorted(image.name for image in wanted):
@@ -52,9 +47,9 @@ def checked(artifact: Artifact, inputs: Images) -> Images:
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
 
 
-def widest(artifact: Artifact) -> int:
+def widest(artifact: Denoiser) -> int:
     """Return the most channels of an image that one of the artifact's kernels reads or writes."""
-    written = [output_channels(kernel.program) for kernel in artifact.kernels]
+    written = [kernel.channels for kernel in artifact.kernels]
     return max(*written, *(image.channels for image in images_of(artifact)))
 
 
@@ -82,6 +77,6 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
     )
 
 
-def black(artifact: Artifact, size: tuple[int, int]) -> Images:
+def black(artifact: Denoiser, size: tuple[int, int]) -> Images:
     """Return black images of `size` (height, width), for the run that makes drivers finish compiling."""
     return {i.name: np.zeros((*size, i.channels), np.float32) for i in images_of(artifact)}

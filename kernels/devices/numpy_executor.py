@@ -21,9 +21,10 @@ from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...compiler.schedules.emit import kernel_gather
 from ...refimpl.network import dataset
 from .executor import Executor, Kernel, Memory
-from .images import Images, gather_of
+from .images import Images
 from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22
@@ -38,6 +39,7 @@ class NumpyExecutor(Executor):
     """Runs the program itself; there is nothing to build."""
 
     name = "numpy"
+    interprets = True
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,8 +59,8 @@ class NumpyExecutor(Executor):
                 held[f"{IMAGE}{name}"][:] = image
         elif isinstance(kernel, PlaneArtifact):
             INTERPRETED[kernel.role](kernel, held, integers)
-        else:
-            images = [held[f"{IMAGE}{image.name}"] for image in gather_of(kernel).images]
+        elif isinstance(kernel, Artifact):
+            images = [held[f"{IMAGE}{image.name}"] for image in kernel.images]
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
 
 
@@ -106,7 +108,7 @@ def _encoded(kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) ->
 
 def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np.float32]) -> None:
     """Fill the output (H, W, C) of one kernel for its images, joined."""
-    gather = gather_of(artifact)
+    gather = kernel_gather(artifact.program)
     height, width, _ = image.shape
     padded = dataset.pad(image, gather.window, gather.axes)
     rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))

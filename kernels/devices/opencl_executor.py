@@ -14,22 +14,33 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.plane_kernel import PlaneArtifact
-from ...compiler.training.step_kernel import StepKernel
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, Part, Size, in_order, shapes
+from .executor import (
+    BYTE_SCHEDULE,
+    INDEX_LIMIT,
+    Denoiser,
+    Executor,
+    Kernel,
+    Memory,
+    Part,
+    Size,
+    in_order,
+    is_denoiser,
+    shapes,
+)
 from .images import Images, widest
-from .opencl_trainer import OpenCLTrainer
+
+if TYPE_CHECKING:
+    from ...compiler.scenes.path_kernel import PathArtifact
+    from ...compiler.training.step_kernel import StepKernel
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
@@ -138,21 +149,21 @@ class OpenCLExecutor(Executor):
         return 1, 1
 
     def _prepare(self, kernel: Kernel) -> _Prepared:
-        if isinstance(kernel, Artifact):
+        if is_denoiser(kernel):
             schedule = kernel.manifest["schedule"]
             local, extent = self._local_size(kernel), (schedule["pixels"], schedule.get("rows", 1))
-        elif isinstance(kernel, PathArtifact | PlaneArtifact):
-            local, extent = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], (kernel.lanes, 1)
+        elif lanes := getattr(kernel, "lanes", 0):
+            local, extent = PATH_LOCAL_SIZE[min(lanes, 2)], (lanes, 1)
         else:
             local, extent = LOCAL_SIZE, (1, 1)
         function = getattr(self._compiled(kernel.source), kernel.entry_point)
         weights = None
-        if isinstance(kernel, Artifact):
+        if is_denoiser(kernel):
             # An empty buffer is not a buffer.
             weights = self._copied(kernel.weights if kernel.weights.size else np.zeros(1, np.float32))
         return _Prepared(function, kernel.interface, weights, local, extent)
 
-    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
+    def check_size(self, artifact: Denoiser, size: tuple[int, int]) -> None:
         """Refuse images that do not fit one buffer of the device, or whose indices `int` does not hold."""
         height, width = size
         most = widest(artifact)
@@ -165,7 +176,7 @@ class OpenCLExecutor(Executor):
                 "split the picture, or use executor numpy",
             )
 
-    def _local_size(self, artifact: Artifact) -> tuple[int, int]:
+    def _local_size(self, artifact: Denoiser) -> tuple[int, int]:
         """Return the size of a group: smaller on a processor for kernels with large arrays."""
         if group := artifact.manifest["schedule"].get("group"):
             self._check_group(artifact.manifest)
@@ -174,11 +185,9 @@ class OpenCLExecutor(Executor):
         if self._device.type & cl.device_type.CPU:
             items = min(items, STACK_BYTES // max(used, 1))
         if not items:
-            width = max(node.type.shape[0] for node in artifact.program.nodes if node.type.shape)
             raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes a pixel (the longest vector has "
-                f"{width} numbers): at most {STACK_BYTES} fit a processor's stack; use narrower layers, or a "
-                "GPU, or executor numpy"
+                f"{self.device}: the kernel's arrays take {used} bytes per pixel: at most {STACK_BYTES} fit "
+                "a processor's stack; use narrower layers, or a GPU, or executor numpy"
             )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
         x = min(wanted[0], items)
@@ -291,7 +300,7 @@ class OpenCLExecutor(Executor):
         self._kept = None
 
     def kernel_seconds(
-        self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
+        self, artifact: Denoiser, images: Images, clock: Callable[[], float] = time.perf_counter
     ) -> float:
         """Return the time of only a built artifact's kernels: images and result stay on the device."""
         size = next(iter(images.values())).shape[:2]
@@ -317,6 +326,8 @@ class OpenCLExecutor(Executor):
                 "the step is scheduled for processors: here it would take very long",
                 f"set {DEVICE_VARIABLE} to a part of a processor's name, such as portable (PoCL)",
             )
+        from .opencl_trainer import OpenCLTrainer
+
         return OpenCLTrainer(self._queue, self._compiled(kernel.source), kernel, values, targets)
 
     def _compiled(self, source: str) -> Any:

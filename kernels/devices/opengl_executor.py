@@ -19,14 +19,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import osmesa
-from .executor import Executor, Kernel, Memory, Size
+from .executor import Denoiser, Executor, Kernel, Memory, Size, is_denoiser
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\
@@ -144,7 +143,7 @@ class OpenGLExecutor(Executor):
     def _prepare(self, kernel: Kernel) -> _Prepared:
         with ExitStack() as made:
             weights = None
-            if isinstance(kernel, Artifact):
+            if is_denoiser(kernel):
                 self._check_promise(kernel)
                 if "group" in kernel.manifest["schedule"]:
                     return self._compile_compute(kernel)
@@ -154,7 +153,7 @@ class OpenGLExecutor(Executor):
             made.pop_all()
             return _Prepared(program, triangle, weights, kernel.interface)
 
-    def _check_promise(self, artifact: Artifact) -> None:
+    def _check_promise(self, artifact: Denoiser) -> None:
         """Refuse a bound that the device cannot keep."""
         rounds = any(artifact.manifest["bound"]["output"] or ())
         if rounds and ORDER_EXTENSION not in self._context.extensions:
@@ -168,7 +167,7 @@ class OpenGLExecutor(Executor):
             if thing is not None:
                 thing.release()
 
-    def _compile_compute(self, artifact: Artifact) -> _Prepared:
+    def _compile_compute(self, artifact: Denoiser) -> _Prepared:
         """Compile a compute shader, and put the weights into a storage buffer."""
         schedule = artifact.manifest["schedule"]
         if self._context.version_code < SHADER_VERSION:
@@ -200,7 +199,7 @@ class OpenGLExecutor(Executor):
         made.callback(program.release)
         return program, self._context.vertex_array(program, [])
 
-    def _weights(self, artifact: Artifact) -> Any:
+    def _weights(self, artifact: Denoiser) -> Any:
         """Return the weights as a texture of whole rows."""
         texel = artifact.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1)
         rows = max(1, -(-artifact.weights.size // (WEIGHT_TEXTURE_WIDTH * texel)))

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from .executor import Executor, Memory, Part, Size, numbers_for, shapes
+from .executor import Denoiser, Executor, Memory, Part, Size, numbers_for, shapes
 from .images import images_of
 
 PICTURE = "picture"
@@ -29,7 +28,7 @@ PICTURE = "picture"
 class Passes:
     """Kernels with their images on a device; a context manager that gives the images back."""
 
-    def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Artifact, size: Size) -> None:
+    def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Denoiser, size: Size) -> None:
         self.encoder, self.denoiser, self.size = encode, denoise, size
         self._executor, self._sums = executor, Memory((), None)
         self._numbers, self._given = Memory((), None), np.zeros(0, np.float32)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...compiler.artifact import Artifact
+from ...compiler.artifact import Artifact, schedule_text
 from ...compiler.core.lower import OWN_NUMBERS
 from ...compiler.languages.c import whole
 from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
-from ...compiler.schedules.schedules import text
 from .bindings import input_section
 from .hosts.host import Host
 from .targets import DISPATCHED, ONNX, TARGETS, Row
@@ -197,7 +196,7 @@ def _schedule(facts: Mapping[str, Any]) -> list[str]:
         return []
     others = [name for name in facts["schedules"] if name != picked["name"]]
     besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
-    return [f"* Schedule: {text(picked)}.{besides}"]
+    return [f"* Schedule: {schedule_text(picked)}.{besides}"]
 
 
 def _halves(facts: Mapping[str, Any]) -> list[str]:

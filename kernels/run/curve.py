@@ -20,7 +20,7 @@ from typing import Any
 from ...compiler import variants
 from ...refimpl.errors import InputError
 from ...refimpl.reading import parse_json, read_file, refusing
-from . import cache
+from .. import cache
 
 SCHEMA = "wamnet-curve-1"
 """Name and version of a curve's form; described in spec/variants.md."""

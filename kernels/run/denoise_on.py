@@ -1,42 +1,54 @@
-"""Denoise a frame on an executor: lower, compile, encode, run, with both times.
+"""Denoise frames on an executor: choose, compile, encode, run, with both times.
 
-Features are encoded by the reference; the edge-avoiding filter, which takes it longer than a kernel takes for
-the network, runs on the device [`images_on`].
+1. [`Denoiser`] is a network on a device: its kernel is chosen for a size, and compiled or, for a command,
+   taken from the cache [kept.py], before the frame is encoded.
+2. Features are encoded by the reference, in blocks of rows that fit a processor's cache; the edge-avoiding
+   filter, which takes it longer than a kernel takes for the network, runs on the device [`images_on`].
+3. [`denoise_on`] does both for one frame.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_plan
-from ...compiler.core.ir import sha256
-from ...compiler.core.profiles import profile_named
-from ...compiler.scenes.smooth_kernel import SmoothKernels, compile_smoothing
-from ...compiler.schedules import schedules
-from ...compiler.schedules.schedules import PLAIN
-from ...compiler.variants import FULL, plan_model
+from ...compiler.artifact import schedule_text
+from ...compiler.languages.interface import FULL, PLAIN
+from ...compiler.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
-from ..devices.executor import Executor
+from ..devices.executor import Denoiser as Kernel
+from ..devices.executor import Executor, Size
 from ..devices.images import Images
 from ..memory import keep_freed_memory
-from .tune import choose
+from .kept import kept_kernels
+from .tune import Subject, pick
+
+if TYPE_CHECKING:
+    from ...compiler.plan import Plan
+    from ...compiler.scenes.smooth_kernel import SmoothKernels
+
+BLOCK_PIXELS = 2**14
+"""Pixels of a block of rows that is encoded at once: some copies of it fit a processor's cache."""
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """The picture (H, W, 3), display-encoded, and where and how fast it was made.
+    """The image (H, W, 3), display-encoded, and where and how fast it was made.
 
-    `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels.
+    `seconds_compile`: tracing, passes, bound, emission, the driver's compilation and one run on a few pixels,
+    or reading what is kept of it.
     `seconds_run`: images to the device, the kernel, the result back; not the encoding of the features.
     `schedule`: what was picked, and why, where it is not the requested one; `reason`: why that was requested.
     `kernel`: its digest. `variant`: what it may cost.
@@ -54,44 +66,79 @@ class RunResult:
     @property
     def digest(self) -> str:
         """Return the SHA-256 of the picture's numbers, little-endian float32, rows from the top."""
-        return sha256(self.image.astype("<f4").tobytes())
+        return hashlib.sha256(self.image.astype("<f4").tobytes()).hexdigest()
 
 
 def images_of(model: Model, frame: Frame) -> Images:
     """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
     # NumPy works without the interpreter's lock: features are encoded beside each other.
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        made = pool.map(lambda name: input_image(model, frame, (name,)), model.features)
-        return dict(zip(model.features, made, strict=True))
+        images = pool.map(lambda name: _image(model, frame, name), model.features)
+        return dict(zip(model.features, images, strict=True))
 
 
-def filter_of(executor: Executor, model: Model, frame: Frame, profile: str) -> SmoothKernels | None:
+def _image(model: Model, frame: Frame, name: str) -> NDArray[np.float32]:
+    """Return one feature's image, in blocks of rows where each pixel is encoded by itself."""
+    feature, rows = FEATURES[name], max(1, BLOCK_PIXELS // frame.width)
+    if feature.guides or frame.height <= rows:
+        return input_image(model, frame, (name,))
+    image = np.empty((frame.height, frame.width, feature.channels), np.float32)
+    for top in range(0, frame.height, rows):
+        block = slice(top, top + rows)
+        layers = {layer: frame[layer][block] for layer in feature.layers if layer in frame.layers}
+        image[block] = input_image(model, Frame(layers, frame.info), (name,))
+    return image
+
+
+def filter_of(
+    executor: Executor, model: Model, frame: Frame, profile: str, keeps: bool = False
+) -> SmoothKernels | None:
     """Return the kernels, built, that smooth a frame's features on a device; None: the reference does.
 
     The reference smooths where a device would take longer, where a picture has the same bits on all devices
     (integers, profile `exact`), and layers with more digits than a kernel reads.
     """
     layers = [layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers]
-    same_bits = model.is_whole or bool(profile_named(profile).common)
-    if not layers or not executor.smooths or same_bits:
+    if not layers or not executor.smooths or model.is_whole:
+        return None
+    from ...compiler.core.profiles import profile_named
+
+    if profile_named(profile).common:
         return None
     if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
         return None
-    kernels = _compiled(model.normalization, executor.name, profile, executor.lanes)
+    kernels = _filter(model.normalization, executor.name, profile, executor.lanes, keeps)
     for kernel in (kernels.guide, kernels.smooth, kernels.encode):
         executor.build(kernel)
     return kernels
 
 
 @lru_cache(maxsize=16)
-def _compiled(normalization: Normalization, target: str, profile: str, lanes: int) -> SmoothKernels:
+def _filter(
+    normalization: Normalization, target: str, profile: str, lanes: int, keeps: bool
+) -> SmoothKernels:
     """Return the kernels of the filter, which all models with these scales share."""
-    return compile_smoothing(normalization, target, profile, lanes)
+
+    def compiled() -> Sequence[Any]:
+        from ...compiler.scenes.smooth_kernel import compile_smoothing
+
+        kernels = compile_smoothing(normalization, target, profile, lanes)
+        return (kernels.guide, kernels.smooth, kernels.encode)
+
+    if keeps:
+        kernels: Sequence[Any] = kept_kernels(
+            "filter", (asdict(normalization), target, profile, lanes), compiled
+        )
+    else:
+        kernels = compiled()
+    return cast("SmoothKernels", SimpleNamespace(guide=kernels[0], smooth=kernels[1], encode=kernels[2]))
 
 
-def images_on(executor: Executor, model: Model, frame: Frame, profile: str = "ieee") -> Images:
+def images_on(
+    executor: Executor, model: Model, frame: Frame, profile: str = "ieee", keeps: bool = False
+) -> Images:
     """Return the images of [`images_of`], smoothed ones by the device where it does that: up to SMO-5."""
-    kernels = filter_of(executor, model, frame, profile)
+    kernels = filter_of(executor, model, frame, profile, keeps)
     if kernels is None:
         return images_of(model, frame)
     others = [name for name in model.features if not FEATURES[name].guides]
@@ -100,6 +147,66 @@ def images_on(executor: Executor, model: Model, frame: Frame, profile: str = "ie
         given = {"color": feature.layer, **feature.guides}
         found[feature.name] = executor.smooth(kernels, {what: frame[layer] for what, layer in given.items()})
     return {name: found[name] for name in model.features}
+
+
+@dataclass
+class Denoiser:
+    """A network on a device; `model` is the variant of it that runs.
+
+    Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
+    `keeps`: kernels are taken from the cache, and put there; nothing about the network is proven.
+    """
+
+    executor: Executor
+    full: Model
+    profile: str = "ieee"
+    schedule: str | None = None
+    variant: str = FULL
+    pictures: int = 1
+    keeps: bool = False
+    model: Model = field(init=False)
+    plan: Plan | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        """Plan the network where a variant changes it, or its plan is needed."""
+        self.keeps = self.keeps and not self.executor.interprets
+        if not (self.keeps and self.variant == FULL):
+            self.plan = self._planned()
+        self.model = self.plan.model if self.plan else self.full
+
+    def _planned(self) -> Plan:
+        """Return the plan."""
+        from ...compiler.variants import plan_model
+
+        plan = plan_model(self.full, self.executor.name, self.profile, self.schedule or PLAIN, self.variant)
+        return replace(plan, proves=not self.keeps)
+
+    def kernel(self, size: Size) -> tuple[Kernel, str]:
+        """Return the kernel for frames of `size` (height, width), not yet built, and why this schedule."""
+        name, reason = self.schedule, "as asked"
+        if name is None:
+            subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.profile)
+            name, reason = pick(self.executor, subject, size, self.pictures)
+        if not self.keeps:
+            return self._compiled(name)[0], reason
+        digest = hashlib.sha256(model_bytes(self.full)).hexdigest()
+        parts = (digest, self.executor.name, self.profile, self.variant, name)
+        return kept_kernels("kernel", parts, lambda: self._compiled(name))[0], reason
+
+    def _compiled(self, schedule: str) -> Sequence[Kernel]:
+        """Return the kernel, compiled."""
+        from ...compiler.compile import compile_plan
+
+        self.plan = self.plan or self._planned()
+        return (compile_plan(self.plan.scheduled(schedule)),)
+
+    def images(self, frame: Frame) -> Images:
+        """Return the images (H, W, C) that the kernel reads, by name."""
+        return images_on(self.executor, self.model, frame, self.profile, self.keeps)
+
+    def prepare(self, frame: Frame) -> None:
+        """Build the kernels that smooth a frame's features on the device, if there are any."""
+        filter_of(self.executor, self.model, frame, self.profile, self.keeps)
 
 
 def denoise_on(
@@ -111,38 +218,34 @@ def denoise_on(
     variant: str = FULL,
     pictures: int = 1,
     images: Images | None = None,
+    keeps: bool = False,
 ) -> RunResult:
-    """Return the denoised frame and the times.
+    """Return the denoised frame and the times, by a [`Denoiser`].
 
-    Without a `schedule`, it is the one that suits device, size and so many `pictures` to come [tune.py].
     `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
-    with the reference's picture; by default the device may make them [`images_on`].
+    with the reference's image; by default the device may make them [`images_on`].
     """
     start = time.perf_counter()
-    size = (frame.height, frame.width)
-    plan, reason = plan_model(model, executor.name, profile, schedule or PLAIN, variant), "as asked"
+    denoiser = Denoiser(executor, model, profile, schedule, variant, pictures, keeps)
     if images is None:
-        filter_of(executor, plan.model, frame, profile)
+        denoiser.prepare(frame)
     planned = time.perf_counter() - start
     # A frame that lacks a layer is refused before its denoiser is compiled; encoding is not part of that.
     if images is None:
-        images = images_on(executor, plan.model, frame, profile)
+        images = denoiser.images(frame)
     start = time.perf_counter() - planned
-    if not schedule:
-        found = choose(executor, plan, size, pictures)
-        plan, reason = found.plan, found.reason
-    artifact = compile_plan(plan)
-    executor.build(artifact, size)
+    size = (frame.height, frame.width)
+    kernel, reason = denoiser.kernel(size)
+    executor.build(kernel, size)
     keep_freed_memory()
     built = time.perf_counter()
-    image = executor.run(artifact, images)
+    image = executor.run(kernel, images)
     seconds = time.perf_counter() - built
-    picked = schedules.text(artifact.manifest["schedule"])
-    facts = (executor.device, picked, reason, artifact.digest, _text_of(artifact))
-    return RunResult(image, built - start, seconds, *facts)
+    facts = (executor.device, schedule_text(kernel.manifest["schedule"]), reason, kernel.digest)
+    return RunResult(image, built - start, seconds, *facts, _text_of(kernel))
 
 
-def _text_of(artifact: Artifact) -> str:
+def _text_of(artifact: Kernel) -> str:
     """Return what a manifest says about a variant, for a reader; nothing where it is all of the network."""
     if (found := artifact.manifest.get("variant")) is None:
         return ""

@@ -16,30 +16,25 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ... import compiler
-from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_plan
-from ...compiler.core.ir import Program
-from ...compiler.plan import Plan
-from ...compiler.schedules.emit import kernel_gather
 from ...refimpl import rng
 from ...refimpl.errors import CompileError
 from ...refimpl.network.denoise import Model
-from .. import measure
+from .. import cache, measure
 from ..devices.executor import Executor
 from ..devices.images import Images
-from . import cache
+
+if TYPE_CHECKING:
+    from ...compiler.artifact import Artifact
+    from ...compiler.core.ir import Program
+    from ...compiler.plan import Plan
 
 CROP = (19, 45)
 """Rows and columns of the picture on which results are checked: neither is a multiple of any group's."""
@@ -86,6 +81,20 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Subject:
+    """What a table is about: a network, the name of its profile, and the rank of its first layer or 0."""
+
+    model: Model
+    profile: str = "ieee"
+    rank: int = 0
+
+    @staticmethod
+    def of(plan: Plan) -> Subject:
+        """Return that of a plan."""
+        return Subject(plan.model, plan.profile.name, plan.cut.rank if plan.cut else 0)
+
+
+@dataclass(frozen=True)
 class Choice:
     """A plan with its schedule, and why that was chosen."""
 
@@ -100,25 +109,27 @@ class Choice:
 
 def choose(executor: Executor, plan: Plan, size: tuple[int, int], pictures: int = 1) -> Choice:
     """Return a plan for so many pictures of `size` (height, width): as measured here, or built in."""
-    if len(plan.target.schedules) > 1 and (found := remembered(executor, plan, size)):
-        best = found.best(pictures)
-        if best is not None:
-            height, width = found.size
-            text = f"tuned on this device on {found.day}: {best.ms:.3g} ms at {width}x{height}"
-            return Choice(plan.scheduled(best.schedule), f"{text}, {best.again_s:.2g} s to build")
-    if kernel_gather(plan.analysed).whole and (name := executor.byte_schedule):
-        return Choice(plan.scheduled(name), "built-in choice for integers on devices that multiply bytes")
-    return Choice(plan.scheduled(executor.schedule_for(size)), executor.schedule_reason)
+    name, reason = pick(executor, Subject.of(plan), size, pictures)
+    return Choice(plan.scheduled(name), reason)
 
 
-def remembered(executor: Executor, plan: Plan, size: tuple[int, int]) -> Table | None:
+def pick(executor: Executor, subject: Subject, size: tuple[int, int], pictures: int = 1) -> tuple[str, str]:
+    """Return the schedule of [`choose`] by name, and the reason, without a plan."""
+    table = None if executor.interprets else remembered(executor, subject, size)
+    if table is not None and (best := table.best(pictures)) is not None:
+        height, width = table.size
+        text = f"tuned on this device on {table.day}: {best.ms:.3g} ms at {width}x{height}"
+        return best.schedule, f"{text}, {best.again_s:.2g} s to build"
+    if subject.model.is_whole and (name := executor.byte_schedule):
+        return name, "built-in choice for integers on devices that multiply bytes"
+    return executor.schedule_for(size), executor.schedule_reason
+
+
+def remembered(executor: Executor, subject: Subject, size: tuple[int, int]) -> Table | None:
     """Return what was measured for this device, network and size, if it was."""
-    found = cache.read_json(_entry(executor, plan, size))
+    found = cache.read_json(_entry(executor, subject, size))
     try:
         rows = tuple(Row(**row) for row in found["rows"])
-        known = {schedule.name for schedule in plan.target.schedules}
-        if not known >= {row.schedule for row in rows}:
-            return None
         height, width = found["size"]
         return Table(found["device"], found["network"], (height, width), found["day"], rows)
     except (TypeError, KeyError, ValueError):
@@ -157,7 +168,7 @@ def tune(
         rows[name] = Row(name, 1e3 * times.median, rows[name].first_s, rows[name].again_s)
     day = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
     table = Table(executor.device, shape_text(plan.model), size, day, tuple(rows.values()))
-    cache.write_json(_entry(executor, plan, size), asdict(table))
+    cache.write_json(_entry(executor, Subject.of(plan), size), asdict(table))
     return table
 
 
@@ -176,6 +187,8 @@ def _way(executor: Executor, artifact: Artifact, images: Images) -> Callable[[],
 
 def _built(executor: Executor, plan: Plan, size: tuple[int, int]) -> tuple[Row, Artifact]:
     """Return a plan's artifact, built, with both times of compilation; raise where it cannot be."""
+    from ...compiler.compile import compile_plan
+
     seconds = []
     for _ in range(2):
         executor.forget()
@@ -235,21 +248,12 @@ def device_parts(executor: Executor) -> list[Any]:
     return [executor.name, executor.device, executor.driver, cores]
 
 
-def _entry(executor: Executor, plan: Plan, size: tuple[int, int]) -> str:
-    """Return the name of the cache's entry."""
-    model, rank = plan.model, plan.cut.rank if plan.cut else 0
+def _entry(executor: Executor, subject: Subject, size: tuple[int, int]) -> str:
+    """Return the name of the cache's entry: a table of other kernels than today's is no use."""
+    model = subject.model
     network = [list(model.siren.widths), list(model.features), model.window.size, model.window.border]
-    parts = [*device_parts(executor), network, plan.profile.name, rank, size_class(size), schedules_version()]
-    return f"tuning-{cache.key(*parts)}"
-
-
-@lru_cache(maxsize=1)
-def schedules_version() -> str:
-    """Return the hash of the compiler's text: a table of other kernels than today's is no use."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(next(iter(compiler.__path__))).rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    how = [subject.profile, subject.rank, size_class(size), cache.program_version()]
+    return f"tuning-{cache.key(*device_parts(executor), network, *how)}"
 
 
 FIRSTS = 64

@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from wamnet.cli.commands import tune
-from wamnet.kernels.run import cache
+from wamnet.kernels import cache
 from wamnet.kernels.run import tune as tuning
 
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.schedules import schedules
 from wamnet.compiler.schedules.c_tiled import C_LADDER
 from wamnet.compiler.schedules.emit_inlined import LARGEST_WEIGHTS
 from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
@@ -170,7 +170,7 @@ def test_the_manifest_says_what_was_picked():
     assert found["schedule"]["name"] == "tile8"
     assert found["schedule"]["pixels"] == 6
     assert "block by block" in found["weights"]["order"]
-    assert schedules.text(found["schedule"]).startswith("tile8: the same for 16 registers of 8 numbers")
+    assert schedule_text(found["schedule"]).startswith("tile8: the same for 16 registers of 8 numbers")
     plain = compile_program(small(), "opencl").manifest
     assert plain["schedule"] == {"name": "plain", "idea": OPENCL_PLAIN.idea, "pixels": 1}
     assert plain["bound"] == found["bound"]
@@ -214,7 +214,7 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
     assert found.manifest["schedule"]["name"] == "plain"
     assert found.manifest["schedule"]["asked"] == "tile16"
     assert re.match(reason, found.manifest["schedule"]["reason"])
-    assert re.search(rf"\(not tile16: {reason}", schedules.text(found.manifest["schedule"]))
+    assert re.search(rf"\(not tile16: {reason}", schedule_text(found.manifest["schedule"]))
     assert found.source == plain.source
 
 

@@ -28,7 +28,8 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
-from wamnet.kernels.run import cache, curve
+from wamnet.kernels import cache
+from wamnet.kernels.run import curve
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.light import scene, variation
 from wamnet.refimpl.light.render import Job, render

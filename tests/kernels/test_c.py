@@ -387,3 +387,26 @@ def test_integers_are_exact_whatever_the_options(executor_named, tmp_path, sched
     ).stdout.split()
     found = np.array([float.fromhex(line) for line in lines], np.float32).reshape(expected.shape)
     assert found.tobytes() == expected.tobytes()
+
+
+def test_a_library_is_compiled_once_for_a_compiler_and_a_processor(case, monkeypatch, tmp_path):
+    monkeypatch.setenv("WAMNET_CACHE", str(tmp_path))
+    artifact, calls = compile_program(case[0], "c"), []
+    call = c_executor.CExecutor._call
+
+    def counted(self, *arguments):
+        calls.append(arguments)
+        return call(self, *arguments)
+
+    monkeypatch.setattr(c_executor.CExecutor, "_call", counted)
+    pictures = []
+    for change in (None, None, "processor"):
+        if change:
+            monkeypatch.setattr(c_executor, "processor", lambda: "another")
+        calls.clear()
+        with kernels.open_executor("c") as executor:
+            pictures.append(executor.run(artifact, case[1]))
+        compiled = sum("-shared" in arguments for arguments in calls)
+        assert compiled == (1 if change or len(pictures) == 1 else 0)
+        assert len(calls) == (1 if compiled == 0 else 3), "the version; the trial and the library"
+    assert all(np.array_equal(picture, pictures[0]) for picture in pictures)

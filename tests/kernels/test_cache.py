@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.kernels.run import cache
+from wamnet.kernels import cache
 
 DATA = {"winner": "tile16", "ms": [1.5, 2.25], "none": None}
 """Some data."""

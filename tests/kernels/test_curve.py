@@ -11,7 +11,8 @@ import pytest
 
 from wamnet.compiler import variants
 from wamnet.compiler.targets import DENOISERS
-from wamnet.kernels.run import cache, curve, measure_curve
+from wamnet.kernels import cache
+from wamnet.kernels.run import curve, measure_curve
 from wamnet.kernels.run.curve import Curve, Limits, Point, choose
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

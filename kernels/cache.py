@@ -3,11 +3,13 @@
 1. The folder is WAMNET_CACHE, else `wamnet` in XDG_CACHE_HOME, else `~/.cache/wamnet` [`folder`].
 2. An entry is JSON around its data: the form's name and the data's SHA-256 [`write_json`]. It is written
    under another name and then takes its own, so that no reader sees half of one; the last writer wins.
-3. What cannot be read, is not of this form, or does not have its checksum is as if it were not there, with a
+3. An entry of what a program computed once for all [`kept`] is made once; of each kind the newest stay.
+4. What cannot be read, is not of this form, or does not have its checksum is as if it were not there, with a
    line in the log `wamnet` [`read_json`]; the next write replaces it. A cache that cannot be written costs
    time, never a run.
 
-Names hold all that an entry depends on [`key`]: nothing is ever brought up to date in place.
+Names hold all that an entry depends on [`key`], the program's own version included [`program_version`]:
+nothing is ever brought up to date in place.
 """
 
 from __future__ import annotations
@@ -16,13 +18,15 @@ import hashlib
 import json
 import logging
 import os
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ...compiler.core.writing import write_bytes
-from ...refimpl.errors import InputError, shown
-from ...refimpl.reading import BROKEN, parse_json, read_file
+from ..compiler.core.writing import write_bytes
+from ..refimpl.errors import InputError, shown
+from ..refimpl.reading import BROKEN, parse_json, read_file
 
 FOLDER_VARIABLE = "WAMNET_CACHE"
 """Environment variable that names another folder."""
@@ -31,7 +35,10 @@ SCHEMA = "wamnet-cache-1"
 """Name and version of an entry's form."""
 
 LARGEST_BYTES = 1 << 24
-"""Largest file that is taken for an entry: 16 MiB."""
+"""Largest file that is taken for an entry, or written as one: 16 MiB."""
+
+MOST_KEPT = 64
+"""Entries of a kind that stay: some networks on some devices."""
 
 _log = logging.getLogger("wamnet")
 
@@ -49,6 +56,37 @@ def key(*parts: object) -> str:
     """Return a short name for all that an entry depends on: JSON's types, in this order."""
     text = json.dumps(parts, sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@lru_cache(maxsize=1)
+def program_version() -> str:
+    """Return a hash of names, sizes and times of the modules: another program makes other kernels."""
+    root, digest = Path(__file__).parents[1], hashlib.sha256()
+    for folder in (root / name for name in ("compiler", "kernels", "refimpl")):
+        for path in sorted(folder.rglob("*.py")):
+            facts = path.stat()
+            digest.update(f"{path.relative_to(root)} {facts.st_size} {facts.st_mtime_ns}\n".encode())
+    return digest.hexdigest()
+
+
+def kept(kind: str, parts: Sequence[object], make: Callable[[], Any]) -> Any:
+    """Return the data of the entry of a kind that depends on `parts`, made and kept where there is none.
+
+    `make` returns data of JSON's types, or None for what is not to be kept.
+    """
+    name = f"{kind}-{key(*parts, program_version())}"
+    if (data := read_json(name)) is None and (data := make()) is not None:
+        write_json(name, data)
+        _trim(kind)
+    return data
+
+
+def _trim(kind: str) -> None:
+    """Remove the oldest entries of a kind; others may do so at the same time."""
+    with suppress(OSError):
+        entries = sorted(folder().glob(f"{kind}-*.json"), key=lambda path: -path.stat().st_mtime)
+        for path in entries[MOST_KEPT:]:
+            path.unlink(missing_ok=True)
 
 
 def read_json(name: str) -> Any:
@@ -73,11 +111,13 @@ def read_json(name: str) -> Any:
 def write_json(name: str, data: Any) -> Path | None:
     """Keep data of JSON's types as the entry `<name>.json`; return its path, or None if it cannot be kept."""
     entry = {"schema": SCHEMA, "sha256": _checksum(data), "data": data}
-    path = _path(name)
+    path, content = _path(name), (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode()
+    if len(content) > LARGEST_BYTES:
+        return None
     try:
         # What is kept may become code of this user's processes: nobody else writes here.
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_bytes(path, (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode())
+        write_bytes(path, content)
     except OSError as error:
         _log.warning(
             "cache entry %s cannot be written (%s): nothing is kept", shown(str(path)), error.strerror

@@ -407,7 +407,7 @@ def write_pictures(output: Path, results: Results) -> None:
             images.write_png(folder / f"{index}-{name}.png", to_display(picture["color"], stops))
         for suffix in (".exr", ".png"):
             path = folder / f"{index}-denoised{suffix}"
-            write_denoised(path, frame.denoised, results.model, frame.noisy)
+            write_denoised(path, frame.denoised, results.model, frame.noisy.info)
         images.write_png(folder / f"{index}-normal.png", normal_to_display(frame.noisy["normal"]))
 
 

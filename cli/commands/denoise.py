@@ -1,21 +1,35 @@
-"""`wamnet denoise` and `wamnet executors`: a model on a frame, and what there is to run it."""
+"""`wamnet denoise` and `wamnet executors`: a model on frames, and what there is to run it.
+
+1. Frames are read, checked and encoded; denoised; and written. For a sequence that overlaps [sequence.py].
+2. A result of a sequence names its origin: model, options and frame. One that is there is not made again, so
+   that an interrupted command goes on where it was [`_origin`].
+3. What was said of several frames is said once, with their number [`Notes`].
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable
+from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..common import options
 from ..common.domain import check_domain
-from ..common.inputs import load_model, need_layers
+from ..common.inputs import load_model, model_path, need_layers
 from ..common.options import ExecutorName
-from ..common.terminal import say, table
+from ..common.sequence import frames_of, is_many, outputs_of, overlapped
+from ..common.terminal import hint_on_interrupt, progress, say, table, tell
 from ..files.outputs import check_output
 
 if TYPE_CHECKING:
+    from ...kernels.devices.images import Images
+    from ...kernels.run.denoise_on import Denoiser
     from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
 
@@ -26,6 +40,10 @@ wamnet denoise model.safetensors noisy.exr -o denoised.png
 wamnet denoise minicubes noisy.exr -o denoised.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
+
+wamnet denoise model.safetensors 'shot.%04d.exr' --executor opencl -o denoised
+
+wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.png
 
 wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
 
@@ -50,16 +68,79 @@ ViewLayer = Annotated[
 ]
 
 
+@dataclass
+class Notes:
+    """Sentences about frames, each with the first frame that it is about and how many there are."""
+
+    counts: dict[str, tuple[str, int]] = field(default_factory=dict)
+
+    def add(self, text: str) -> None:
+        """Take a sentence that begins with the name of a frame."""
+        frame, _, sentence = text.partition(": ")
+        first, count = self.counts.get(sentence, (frame, 0))
+        self.counts[sentence] = first, count + 1
+
+    def say(self) -> None:
+        """Print the sentences."""
+        for sentence, (first, count) in self.counts.items():
+            say(f"{first}{f' and {count - 1} more' if count > 1 else ''}: {sentence}")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is done with each frame: read, encoded, and written with this origin."""
+
+    denoiser: Denoiser
+    notes: Notes
+    anyway: bool
+    keep_layers: bool
+    view_layer: str
+
+    def read(self, path: Path) -> tuple[Frame, Images]:
+        """Return a frame and its encoded features, or refuse it."""
+        from ..files import exr
+
+        model = self.denoiser.full
+        noisy = exr.read_frame(path, False, self.notes.add, self.view_layer)
+        because, remedy = "the model was trained with it", "render or export that layer too"
+        need_layers(path, noisy, model.features, because, remedy)
+        _note_what_is_no_number(path, noisy, model, self.notes)
+        check_domain(path, noisy, model, self.anyway, self.notes.add)
+        return noisy, self.denoiser.images(noisy)
+
+    def write(self, output: Path, source: Path, noisy: Frame, encoded: Any, origin: str) -> None:
+        """Write a denoised image (H, W, 3), display-encoded."""
+        from ...refimpl.encoding import from_display
+        from ..files import exr
+
+        model = self.denoiser.full
+        if self.keep_layers:
+            linear = from_display(encoded, model.normalization.exposure_stops)
+            layer = exr.write_beside(output, source, linear, self.view_layer)
+            self.notes.add(f"{output}: layer {layer} is the denoised image")
+        else:
+            write_denoised(output, encoded, model, {**noisy.info, **({exr.ORIGIN: origin} if origin else {})})
+
+
 def denoise(
     model: options.ModelFile,
-    frame: Annotated[
-        Path,
+    frames: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="FRAME", help="Noisy frame with the model's layers (.exr).", show_default=False
+            metavar="FRAME...",
+            help="Noisy frames with the model's layers (.exr); shot.*.exr and shot.%04d.exr are sequences.",
+            show_default=False,
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Linear colour (.exr) or picture (.png).")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Linear colour (.exr) or display-encoded image (.png); for several frames a folder, or a "
+            "name with %04d for their numbers.",
+        ),
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorName.numpy,
     profile: options.Profile = "ieee",
@@ -73,53 +154,124 @@ def denoise(
     view_layer: ViewLayer = "",
     context: options.OpenGLContext = None,
 ) -> None:
-    """Denoise a frame with a trained model.
+    """Denoise frames with a trained model.
 
     The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
-    result is the same to the last bit on every executor; its digest is printed, to be compared.
+    result is the same to the last bit on every executor; its digest is printed, to be compared. Kernels are
+    kept: a second command compiles nothing. Of a sequence, results that are there are not made again.
     """
-    from ...kernels import denoise_on, open_executor
-    from ...kernels.run.tune import first_time
-    from ...refimpl.encoding import from_display
-    from ..files import exr
+    from ...kernels import open_executor
+    from ...kernels.run.denoise_on import Denoiser
 
-    check_output(output, (".exr",) if keep_layers else (".exr", ".png"), [model, frame])
-    network, noisy = load_model(model), exr.read_frame(frame, False, say, view_layer)
-    need_layers(
-        frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
-    )
-    _say_what_is_no_number(frame, noisy, network)
-    check_domain(frame, noisy, network, anyway)
+    paths = frames_of(frames)
+    outputs = outputs_of(paths, output)
+    many, suffixes = is_many(paths, output), (".exr",) if keep_layers else (".exr", ".png")
+    if many:
+        outputs[0].parent.mkdir(parents=True, exist_ok=True)
+    for result in outputs:
+        check_output(result, suffixes, [model, *paths])
+    network, notes = load_model(model), Notes()
+    chosen = chosen_variant(variant, rank)
     with open_executor(executor.value) as runner:
-        result = denoise_on(
-            runner, network, noisy, profile, schedule, chosen_variant(variant, rank), keeps=True
-        )
-        first = first_time(runner, result.kernel, result.seconds_compile)
-    if keep_layers:
-        linear = from_display(result.image, network.normalization.exposure_stops)
-        say(f"{output}: layer {exr.write_beside(output, frame, linear, view_layer)} is the denoised picture")
-    else:
-        write_denoised(output, result.image, network, noisy)
-    say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
+        denoiser = Denoiser(runner, network, profile, schedule, chosen, len(paths), keeps=True)
+        job = Job(denoiser, notes, anyway, keep_layers, view_layer)
+        if many:
+            how = [executor.value, profile, schedule, chosen, keep_layers, view_layer]
+            content = hashlib.sha256(model_path(model).read_bytes()).hexdigest()
+            _denoise_all(job, paths, outputs, output, _digest(content, *how))
+        else:
+            _denoise_one(job, paths[0], output)
+
+
+def _denoise_one(job: Job, path: Path, output: Path) -> None:
+    """Denoise a frame, and say all about it."""
+    from ...kernels.run.tune import first_time
+
+    denoiser = job.denoiser
+    noisy, images = job.read(path)
+    job.notes.say()
+    job.notes.counts.clear()
+    result = denoiser.run(noisy, images)
+    first = first_time(denoiser.executor, result.kernel, result.seconds_compile)
+    job.write(output, path, noisy, result.image, "")
+    job.notes.say()
+    say(f"{output}: {noisy.width}x{noisy.height} pixels on {denoiser.executor.name} ({result.device})")
     say(f"schedule {result.schedule}; {result.reason}")
     if result.variant:
         say(result.variant)
     before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
-    if profile == "exact":
+    if denoiser.profile == "exact":
         say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 
 
-def _say_what_is_no_number(path: Path, noisy: Frame, model: Model) -> None:
-    """Warn of pixels that are read as something else."""
+def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], output: Path, how: str) -> None:
+    """Denoise a sequence of frames, those that are not there; the others go on when one fails."""
+    start = time.perf_counter()
+    # A frame that is not there fails when it is read.
+    tasks = [(path, out, _origin(path, how)) for path, out in zip(paths, outputs, strict=True)]
+    missing = [task for task in tasks if not task[2] or read_origin(task[1]) != task[2]]
+
+    def work(read: tuple[Frame, Images]) -> tuple[Frame, Any]:
+        noisy, images = read
+        return noisy, job.denoiser.image(images)
+
+    def write(task: tuple[Path, Path, str], done: tuple[Frame, Any]) -> None:
+        job.write(task[1], task[0], *done, task[2])
+
+    with (
+        hint_on_interrupt(lambda: f"{output}: the same command goes on with the frames that are left"),
+        progress("denoising", len(missing), "frames") as advance,
+    ):
+        failed = overlapped(missing, lambda task: job.read(task[0]), work, write, advance)
+    job.notes.say()
+    seconds = time.perf_counter() - start
+    done, there = len(missing) - len(failed), len(tasks) - len(missing)
+    runner = job.denoiser.executor
+    rate = f", {done / seconds:.2f} frames per second" if done else ""
+    besides = f"; {there} were there already" if there else ""
+    say(f"{output}: {done} frames in {seconds:.1f} s{rate}{besides}; {runner.name} ({runner.device})")
+    for _, error in failed:
+        tell(f"error: {error}")
+    if failed:
+        count = f"{len(failed)} of {len(tasks)}"
+        rule = "they could not be denoised, for the reasons above"
+        raise InputError("number of frames that failed", count, rule, "fix them, or leave them out")
+
+
+def _digest(*parts: object) -> str:
+    """Return a hash of data of JSON's types."""
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _origin(path: Path, how: str) -> str:
+    """Return what names a result's origin: the file of its frame, and how it is made; "" without a file."""
+    try:
+        facts = path.stat()
+    except OSError:
+        return ""
+    return _digest(how, path.name, facts.st_size, facts.st_mtime_ns)
+
+
+def read_origin(path: Path) -> str | None:
+    """Return the origin that a result names; None where there is none, or it is damaged."""
+    from ..files import exr, images
+
+    if not path.exists():
+        return None
+    return images.read_origin(path) if path.suffix.lower() == ".png" else exr.read_origin(path)
+
+
+def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes) -> None:
+    """Note pixels that are read as something else."""
     from ...refimpl.frame import not_finite
     from ...refimpl.network.dataset import FEATURES
 
-    read = {layer for name in model.features for layer in FEATURES[name].layers}
+    layers = {layer for name in model.features for layer in FEATURES[name].layers}
     for layer, count in not_finite(noisy).items():
-        if layer in read:
+        if layer in layers:
             rule = "NaN is read as 0, an infinity as the end of the range"
-            say(f"{path}: {count} pixels of {layer} are not finite: {rule}")
+            notes.add(f"{path}: {count} pixels of {layer} are not finite: {rule}")
 
 
 def chosen_variant(variant: str | None, rank: int) -> str:
@@ -133,17 +285,17 @@ def chosen_variant(variant: str | None, rank: int) -> str:
     return with_rank(variant or FULL, rank)
 
 
-def write_denoised(path: Path, encoded: Any, model: Model, noisy: Frame) -> None:
+def write_denoised(path: Path, encoded: Any, model: Model, info: Mapping[str, str]) -> None:
     """Write display-encoded colour (H, W, 3): as it is to PNG, as linear radiance to EXR."""
     from ...refimpl.encoding import from_display
     from ...refimpl.frame import Frame
     from ..files import exr, images
 
     if path.suffix.lower() == ".png":
-        images.write_png(path, encoded)
+        images.write_png(path, encoded, info.get(exr.ORIGIN, ""))
     else:
         color = from_display(encoded, model.normalization.exposure_stops)
-        exr.write_frame(path, Frame({"color": color}, {**noisy.info, "denoised": "true"}))
+        exr.write_frame(path, Frame({"color": color}, {**info, "denoised": "true"}))
 
 
 def executors() -> None:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from ...refimpl.network.domain import Distance, Domain
 
 
-def check_domain(path: Path, frame: Frame, model: Model, anyway: bool = False) -> None:
+def check_domain(
+    path: Path, frame: Frame, model: Model, anyway: bool = False, say: Callable[[str], None] = say
+) -> None:
     """Say what about the frame in `path` a model has not learned.
 
     Another program's frame that is outside of the domain is refused, unless it is to be denoised `anyway`.

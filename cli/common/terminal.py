@@ -5,15 +5,18 @@ Names and texts may be untrusted: nothing reaches the terminal before [`errors.e
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from rich import box
 from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
@@ -23,6 +26,19 @@ from rich.table import Table
 from rich.text import Text
 
 from ...refimpl.errors import escaped, shown
+
+
+class _Rate(ProgressColumn):
+    """How many of a unit are done per second."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = unit
+
+    def render(self, task: Task) -> Text:
+        """Return the text of a task."""
+        return Text(f"{task.speed:.1f} {self._unit}/s" if task.speed else "")
+
 
 Advance = Callable[[float], None]
 """Called with the work done since the last call, in the unit of the total."""
@@ -49,8 +65,11 @@ def hint_on_interrupt(hint: Callable[[], str]) -> Iterator[None]:
 
 
 @contextmanager
-def progress(title: str, total: float) -> Iterator[Advance]:
-    """Show a progress bar on a terminal, and nothing where standard error is a file or a pipe."""
+def progress(title: str, total: float, unit: str = "") -> Iterator[Advance]:
+    """Show a progress bar on a terminal, and nothing where standard error is a file or a pipe.
+
+    With the name of a `unit` it shows how many of them are done per second.
+    """
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -60,8 +79,15 @@ def progress(title: str, total: float) -> Iterator[Advance]:
         TextColumn("passed,"),
         TimeRemainingColumn(),
         TextColumn("left"),
+        *([_Rate(unit)] if unit else []),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with ExitStack() as opened:
+        if unit and console.is_terminal:
+            # Threads that read files redirect the descriptor for a moment [files/exr.py].
+            stream = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="replace")
+            console = Console(file=opened.enter_context(stream))
+        bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        opened.enter_context(bar)
         task = bar.add_task(escaped(title), total=total)
         yield lambda done: bar.update(task, advance=done)
 

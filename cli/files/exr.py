@@ -15,9 +15,10 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -78,6 +79,9 @@ BOUND = ("channels", "chunkCount", "compression", "name", "tiles", "type", "vers
 INFO_PREFIX = "wamnet."
 """Before each name of the frame's info among the file's attributes, so that it meets no other program's."""
 
+ORIGIN = "origin"
+"""Name of the info that says what a frame was made from."""
+
 EXR_BYTES = 12
 """Memory that a pixel of a channel takes until it is in a frame: as read, as float32, in its layer."""
 
@@ -130,7 +134,7 @@ def _write(path: Path, openexr: Any, channels: Mapping[str, Any], header: Mappin
     form = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
     with replacing(path) as new:
         try:
-            with _quiet():
+            with _quiet:
                 openexr.File({**header, **form}, dict(channels)).write(str(new))
         except (RuntimeError, ValueError, TypeError) as error:
             # The package tells a full disk in this way, with the temporary file's name.
@@ -172,6 +176,16 @@ def read_frame(
     return frame
 
 
+def read_origin(path: Path) -> str | None:
+    """Return the text that names the origin of a frame, or None."""
+    check_input(path)
+    openexr = need("OpenEXR", "to read EXR files", "files")
+    with suppress(RuntimeError, ValueError, TypeError), _quiet:
+        for part in openexr.File(str(path), header_only=True).parts:
+            return str(part.header.get(INFO_PREFIX + ORIGIN, ""))
+    return None
+
+
 def _read_channels(path: Path, whole: bool = False) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return all channels of all parts by name, and the first part's header.
 
@@ -180,7 +194,7 @@ def _read_channels(path: Path, whole: bool = False) -> tuple[dict[str, Any], dic
     check_input(path)
     openexr = need("OpenEXR", "to read EXR files", "files")
     try:
-        with _quiet():
+        with _quiet:
             headers = openexr.File(str(path), header_only=True).parts
             expected = len(headers)
             _check_room(path, headers)
@@ -296,15 +310,31 @@ def _without_misses(layers: dict[str, Floats]) -> int:
     return int(missed.sum())
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence what the OpenEXR package prints by itself about a bad file: our error says it in one line."""
-    saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
-    try:
-        with redirect_stdout(StringIO()):
-            yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
+class _Quiet:
+    """Silence what the OpenEXR package prints by itself about a bad file: our error says it in one line.
+
+    Threads may read and write at once: the first that enters redirects, the last that leaves restores.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._count, self._restore = threading.Lock(), 0, ExitStack()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._count:
+                saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+                for descriptor in (saved, nowhere):
+                    self._restore.callback(os.close, descriptor)
+                self._restore.callback(os.dup2, saved, 2)
+                os.dup2(nowhere, 2)
+                self._restore.enter_context(redirect_stdout(StringIO()))
+            self._count += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._count -= 1
+            if not self._count:
+                self._restore.close()
+
+
+_quiet = _Quiet()

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,12 +47,22 @@ class Image:
     linear: Floats
 
 
-def write_png(path: Path, encoded: Floats) -> None:
-    """Write display-encoded colour (H, W, 3) in [0, 1] as an 8-bit PNG, all of it or nothing."""
+def write_png(path: Path, encoded: Floats, origin: str = "") -> None:
+    """Write display-encoded colour (H, W, 3) in [0, 1] as an 8-bit PNG, all of it or nothing.
+
+    With an `origin` the file keeps a text that names it.
+    """
     pillow = need("PIL.Image", "to write PNG files", "files")
-    picture = pillow.fromarray(encoding.to_8bit(encoded))
+    _save(path, pillow.fromarray(encoding.to_8bit(encoded)), origin)
+
+
+def _save(path: Path, picture: Any, origin: str) -> None:
+    """Write an image of Pillow's as a PNG."""
+    text = need("PIL.PngImagePlugin", "to write PNG files", "files").PngInfo()
+    if origin:
+        text.add_text(ORIGIN, origin)
     with replacing(path) as new:
-        picture.save(new, format="PNG")
+        picture.save(new, format="PNG", pnginfo=text)
 
 
 def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) -> None:
@@ -60,10 +71,7 @@ def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) 
     Both sides of the whole are even, as films want it.
     """
     pillow = need("PIL.Image", "to write PNG files", "files")
-    drawing, info = (
-        need("PIL.ImageDraw", "to label", "files"),
-        need("PIL.PngImagePlugin", "to label", "files"),
-    )
+    drawing = need("PIL.ImageDraw", "to label", "files")
     font = need("PIL.ImageFont", "to label", "files").load_default()
     height, width, _ = panels[0][1].shape
     whole = pillow.new("RGB", (_even(width * len(panels)), _even(height + LABEL_PX)))
@@ -72,10 +80,7 @@ def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) 
         drawing.Draw(bar).text((3, 3), label, fill="white", font=font)
         whole.paste(bar, (width * index, 0))
         whole.paste(pillow.fromarray(encoding.to_8bit(encoded)), (width * index, LABEL_PX))
-    text = info.PngInfo()
-    text.add_text(ORIGIN, origin)
-    with replacing(path) as new:
-        whole.save(new, format="PNG", pnginfo=text)
+    _save(path, whole, origin)
 
 
 def _even(length: int) -> int:

@@ -166,13 +166,17 @@ class Denoiser:
     keeps: bool = False
     model: Model = field(init=False)
     plan: Plan | None = field(init=False, default=None)
+    seconds_planned: float = field(init=False)
+    ready: dict[Size, tuple[Kernel, str]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Plan the network where a variant changes it, or its plan is needed."""
+        start = time.perf_counter()
         self.keeps = self.keeps and not self.executor.interprets
         if not (self.keeps and self.variant == FULL):
             self.plan = self._planned()
         self.model = self.plan.model if self.plan else self.full
+        self.seconds_planned = time.perf_counter() - start
 
     def _planned(self) -> Plan:
         """Return the plan."""
@@ -182,7 +186,16 @@ class Denoiser:
         return replace(plan, proves=not self.keeps)
 
     def kernel(self, size: Size) -> tuple[Kernel, str]:
-        """Return the kernel for frames of `size` (height, width), not yet built, and why this schedule."""
+        """Return the kernel for frames of `size` (height, width), built, and why it has this schedule."""
+        if size not in self.ready:
+            self.ready[size] = self._kernel(size)
+            keep_freed_memory()
+        kernel, reason = self.ready[size]
+        self.executor.build(kernel, size)
+        return kernel, reason
+
+    def _kernel(self, size: Size) -> tuple[Kernel, str]:
+        """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
             subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.profile)
@@ -204,9 +217,27 @@ class Denoiser:
         """Return the images (H, W, C) that the kernel reads, by name."""
         return images_on(self.executor, self.model, frame, self.profile, self.keeps)
 
-    def prepare(self, frame: Frame) -> None:
-        """Build the kernels that smooth a frame's features on the device, if there are any."""
-        filter_of(self.executor, self.model, frame, self.profile, self.keeps)
+    def image(self, images: Images) -> NDArray[np.float32]:
+        """Return the denoised image (H, W, 3), display-encoded, of a frame's images."""
+        height, width = next(iter(images.values())).shape[:2]
+        return self.executor.run(self.kernel((height, width))[0], images)
+
+    def run(self, frame: Frame, images: Images | None = None) -> RunResult:
+        """Return a denoised frame and the times; `images` are its encoded features, if they are there."""
+        start = time.perf_counter()
+        if images is None:
+            filter_of(self.executor, self.model, frame, self.profile, self.keeps)
+        before = time.perf_counter() - start
+        # A frame that lacks a layer is refused before its kernel is compiled; encoding is not part of that.
+        images = self.images(frame) if images is None else images
+        start = time.perf_counter()
+        kernel, reason = self.kernel((frame.height, frame.width))
+        built = time.perf_counter()
+        image = self.executor.run(kernel, images)
+        seconds = time.perf_counter() - built
+        facts = (self.executor.device, schedule_text(kernel.manifest["schedule"]), reason, kernel.digest)
+        compiling = self.seconds_planned + before + built - start
+        return RunResult(image, compiling, seconds, *facts, _text_of(kernel))
 
 
 def denoise_on(
@@ -225,24 +256,7 @@ def denoise_on(
     `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
     with the reference's image; by default the device may make them [`images_on`].
     """
-    start = time.perf_counter()
-    denoiser = Denoiser(executor, model, profile, schedule, variant, pictures, keeps)
-    if images is None:
-        denoiser.prepare(frame)
-    planned = time.perf_counter() - start
-    # A frame that lacks a layer is refused before its denoiser is compiled; encoding is not part of that.
-    if images is None:
-        images = denoiser.images(frame)
-    start = time.perf_counter() - planned
-    size = (frame.height, frame.width)
-    kernel, reason = denoiser.kernel(size)
-    executor.build(kernel, size)
-    keep_freed_memory()
-    built = time.perf_counter()
-    image = executor.run(kernel, images)
-    seconds = time.perf_counter() - built
-    facts = (executor.device, schedule_text(kernel.manifest["schedule"]), reason, kernel.digest)
-    return RunResult(image, built - start, seconds, *facts, _text_of(kernel))
+    return Denoiser(executor, model, profile, schedule, variant, pictures, keeps).run(frame, images)
 
 
 def _text_of(artifact: Kernel) -> str:

@@ -33,10 +33,10 @@ BUDGET = {
     "kernels/verify": 2925,
     "spec/conformance": 8600,
     "cli": 300,
-    "cli/commands": 6100,
-    "cli/common": 1160,
+    "cli/commands": 6250,
+    "cli/common": 1350,
     "cli/course": 5620,
-    "cli/files": 1325,
+    "cli/files": 1375,
     "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""

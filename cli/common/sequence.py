@@ -1,0 +1,171 @@
+"""Frames in sequence: which files they are, where their results go, and work that overlaps.
+
+1. A name with `*`, `?` or `[` stands for the files that match, one with `%04d` for those with a number in its
+   place; a shell may have expanded the first kind already [`frames_of`].
+2. Results go to a file, to files of a pattern with the number of each frame, or to a folder under the frame's
+   name [`outputs_of`].
+3. One thread reads ahead and another writes behind while the device works; a frame that fails is left out,
+   and the others go on [`overlapped`].
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from glob import has_magic
+from pathlib import Path
+from typing import TypeVar
+
+from ...refimpl.errors import InputError, WamnetError
+
+AHEAD = 2
+"""Frames that are read before they are needed, and results that wait to be written: more would only take
+memory."""
+
+NUMBER = re.compile(r"%0?([1-9]?)d")
+"""The place of a frame's number in a pattern, as in C: `%04d` has at least four digits."""
+
+SUFFIXES = (".exr", ".png")
+"""Suffixes of results, which no folder has."""
+
+Item = TypeVar("Item")
+Loaded = TypeVar("Loaded")
+Result = TypeVar("Result")
+
+
+def frames_of(names: Sequence[Path]) -> list[Path]:
+    """Return the files that names and patterns stand for, in order; refuse a pattern without any."""
+    frames: list[Path] = []
+    for name in names:
+        text = str(name)
+        if name.exists() or not (NUMBER.search(text) or has_magic(text)):
+            frames.append(name)
+            continue
+        root = Path(name.anchor)
+        matching = _numbered(name) if NUMBER.search(text) else sorted(root.glob(str(name.relative_to(root))))
+        if not matching:
+            raise InputError("input frames", text, "no file matches this pattern", "check the name")
+        frames.extend(matching)
+    return list(dict.fromkeys(frames))
+
+
+def _numbered(pattern: Path) -> list[Path]:
+    """Return the files whose names are that of a pattern with a number in it, by number."""
+    place = NUMBER.search(pattern.name)
+    if place is None or len(NUMBER.findall(str(pattern))) > 1:
+        rule = "its file name must have one number"
+        raise InputError("input frames", str(pattern), rule, "for example shot.%04d.exr")
+    digits = place[1] or "1"
+    before, after = re.escape(pattern.name[: place.start()]), re.escape(pattern.name[place.end() :])
+    name = re.compile(f"{before}([0-9]{{{digits},}}){after}")
+    folder = pattern.parent
+    files = folder.iterdir() if folder.is_dir() else ()
+    numbers = {path: int(match[1]) for path in files if (match := name.fullmatch(path.name))}
+    return sorted(numbers, key=lambda path: (numbers[path], path.name))
+
+
+def is_many(frames: Sequence[Path], output: Path) -> bool:
+    """Tell whether results are those of a sequence: several, or of a pattern, or in a folder."""
+    return len(frames) > 1 or NUMBER.search(output.name) is not None or _is_folder(output)
+
+
+def _is_folder(output: Path) -> bool:
+    """Tell whether an output names a folder, which may be there or not."""
+    return not output.suffix or (output.is_dir() and output.suffix.lower() not in SUFFIXES)
+
+
+def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> list[Path]:
+    """Return the file of each frame's result; refuse names that meet each other or a frame."""
+    if not is_many(frames, output):
+        return [output]
+    if NUMBER.search(output.name):
+        outputs = [_of_number(frame, output) for frame in frames]
+    elif _is_folder(output):
+        outputs = [output / f"{frame.stem}{suffix}" for frame in frames]
+    else:
+        rule = f"{len(frames)} frames need a folder, or a pattern with their numbers"
+        raise InputError("output", str(output), rule, f"for example -o out or -o out/{output.stem}.%04d.exr")
+    first: dict[Path, Path] = {}
+    for frame, result in zip(frames, outputs, strict=True):
+        other = first.setdefault(result.resolve(), frame)
+        if other is not frame:
+            rule = f"both {other} and {frame} would be written there"
+            raise InputError("output file", str(result), rule, "rename a frame, or choose another with -o")
+    for frame in frames:
+        if frame.resolve() in first:
+            rule = "it is one of the input frames"
+            raise InputError("output file", str(frame), rule, "choose another folder or pattern with -o")
+    return outputs
+
+
+def _of_number(frame: Path, pattern: Path) -> Path:
+    """Return the name of a pattern with a frame's number, which are the last digits of its name."""
+    numbers = re.findall("[0-9]+", frame.stem)
+    if not numbers:
+        rule = f"its name has no number, which -o {pattern} needs"
+        raise InputError("input frame", str(frame), rule, "rename it, or give a folder with -o")
+    place = NUMBER.search(pattern.name)
+    assert place is not None, "the caller has looked for it"
+    number = str(int(numbers[-1])).rjust(int(place[1] or "1"), "0")
+    return pattern.with_name(pattern.name[: place.start()] + number + pattern.name[place.end() :])
+
+
+def overlapped(
+    items: Sequence[Item],
+    read: Callable[[Item], Loaded],
+    work: Callable[[Loaded], Result],
+    write: Callable[[Item, Result], None],
+    advance: Callable[[float], None],
+) -> list[tuple[Item, WamnetError]]:
+    """Read, work on and write each item; return those that failed, and why.
+
+    Only the work is done in the caller's thread.
+    """
+    failed: list[tuple[Item, WamnetError]] = []
+    reading: deque[tuple[Item, Future[Loaded]]] = deque()
+    writing: deque[tuple[Item, Future[None]]] = deque()
+
+    def finish(count: int) -> None:
+        """Wait until at most `count` results are being written."""
+        while len(writing) > count:
+            item, written = writing.popleft()
+            try:
+                written.result()
+            except WamnetError as error:
+                failed.append((item, error))
+            advance(1)
+
+    with _thread() as reader, _thread() as writer:
+        coming = iter(items)
+        for item in coming:
+            reading.append((item, reader.submit(read, item)))
+            if len(reading) == AHEAD:
+                break
+        while reading:
+            item, loaded = reading.popleft()
+            try:
+                result = work(loaded.result())
+            except WamnetError as error:
+                failed.append((item, error))
+                advance(1)
+            else:
+                writing.append((item, writer.submit(write, item, result)))
+            finish(AHEAD)
+            for following in coming:
+                reading.append((following, reader.submit(read, following)))
+                break
+        finish(0)
+    return failed
+
+
+@contextmanager
+def _thread() -> Iterator[ThreadPoolExecutor]:
+    """Yield a thread that takes work in order; what has not begun when the block ends early is dropped."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -13,7 +13,6 @@ import itertools
 import os
 import shlex
 import subprocess
-import tempfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -38,6 +37,7 @@ from ...compiler.languages.interface import (
 )
 from ...compiler.schedules.schedules import PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from ..folders import discard, new_temporary
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor, Kernel, Memory, words
 from .images import widest
 
@@ -232,17 +232,17 @@ class CExecutor(Executor):
         self.device = f"{' '.join(self._command)}: {version}"
         self._count = itertools.count()
         self._options = list(OPTIONS)
-        self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
+        self._folder, self._lock = new_temporary("c", programs=True)
         try:
             self._try()
         except ExecutorUnavailable:
-            self._folder.cleanup()
+            discard(self._folder, self._lock)
             raise
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
 
     def _try(self) -> None:
         """Find out what the compiler takes, and whether its programs compute as they must."""
-        program = Path(self._folder.name) / "trial"
+        program = self._folder / "trial"
         # Not all compilers know all options; what the program prints decides, not which options they accept.
         for options in ([*STRICT, NATIVE], STRICT, []):
             self._options = [*OPTIONS, *options]
@@ -292,7 +292,7 @@ class CExecutor(Executor):
 
     def _library(self, kernel: Kernel, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
-        folder = Path(self._folder.name)
+        folder = self._folder
         (folder / _header(kernel)).write_text(kernel.source, encoding="utf-8")
         # A library that was built before may still be loaded: each has a name of its own.
         library = folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
@@ -354,7 +354,7 @@ class CExecutor(Executor):
     def close(self) -> None:
         """End the threads and remove the folder."""
         self._threads.shutdown()
-        self._folder.cleanup()
+        discard(self._folder, self._lock)
 
 
 def _header(kernel: Kernel) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ...compiler.core.writing import signals_wait
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ..folders import protect_caches
 from ..memory import widen_stacks
 from .executor import Executor
 
@@ -69,6 +70,7 @@ def open_executor(name: str, **options: Any) -> Executor:
         raise InputError("executor", name, f"must be one of {', '.join(EXECUTORS)}", "choose one of these")
     if name != "numpy":
         widen_stacks()
+        protect_caches()
     try:
         return EXECUTORS[name](**options)
     except ImportError as error:

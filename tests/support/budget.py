@@ -32,7 +32,7 @@ BUDGET = {
     "kernels/export": 4400,
     "kernels/verify": 2925,
     "spec/conformance": 8600,
-    "cli": 300,
+    "cli": 320,
     "cli/commands": 6100,
     "cli/common": 1160,
     "cli/course": 5620,

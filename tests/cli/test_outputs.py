@@ -146,7 +146,7 @@ def test_a_full_disk_while_a_kernel_is_written(
 def test_no_text_brings_control_characters_into_a_file(
     tmp_path_factory: pytest.TempPathFactory, text: str
 ) -> None:
-    """Escapes of names went into findings.csv and index.html, which `cat` runs; halves of characters raised."""
+    """Escapes of names went into findings.csv and index.html, which a terminal obeys; surrogates raised."""
     path = tmp_path_factory.mktemp("text") / "text"
     write_text(path, text)
     written = path.read_text(encoding="utf-8")

@@ -2,10 +2,12 @@
 
 Nothing is written and no process started before [`main`] of main.py runs, so that Ctrl-C may end the process
 at once until then [`run`]. Modules in C turn an interrupt of their import into errors of their own: therefore
-it is not raised meanwhile.
+it is not raised meanwhile. Standard streams are there and take any text before anything is imported
+[`_open_streams`].
 """
 
 import atexit
+import io
 import os
 import signal
 import sys
@@ -16,6 +18,7 @@ BY_SIGNALS = (130, 143)
 
 def run() -> int:
     """Import and run the command line; return its exit status."""
+    _open_streams()
     status = _run()
     if status in BY_SIGNALS:
         # Python kills itself by SIGINT, whatever the status, if an interrupt that was handled long ago has
@@ -25,6 +28,21 @@ def run() -> int:
         sys.stderr.flush()
         os._exit(status)
     return status
+
+
+def _open_streams() -> None:
+    """Make a closed standard stream one that is empty, and show what an encoding lacks as escapes."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The next file that is opened would have this number, and get what drivers in C write to it.
+            os.open(os.devnull, os.O_RDWR)
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _run() -> int:

@@ -27,12 +27,13 @@ from .core.ir import LEAST, OUTPUT_ENCODING, Gather, Program
 from .core.passes import pipeline
 from .core.profiles import SineContract
 from .core.sums import is_split
+from .languages.c import stack_bytes
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
 from .proof.whole import has_one_zero
 from .schedules.emit import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
-from .schedules.schedules import PLAIN, Pick, Schedule
+from .schedules.schedules import PLAIN, Schedule
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
@@ -153,7 +154,7 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
         for i in gather.images
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
-    arguments = _arguments(picked, channels).split("\n")
+    arguments = _arguments(plan).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
     language = picked.schedule.language or target.language
@@ -176,11 +177,12 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
     ]
 
 
-def _arguments(picked: Pick, channels: int) -> str:
+def _arguments(plan: Plan) -> str:
     """Return how a kernel is called."""
-    columns, rows = picked.extent
-    numbers = picked.schedule.called()
-    return picked.schedule.arguments.format(channels=channels, columns=columns, rows=rows, **numbers)
+    (columns, rows), schedule = plan.picked.extent, plan.schedule
+    numbers = {"columns": columns, "rows": rows, "channels": output_channels(plan.emitted)}
+    stack = stack_bytes(schedule.private_bytes(plan.emitted))
+    return schedule.arguments.format(**numbers, stack=stack, **schedule.called())
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
@@ -230,7 +232,7 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
             "channels": output_channels(emitted),
             "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
         },
-        "arguments": _arguments(plan.picked, output_channels(emitted)),
+        "arguments": _arguments(plan),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": AGAINST_WHOLE if bound.exact else AGAINST_PINNED if emitted.exact else AGAINST,

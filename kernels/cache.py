@@ -1,6 +1,7 @@
 """What wamnet remembers of a machine between runs: one small file an entry, in the user's cache folder.
 
-1. The folder is WAMNET_CACHE, else `wamnet` in XDG_CACHE_HOME, else `~/.cache/wamnet` [`folder`].
+1. The folder is WAMNET_CACHE, else `wamnet` in XDG_CACHE_HOME, else `~/.cache/wamnet`; where there is no
+   home, or others may write the folder, there is no cache [`folder`].
 2. An entry is JSON around its data: the form's name and the data's SHA-256 [`write_json`]. It is written
    under another name and then takes its own, so that no reader sees half of one; the last writer wins.
 3. An entry of what a program computed once for all [`kept`] is made once; of each kind the newest stay.
@@ -27,6 +28,7 @@ from typing import Any
 from ..compiler.core.writing import write_bytes
 from ..refimpl.errors import InputError, shown
 from ..refimpl.reading import BROKEN, parse_json, read_file
+from .folders import cache_base, is_private
 
 FOLDER_VARIABLE = "WAMNET_CACHE"
 """Environment variable that names another folder."""
@@ -43,13 +45,19 @@ MOST_KEPT = 64
 _log = logging.getLogger("wamnet")
 
 
-def folder() -> Path:
-    """Return the folder of this user's entries, which need not exist yet."""
-    if given := os.environ.get(FOLDER_VARIABLE):
-        return Path(given)
-    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    # The specification of the variable: a path that is not absolute is to be ignored.
-    return (base if base.is_absolute() else Path("~/.cache").expanduser()) / "wamnet"
+def folder() -> Path | None:
+    """Return the folder of this user's entries, which need not exist yet, or None where nothing is kept."""
+    chosen = os.environ.get(FOLDER_VARIABLE)
+    base = cache_base()
+    path = Path(chosen) if chosen else base and base / "wamnet"
+    return path if path is not None and is_private(path) else None
+
+
+def writable(path: Path) -> bool:
+    """Make a folder of entries if it is not there, and tell whether files can be written in it."""
+    with suppress(OSError):
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return os.access(path, os.W_OK | os.X_OK)
 
 
 def key(*parts: object) -> str:
@@ -83,19 +91,24 @@ def kept(kind: str, parts: Sequence[object], make: Callable[[], Any]) -> Any:
 
 def _trim(kind: str) -> None:
     """Remove the oldest entries of a kind; others may do so at the same time."""
+    path = folder()
+    if path is None:
+        return
     with suppress(OSError):
-        entries = sorted(folder().glob(f"{kind}-*.json"), key=lambda path: -path.stat().st_mtime)
-        for path in entries[MOST_KEPT:]:
-            path.unlink(missing_ok=True)
+        entries = sorted(path.glob(f"{kind}-*.json"), key=lambda path: -path.stat().st_mtime)
+        for old in entries[MOST_KEPT:]:
+            old.unlink(missing_ok=True)
 
 
 def read_json(name: str) -> Any:
     """Return the data of the entry `<name>.json`, or None where there is none that can be trusted."""
-    path = _path(name)
+    path = path_of(name)
+    if path is None:
+        return None
     try:
         content = read_file(path, "cache entry", "remove it", LARGEST_BYTES)
     except InputError as error:
-        if path.exists() or path.is_symlink():
+        if os.path.lexists(path):
             _log.warning("%s: it is ignored", error)
         return None
     with suppress(*BROKEN):
@@ -111,11 +124,11 @@ def read_json(name: str) -> Any:
 def write_json(name: str, data: Any) -> Path | None:
     """Keep data of JSON's types as the entry `<name>.json`; return its path, or None if it cannot be kept."""
     entry = {"schema": SCHEMA, "sha256": _checksum(data), "data": data}
-    path, content = _path(name), (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode()
-    if len(content) > LARGEST_BYTES:
+    content = (json.dumps(entry, indent=1, sort_keys=True) + "\n").encode()
+    path = path_of(name)
+    if path is None or len(content) > LARGEST_BYTES:
         return None
     try:
-        # What is kept may become code of this user's processes: nobody else writes here.
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_bytes(path, content)
     except OSError as error:
@@ -126,10 +139,11 @@ def write_json(name: str, data: Any) -> Path | None:
     return path
 
 
-def _path(name: str) -> Path:
-    """Return the file of an entry."""
+def path_of(name: str) -> Path | None:
+    """Return the file of an entry, or None where there is no cache."""
     assert name == Path(name).name, "names of entries are made by the program, and hold no folder"
-    return folder() / f"{name}.json"
+    path = folder()
+    return path and path / f"{name}.json"
 
 
 def _checksum(data: Any) -> str:

@@ -25,7 +25,7 @@ from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
 from ..common.inputs import load_model, model_path, need_layers
 from ..common.terminal import progress, say, table
-from ..files.outputs import check_new_folder, making_folder
+from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
 
 if TYPE_CHECKING:
@@ -245,8 +245,8 @@ def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, 
             artifact.write(kernel.artifact, new / _folder_of(kernel))
         report = _report(task, verdicts, found)
         text = json.dumps(report, indent=2, sort_keys=True, allow_nan=False) + "\n"
-        (new / REPORT).write_text(text, encoding="utf-8")
-        (new / README).write_text(_readme(task, report, odd), encoding="utf-8")
+        write_text(new / REPORT, text)
+        write_text(new / README, _readme(task, report, odd))
 
 
 def part_of(task: Task, box: Box) -> Frame:

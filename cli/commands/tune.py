@@ -93,13 +93,8 @@ def _alone() -> Iterator[None]:
     from ...kernels import cache
 
     folder = cache.folder()
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        writable = os.access(folder, os.W_OK | os.X_OK)
-    except OSError:
-        writable = False
     # A cache that cannot be written costs time, never a run.
-    if not writable:
+    if folder is None or not cache.writable(folder):
         yield
         return
     with alone_in(folder, "tuning", "wait for it, or choose another with --cache"):

@@ -31,7 +31,7 @@ from ...refimpl.network.dataset import FARTHEST_DEPTH
 from ...refimpl.reading import check_room, refusing
 from ..common.inputs import check_input
 from ..common.packages import need
-from .outputs import replacing, unwritable
+from .outputs import replacing, spelled, unwritable
 
 CHANNELS: Mapping[str, tuple[str, ...]] = {
     "color": ("R", "G", "B"),
@@ -132,10 +132,10 @@ def write_beside(path: Path, source: Path, color: Floats, view_layer: str = "") 
 def _write(path: Path, openexr: Any, channels: Mapping[str, Any], header: Mapping[str, Any]) -> None:
     """Write channels (H, W), losslessly compressed, all of them or nothing."""
     form = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
-    with replacing(path) as new:
+    with replacing(path) as new, spelled(new) as name:
         try:
             with _quiet:
-                openexr.File({**header, **form}, dict(channels)).write(str(new))
+                openexr.File({**header, **form}, dict(channels)).write(name)
         except (RuntimeError, ValueError, TypeError) as error:
             # The package tells a full disk in this way, with the temporary file's name.
             reason = " ".join(str(error).replace(str(new), str(path)).split())
@@ -194,11 +194,11 @@ def _read_channels(path: Path, whole: bool = False) -> tuple[dict[str, Any], dic
     check_input(path)
     openexr = need("OpenEXR", "to read EXR files", "files")
     try:
-        with _quiet:
-            headers = openexr.File(str(path), header_only=True).parts
+        with _quiet, spelled(path) as name:
+            headers = openexr.File(name, header_only=True).parts
             expected = len(headers)
             _check_room(path, headers)
-            parts = openexr.File(str(path), separate_channels=True).parts
+            parts = openexr.File(name, separate_channels=True).parts
     except InputError:
         raise
     except (RuntimeError, ValueError, TypeError):

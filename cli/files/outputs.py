@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...compiler.core import writing
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, escaped
 
 
 def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path] = ()) -> None:
@@ -76,10 +76,30 @@ def replacing(path: Path) -> Iterator[Path]:
         raise unwritable(path, error) from None
 
 
+@contextmanager
+def spelled(path: Path) -> Iterator[str]:
+    """Yield a name of a file for a package that takes UTF-8 only; names on Linux are any bytes."""
+    if is_utf8(str(path)):
+        yield str(path)
+        return
+    named = is_utf8(path.name)
+    handle = os.open(path.parent if named else path, os.O_RDONLY)
+    try:
+        yield f"/proc/self/fd/{handle}/{path.name}" if named else f"/proc/self/fd/{handle}"
+    finally:
+        os.close(handle)
+
+
+def is_utf8(name: str) -> bool:
+    """Tell whether a name has no bytes that Python shows as halves of characters."""
+    return name.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in name)
+
+
 def write_text(path: Path, text: str) -> None:
-    """Write `text` to `path`, all of it or none."""
+    """Write `text` to `path`, all of it or none; names in it may hold what no terminal should be given."""
+    lines = (escaped(line) for line in text.split("\n"))
     with replacing(path) as new:
-        new.write_text(text, encoding="utf-8")
+        new.write_text("\n".join(lines), encoding="utf-8")
 
 
 def check_real_folder(folder: Path) -> bool:

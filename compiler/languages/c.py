@@ -76,6 +76,9 @@ RESTORED = """\
 #endif"""
 """What ends [`IGNORED`]."""
 
+STACK = "stack: {stack} bytes at most, without optimisation too"
+"""What a denoiser's text says of the thread that calls it."""
+
 ALL_PIXELS = "/* All pixels, one after another. */"
 """What the function is for that calls the one of a pixel."""
 
@@ -83,6 +86,15 @@ ALL_PIXELS = "/* All pixels, one after another. */"
 def whole(entry: str) -> str:
     """Return the name of the function of all pixels, by that of a pixel's."""
     return entry.replace("_trace_pixel", "_trace").replace("_pixel", "_image")
+
+
+def stack_bytes(arrays: int) -> int:
+    """Return the most bytes of stack of a call whose arrays have so many.
+
+    Next to them are the scalars of a pixel and of the transforms, which compilers keep in memory where they
+    do not optimise; a test compares with the compilers' own count.
+    """
+    return arrays + arrays // 2 + 8192
 
 
 def includes(role: str, *names: str) -> list[str]:
@@ -120,7 +132,8 @@ class C(Arguments):
     said = {
         DENOISE: (
             f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
-            "wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops"
+            "wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops\n"
+            f"{STACK}"
         ),
         PATH: (
             "sums: float, one plane of rows * width numbers for each of:\n"

@@ -6,7 +6,7 @@ Other compilers stop at an error that names the tiled schedules, which are plain
 
 from __future__ import annotations
 
-from ..languages.c import includes
+from ..languages.c import STACK, includes
 from ..languages.dialect import Parts
 from ..languages.fourier_dialect import PLACES, FourierDialect
 from ..languages.interface import DENOISE, Interface
@@ -38,7 +38,8 @@ class CFourier(CTiled, FourierDialect):
         DENOISE: (
             f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
             "wamnet_image does the whole picture, wamnet_pixel {columns} x {rows} pixels from (x, y) on:\n"
-            "call that from your own loops, for each x that is a multiple of {columns} and each y of {rows}"
+            "call that from your own loops, for each x that is a multiple of {columns} and each y of {rows}\n"
+            f"{STACK}"
         )
     }
 

@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from ..languages.c import UNFUSED, C, includes
+from ..languages.c import STACK, UNFUSED, C, includes
 from ..languages.dialect import Parts
 from ..languages.interface import DENOISE, Interface
 from ..languages.openings import IMAGES, WEIGHTS_RESULT
@@ -165,7 +165,8 @@ class CTiled(C, TiledDialect):
         DENOISE: (
             f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
             "wamnet_image does the whole picture, wamnet_pixel {pixels} neighbours of a row from (x, y) on:\n"
-            "call that from your own loops, for each x that is a multiple of {pixels}"
+            "call that from your own loops, for each x that is a multiple of {pixels}\n"
+            f"{STACK}"
         )
     }
     operations = {name: C.operations[name] for name in (*OPERATIONS, *ON_INTEGERS)}

@@ -17,7 +17,6 @@ import platform
 import shlex
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -43,6 +42,7 @@ from ...compiler.languages.interface import (
 )
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .. import cache
+from ..folders import discard, new_temporary
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Denoiser, Executor, Kernel, Memory, is_denoiser, words
 from .images import widest
 
@@ -237,13 +237,13 @@ class CExecutor(Executor):
         self.device = f"{' '.join(self._command)}: {version}"
         self._count = itertools.count()
         self._options = list(OPTIONS)
-        self._folder = tempfile.TemporaryDirectory(prefix="wamnet-c-")
+        self._folder, self._lock = new_temporary("c", programs=True)
         self._compiler = [*self._command, version, *_file_facts(self._command[0]), processor()]
         try:
             tried = cache.kept("c-trial", [*self._compiler, TRIAL], self._try)
             self._options, lanes, byte_products = tried["options"], tried["lanes"], tried["bytes"]
         except ExecutorUnavailable:
-            self._folder.cleanup()
+            discard(self._folder, self._lock)
             raise
         self.byte_schedule = BYTE_SCHEDULE if byte_products else ""
         self.schedule = SCHEDULES.get(lanes, PLAIN)
@@ -252,7 +252,7 @@ class CExecutor(Executor):
 
     def _try(self) -> dict[str, Any]:
         """Return what the compiler takes; raise where its programs do not compute as they must."""
-        program = Path(self._folder.name) / "trial"
+        program = self._folder / "trial"
         # Not all compilers know all options; what the program prints decides, not which options they accept.
         for options in ([*STRICT, NATIVE], STRICT, []):
             self._options = [*OPTIONS, *options]
@@ -301,7 +301,7 @@ class CExecutor(Executor):
     def _library(self, kernel: Kernel, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
         # A library that was built before may still be loaded: each has a name of its own.
-        library = Path(self._folder.name) / f"{kernel.digest[:32]}-{next(self._count)}.so"
+        library = self._folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
 
         def built() -> str:
             (library.parent / _header(kernel)).write_text(kernel.source, encoding="utf-8")
@@ -367,7 +367,7 @@ class CExecutor(Executor):
     def close(self) -> None:
         """End the threads and remove the folder."""
         self._threads.shutdown()
-        self._folder.cleanup()
+        discard(self._folder, self._lock)
 
 
 def processor() -> str:

@@ -7,6 +7,8 @@ from typing import Any
 
 from ...compiler.core.writing import signals_wait
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ..folders import protect_caches
+from ..memory import widen_stacks
 from .executor import Executor
 
 CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
@@ -66,6 +68,9 @@ def open_executor(name: str, **options: Any) -> Executor:
     """Return an open executor, or raise ExecutorUnavailable that says what is missing and how to get it."""
     if name not in EXECUTORS:
         raise InputError("executor", name, f"must be one of {', '.join(EXECUTORS)}", "choose one of these")
+    if name != "numpy":
+        widen_stacks()
+        protect_caches()
     try:
         return EXECUTORS[name](**options)
     except ImportError as error:

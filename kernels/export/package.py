@@ -41,6 +41,7 @@ from ...refimpl.network.domain import of_model
 from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
+from .hosts import scratch
 from .hosts.picture import beside
 from .hosts.table import host_named
 from .motion import ROWS_NAME, Motion
@@ -131,6 +132,8 @@ def export(request: Request) -> Export:
     for kernel, folder in _folders(denoiser):
         files |= _written(kernel, folder)
         files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
+        if row.slots == "header":
+            files[f"{folder}/{scratch.NAME}"] = scratch.header(kernel).encode()
     halves = _halves(denoiser)
     if halves:
         files[f"denoise/{HALVES_NAME}"] = halves

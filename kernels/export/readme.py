@@ -11,6 +11,7 @@ from ...compiler.languages.c import whole
 from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
 from .bindings import input_section
+from .hosts import scratch
 from .hosts.host import Host
 from .targets import DISPATCHED, ONNX, TARGETS, Row
 
@@ -88,6 +89,7 @@ def readme(
         "",
         *_hosted(host),
         *_facts(facts),
+        *_stack(facts, denoiser),
         *(PRECISIONS if facts["target"] == ONNX else ()),
         "",
         "## Kernels, in the order in which they run",
@@ -175,6 +177,17 @@ def _facts(facts: Mapping[str, Any]) -> list[str]:
         *_domain(facts["model"]),
         "* Size: no image, and no buffer of sums, may hold 2^31 numbers or more.",
         *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
+    ]
+
+
+def _stack(facts: Mapping[str, Any], denoiser: Artifact | None) -> list[str]:
+    """Return the lines about the stack of functions in C."""
+    if denoiser is None or TARGETS[facts["target"]].slots != "header":
+        return []
+    most = max(map(scratch.stack_of, denoiser.kernels))
+    return [
+        f"* Stack: a call of the denoiser takes up to {most:,} bytes of its thread's stack. For threads with",
+        f"  less (musl: 131,072), `wamnet_image_with` of `{scratch.NAME}` runs it on memory that you pass.",
     ]
 
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import shlex
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,6 +27,8 @@ from ...refimpl.errors import InputError
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import to_json
 from ...refimpl.light.transport import Settings
+from ..folders import temporary
+from ..orphans import printed, running
 from ..run.render_frame import render_frame
 from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray, write_three
 from .case import Shot
@@ -39,6 +40,9 @@ LIMIT_S = 300.0
 
 MOST_TOLD = 300
 """Most letters of what a process says that a verdict keeps."""
+
+MOST_READ = 1 << 16
+"""Most bytes of what a process says that are kept while it runs: the last ones."""
 
 NPZ, EXR, PNG = ".npz", ".exr", ".png"
 """Ends of the names of pictures."""
@@ -146,9 +150,9 @@ class ByCommand:
 
     def pictures(self, shot: Shot, seeds: Sequence[int]) -> Sequence[Picture] | Missing:
         """Return a picture for each seed, or why there are none."""
-        with tempfile.TemporaryDirectory(prefix="wamnet-verify-") as folder:
+        with temporary("verify") as folder:
             try:
-                return self._asked(shot, seeds, Path(folder))
+                return self._asked(shot, seeds, folder)
             except NotExpressed as error:
                 return Missing(UNTESTED, f"format {self.form} has no {error}")
             except _Broken as error:
@@ -163,7 +167,10 @@ class ByCommand:
         pairs = list(zip(seeds, outputs, strict=True))
         for group in [pairs] if together else [[pair] for pair in pairs]:
             scene = folder / f"{shot.name}-{group[0][0]}{form.suffix}"
-            scene.write_text(form.write(shot, group[0][0]), encoding="utf-8")
+            try:
+                scene.write_text(form.write(shot, group[0][0]), encoding="utf-8")
+            except OSError as error:  # the process of an earlier picture has removed the folder, or filled it
+                raise _Broken(f"its scene cannot be written ({error.strerror})") from None
             self._run(self._filled(shot, scene, group), folder)
         return [self._read(path) for path in outputs]
 
@@ -189,25 +196,18 @@ class ByCommand:
 
     def _run(self, words: Sequence[str], folder: Path) -> None:
         """Run the command in a folder of its own; whatever goes wrong is reported."""
+        none, pipe, both = subprocess.DEVNULL, subprocess.PIPE, subprocess.STDOUT
         try:
-            done = subprocess.run(
-                words,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                timeout=self.limit_s,
-                check=False,
-                text=True,
-                errors="replace",
-            )
+            with running(words, cwd=folder, stdin=none, stdout=pipe, stderr=both) as process:
+                said = printed(process, MOST_READ, self.limit_s).decode(errors="replace")
         except subprocess.TimeoutExpired:
             raise _Broken(f"no answer in {self.limit_s:g} s") from None
-        except OSError as error:
-            raise _Broken(f"{words[0]} cannot be run ({error.strerror})") from None
-        if done.returncode:
-            said = done.stdout.strip().splitlines() or ["nothing said"]
-            raise _Broken(f"exit status {done.returncode}: {said[-1][:MOST_TOLD]}")
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise _Broken(f"{words[0]} cannot be run ({reason})") from None
+        if process.returncode:
+            last = (said.strip().splitlines() or ["nothing said"])[-1][:MOST_TOLD]
+            raise _Broken(f"exit status {process.returncode}: {last}")
 
     def _read(self, path: Path) -> Picture:
         """Return the layers of a picture."""

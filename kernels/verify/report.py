@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...refimpl.errors import escaped
 from .case import RULES
 from .judgement import DEVIATES, SIGNIFICANCE, UNTESTED, Verdict, first_blamed, sentence_of
 from .run import counts
@@ -89,12 +90,12 @@ def _numbers(verdict: Verdict) -> tuple[str, str, str]:
 def to_markdown(renderer: str, verdicts: Sequence[Verdict]) -> str:
     """Return a page: the counts, the broken rules in sentences, and a table of all cases."""
     told = ", ".join(f"{number} {state}" for state, number in counts(verdicts).items())
-    lines = [f"# {renderer}", "", f"{told}.", ""]
+    lines = [f"# {escaped(renderer)}", "", f"{told}.", ""]
     odd = [verdict for verdict in verdicts if verdict.deviates]
     first = first_blamed(verdicts)
     if first is not None:
         lines += [f"Look first at rule `{first.rule}`: others rest on it.", ""]
-        lines += [*(f"* {sentence_of(verdict)}" for verdict in odd), ""]
+        lines += [*(f"* {escaped(sentence_of(verdict))}" for verdict in odd), ""]
     untested = {verdict.rule for verdict in verdicts if verdict.state == UNTESTED}
     if silent := [rule for rule in RULES if rule in untested]:
         lines += [f"Rules with cases that were not tested: {', '.join(silent)}.", ""]
@@ -104,4 +105,4 @@ def to_markdown(renderer: str, verdicts: Sequence[Verdict]) -> str:
 
 def _line(cells: Sequence[str]) -> str:
     """Return a line of a Markdown table."""
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(escaped(cell).replace("|", "\\|") for cell in cells) + " |"

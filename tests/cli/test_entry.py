@@ -75,3 +75,42 @@ def test_an_interrupt_while_an_object_is_deleted_is_not_lost() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 130
     assert done.stderr == "wamnet: interrupted\n"
+
+
+STREAMS = (
+    "import sys; from wamnet.cli import entry, main\n"
+    "main.main = lambda: print('\\u00fc\\udcff', '\\u00fc', file=sys.stderr) or print('\\u00fc') or 7\n"
+    "sys.exit(entry.run())\n"
+)
+"""A command that prints what not every encoding has."""
+
+
+@pytest.mark.parametrize(
+    ("encoding", "closed", "told"),
+    [
+        ("ascii", "", rb"\xfc\udcff \xfc"),
+        ("latin-1", "", b"\xfc\\udcff \xfc"),
+        ("utf-8", "", b"\xc3\xbc\\udcff \xc3\xbc"),
+        ("utf-8", "2>&-", b""),
+        ("ascii", "2>&- >&- <&-", b""),
+    ],
+)
+def test_streams_take_any_text_and_may_be_closed(tmp_path, encoding, closed, told) -> None:
+    """The file was written, and then a traceback of UnicodeEncodeError printed instead of its name."""
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    command = ["sh", "-c", f'"$@" {closed}', "sh", sys.executable, "-c", STREAMS]
+    done = subprocess.run(
+        command, env=environment, cwd=tmp_path, capture_output=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stderr.strip()) == (7, told)
+
+
+def test_a_closed_stream_s_number_is_not_that_of_a_file(tmp_path) -> None:
+    """What a driver in C prints would get into the first file that is opened."""
+    code = (
+        "import os, sys; from wamnet.cli import entry, main\n"
+        "main.main = lambda: os.open('a', os.O_CREAT | os.O_WRONLY)\n"
+        "sys.exit(entry.run())\n"
+    )
+    command = ["sh", "-c", '"$@" 2>&- >&- <&-', "sh", sys.executable, "-c", code]
+    assert subprocess.run(command, cwd=tmp_path, check=False, timeout=60).returncode > 2

@@ -7,10 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from wamnet.cli.files.outputs import check_output, replacing, write_text
+from wamnet.cli.files import exr, images
+from wamnet.cli.files.outputs import check_output, replacing, spelled, write_text
 from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import Frame
 
 
 def test_a_complete_file_replaces_the_old_one(tmp_path: Path) -> None:
@@ -134,3 +139,40 @@ def test_a_full_disk_while_a_kernel_is_written(
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"output folder is .*kernel: cannot be written \(No space left"):
         compile_model(str(samples / "model.safetensors"), Target.glsl, tmp_path / "kernel")
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.text(st.characters(exclude_categories=())))
+def test_no_text_brings_control_characters_into_a_file(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    """Escapes of names went into findings.csv and index.html, which a terminal obeys; surrogates raised."""
+    path = tmp_path_factory.mktemp("text") / "text"
+    write_text(path, text)
+    written = path.read_text(encoding="utf-8")
+    assert written.replace("\n", "").isprintable()
+    assert written == text or not text.replace("\n", "").isprintable()
+
+
+NAME = st.binary(min_size=1, max_size=20).filter(lambda name: not set(name) & set(b"/\0"))
+"""What Linux takes for a name."""
+
+
+@settings(max_examples=25, deadline=None)
+@given(folder=NAME, name=NAME)
+def test_any_bytes_are_the_name_of_a_frame(
+    tmp_path_factory: pytest.TempPathFactory, folder: bytes, name: bytes
+) -> None:
+    """A frame was written under n\\xff.exr, and then was "not an OpenEXR image"."""
+    place = tmp_path_factory.mktemp("names") / f"f{os.fsdecode(folder)}"
+    place.mkdir()
+    path = place / f"n{os.fsdecode(name)}.exr"
+    frame = Frame({"color": np.full((2, 3, 3), 0.25, np.float32)}, {})
+    exr.write_frame(path, frame)
+    assert np.array_equal(exr.read_frame(path).layers["color"], frame.layers["color"])
+    picture = path.with_suffix(".png")
+    images.write_png(picture, np.zeros((2, 3, 3), np.uint8))
+    assert images.read_png(picture).shape == (2, 3, 3)
+    assert sorted(place.iterdir()) == sorted([path, picture])
+    with spelled(path) as spelt:
+        assert Path(spelt.encode().decode()).read_bytes() == path.read_bytes()

@@ -14,6 +14,7 @@
  *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
  *           wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops
+ *           stack: 8300 bytes at most, without optimisation too
  * weights   W0 (24 x 4) at 0, b0 (4) at 96, W1 (4 x 3) at 100, b1 (3) at 112; matrices input-major:
  *           D_in x D_out, in C order
  */

@@ -16,6 +16,7 @@
  *           width; height: fewer than 2^31 numbers an image.
  *           wamnet_image does the whole picture, wamnet_pixel 14 neighbours of a row from (x, y) on:
  *           call that from your own loops, for each x that is a multiple of 14
+ *           stack: 14108 bytes at most, without optimisation too
  * weights   W0 (1 x 12 x 16) at 0, b0 (16) at 192, W1 (1 x 5 x 16) at 208; vectors filled up with
  *           zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows of one that
  *           reads the window go image by image, then tap by tap in rows, then channel by channel

@@ -95,7 +95,7 @@ def test_a_folder_that_cannot_be(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path / "file" / "cache"))
     assert cache.read_json("a") is None
     assert cache.write_json("a", DATA) is None
-    assert "cannot be written (Not a directory): nothing is kept" in caplog.text
+    assert "is not used: Not a directory" in caplog.text
 
 
 def test_names_hold_no_folder():

@@ -62,3 +62,26 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path, code) -> None:
         finally:
             for pid in members(process.pid):
                 os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.parametrize("end", ["parent", "block"])
+def test_what_a_program_has_started_ends_too(tmp_path, end) -> None:
+    """A renderer's own children lived on after the time limit, and when the command was killed."""
+    started = "sleep 600 & sleep 600 & echo $!; wait"
+    code = (
+        "import subprocess, time; from wamnet.kernels.orphans import running\n"
+        f"with running(['sh', '-c', {started!r}], stdout=subprocess.PIPE) as process:\n"
+        "    print(process.pid, process.stdout.readline().decode().strip(), flush=True)\n"
+        f"    time.sleep({600 if end == 'parent' else 0})\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE) as process:
+        group, child = map(int, process.stdout.readline().split())
+        assert end == "block" or child in members(group)
+        if end == "parent":
+            process.kill()
+        process.wait()
+        for _ in range(int(GRACE_S / 0.1)):
+            if not members(group):
+                break
+            time.sleep(0.1)
+        assert members(group) == set()

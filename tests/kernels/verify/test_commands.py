@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,11 +12,12 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands.verify.renderer import read_layers
+from wamnet.kernels.orphans import printed, running
 from wamnet.kernels.verify import renderers as R
-from wamnet.kernels.verify import run
+from wamnet.kernels.verify import report, run
 from wamnet.kernels.verify.case import Shot
 from wamnet.kernels.verify.cases import chosen, questions
-from wamnet.kernels.verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing
+from wamnet.kernels.verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing, Verdict
 from wamnet.kernels.verify.parts import NotExpressed, parts_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.materials import Mirror
@@ -58,10 +60,16 @@ def test_one_process_for_all_pictures():
         ("import sys; sys.exit(3)", "exit status 3: nothing said"),
         ("pass", "it ended well, and wrote no .npz where {output} said"),
         ("import sys; open(sys.argv[2], 'w').write('no')", "its picture cannot be read"),
+        ("import sys; print('x' * 10**7); print('last'); sys.exit(2)", "exit status 2: last"),
+        ("import os, shutil; shutil.rmtree(os.getcwd())", "its scene cannot be written (No such file"),
+        (
+            "import os\nfor _ in range(1100): os.makedirs('d', exist_ok=True); os.chdir('d')",
+            "it ended well, and wrote no .npz",
+        ),
     ],
 )
 def test_failures_are_told(program, note):
-    found = by(program).pictures(SHOT, [1])
+    found = by(program).pictures(SHOT, [1, 2])
     assert isinstance(found, Missing)
     assert found.state == FAILED
     assert note in found.note
@@ -71,6 +79,23 @@ def test_failures_are_told(program, note):
 def test_a_program_that_never_ends():
     found = by("import time; time.sleep(60)", limit_s=0.5).pictures(SHOT, [1])
     assert found == Missing(FAILED, "no answer in 0.5 s")
+
+
+@pytest.mark.needs("programs")
+def test_a_child_in_the_background_does_not_hold_a_finished_picture():
+    """It kept the pipe, which was read to its end: no answer, though the picture was there."""
+    child = "import subprocess; subprocess.Popen(['sleep', '600'])\n"
+    (found,) = by(child + WRITES, limit_s=60.0).pictures(SHOT, [3])
+    assert found["color"].shape == (4, 4, 3)
+
+
+@pytest.mark.needs("programs")
+def test_only_the_end_of_what_a_program_prints_is_kept():
+    """A flood of prints took a gigabyte of memory in a second."""
+    program = "import os\nfor n in range(400): os.write(1, b'%d' % (n % 10) * 50_000)\nos.write(1, b'end')"
+    with running([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
+        kept = printed(process, 1000, 60.0)
+    assert kept == b"9" * 997 + b"end"
 
 
 @pytest.mark.needs("programs")
@@ -211,3 +236,13 @@ def test_mitsuba(mitsuba):
     assert all(v.confirmed for v in odd.values())
     assert sum(v.state == PASS for v in found) >= 35
     assert np.all([v.state != FAILED for v in found])
+
+
+def test_a_report_holds_no_control_characters():
+    """A renderer's name and last words went into the Markdown as they were, with a terminal's escapes."""
+    odd = "a\x1b[31m\n|\u202e\udcff"
+    verdict = Verdict(chosen(["depth"])[0], FAILED, note=odd)
+    page = report.to_markdown(odd, [verdict]) + report.to_json(odd, [verdict], {})
+    page.encode()
+    assert page.replace("\n", "").isprintable()
+    assert page.count(r"\x1b[31m") == 3

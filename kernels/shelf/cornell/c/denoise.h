@@ -16,6 +16,7 @@
  *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
  *           wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops
+ *           stack: 9956 bytes at most, without optimisation too
  * weights   W0 (1728 x 32) at 0, b0 (32) at 55296, W1 (32 x 32) at 55328, b1 (32) at 56352, W2 (32 x
  *           32) at 56384, b2 (32) at 57408, W3 (32 x 32) at 57440, b3 (32) at 58464, W4 (32 x 3) at
  *           58496, b4 (3) at 58592; matrices input-major: D_in x D_out, in C order

@@ -17,6 +17,7 @@
  *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
  *           wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops
+ *           stack: 9956 bytes at most, without optimisation too
  * weights   W0 (2160 x 32) at 0, b0 (32) at 69120, W1 (32 x 32) at 69152, b1 (32) at 70176, W2 (32 x
  *           32) at 70208, b2 (32) at 71232, W3 (32 x 32) at 71264, b3 (32) at 72288, W4 (32 x 3) at
  *           72320, b4 (3) at 72416; matrices input-major: D_in x D_out, in C order

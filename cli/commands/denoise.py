@@ -2,7 +2,7 @@
 
 1. Frames are read, checked and encoded; denoised; and written. For a sequence that overlaps [sequence.py].
 2. A result of a sequence names its origin: model, options and frame. One that is there is not made again, so
-   that an interrupted command goes on where it was [`_origin`].
+   that an interrupted command resumes where it was [`_origin`].
 3. What was said of several frames is said once, with their number [`Notes`].
 """
 
@@ -206,7 +206,7 @@ def _denoise_one(job: Job, path: Path, output: Path) -> None:
 
 
 def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], output: Path, how: str) -> None:
-    """Denoise a sequence of frames, those that are not there; the others go on when one fails."""
+    """Denoise a sequence of frames, those that are not there; the others are done when one fails."""
     start = time.perf_counter()
     # A frame that is not there fails when it is read.
     tasks = [(path, out, _origin(path, how)) for path, out in zip(paths, outputs, strict=True)]
@@ -220,7 +220,7 @@ def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], outpu
         job.write(task[1], task[0], *done, task[2])
 
     with (
-        hint_on_interrupt(lambda: f"{output}: the same command goes on with the frames that are left"),
+        hint_on_interrupt(lambda: f"{output}: the same command resumes with the remaining frames"),
         progress("denoising", len(missing), "frames") as advance,
     ):
         failed = overlapped(missing, lambda task: job.read(task[0]), work, write, advance)

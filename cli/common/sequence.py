@@ -5,7 +5,7 @@
 2. Results go to a file, to files of a pattern with the number of each frame, or to a folder under the frame's
    name [`outputs_of`].
 3. One thread reads ahead and another writes behind while the device works; a frame that fails is left out,
-   and the others go on [`overlapped`].
+   and the others are done [`overlapped`].
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sequences of frames: names, results, overlap, failures, and going on after an interruption."""
+"""Sequences of frames: names, results, overlap, failures, and resuming after an interruption."""
 
 from __future__ import annotations
 
@@ -219,7 +219,7 @@ def test_an_interrupted_sequence_says_how_to_go_on(wamnet, here, monkeypatch):
     monkeypatch.setattr(denoise.Job, "write", interrupted)
     outcome = wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out")
     assert outcome.status == 130
-    assert "out: the same command goes on with the frames that are left" in outcome.err
+    assert "out: the same command resumes with the remaining frames" in outcome.err
     monkeypatch.setattr(denoise.Job, "write", write)
     assert re.search(
         r": [1-4] frames in .*; [1-4] were there already",

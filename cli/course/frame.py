@@ -16,6 +16,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -199,11 +200,17 @@ OF_PROGRAMS = ("CNF-9", "RDG-4")
 """Clauses of what programs are sent, which a student's functions do not see."""
 
 
+@cache
+def cases_of(kind: str) -> Sequence[Case]:
+    """Return the spec's cases of a kind, which a process that grades a class reads once."""
+    return load(VECTORS / f"{kind}.json")[1]
+
+
 def vectors(
     kind: str, answer: Answer, only: Sequence[str] = (), likely: str = "", explain: Explain | None = None
 ) -> None:
     """Ask all cases of a kind; `only` are the outputs that count. Wrong names the case and its clause."""
-    for case in load(VECTORS / f"{kind}.json")[1]:
+    for case in cases_of(kind):
         if case.clause in OF_PROGRAMS:
             continue
         if only and case.expected is not None:
@@ -298,7 +305,7 @@ EXPLAINED = (
 
 
 class Ended(BaseException):
-    """The student's process has ended, or is to be ended; no check goes on."""
+    """The student's process has ended, or is to be ended; no check continues."""
 
 
 def of_exception(error: BaseException, name: str) -> Wrong:

@@ -104,7 +104,7 @@ def result_of(lab: Lab, found: dict[str, Wrong | None], running: str, cause: Wro
 
 
 def _status(process: subprocess.Popen[bytes]) -> int | None:
-    """Return how a process has ended, the number of a signal below 0, or None where it goes on."""
+    """Return how a process has ended, the number of a signal below 0, or None where it runs."""
     try:
         status = process.wait(1)
     except subprocess.TimeoutExpired:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ...refimpl.errors import InputError
 from .sandbox import Limits, confine, die_with_parent
 from .wire import LONGEST_MESSAGE, MOST_BYTES, STUDENT, Channel, error_of, names_of, plain, unpacked
 
@@ -65,10 +66,11 @@ def serve(channel: Channel) -> None:
 
 
 def _bytes(kind: str, rest: Any) -> bytes:
-    """Return a message; ValueError for one that the grader does not read."""
+    """Return a message; InputError for one that the grader does not read."""
     message = json.dumps([kind, rest]).encode()
     if len(message) > MOST_BYTES:
-        raise ValueError(f"a result of {len(message)} bytes, more than {MOST_BYTES}")
+        rule = f"at most {MOST_BYTES} are read"
+        raise InputError("result", f"{len(message)} bytes", rule, "return an array of the stated shape")
     return message
 
 

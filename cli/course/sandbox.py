@@ -56,12 +56,10 @@ LIMITS = Limits()
 
 def bubblewrap() -> list[str]:
     """Return the command that runs another one in a sandbox."""
-    parts = (
-        importlib.util.find_spec(f"wamnet.{name}")
-        for name in ("cli", "compiler", "kernels", "refimpl", "spec")
-    )
+    parts = (importlib.util.find_spec(f"wamnet.{name}") for name in ("cli", "compiler", "kernels", "refimpl"))
     packages = [place for part in parts if part for place in part.submodule_search_locations or ()]
     folders = ["/usr", "/etc/alternatives", "/etc/ld.so.cache", sys.base_prefix, sys.prefix]
+    folders.append(str(Path(sys.executable).resolve().parents[1]))
     folders += [str(Path(np.__file__).parents[1]), *packages]
     command = ["bwrap", "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session"]
     command += ["--cap-drop", "ALL", "--size", str(FOLDER_MB * MEGABYTE), "--tmpfs", FOLDER]
@@ -119,7 +117,7 @@ _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 """Operations of a filter: load a word of the call, jump by comparing it, return."""
 
 _ALLOW, _NOT_PERMITTED, _NO_SUCH_CALL = 0x7FFF0000, 0x50001, 0x50026
-"""What a filter returns: go on, EPERM, ENOSYS, on which the C library takes clone in place of clone3."""
+"""What a filter returns: continue, EPERM, ENOSYS, on which the C library takes clone in place of clone3."""
 
 
 def _filter(architecture: int, clone: int, denied: tuple[int, ...]) -> bytes:

@@ -3,7 +3,7 @@
 1. The process runs in the sandbox, or only with its own limits where the code is trusted [`started`].
 2. A function of the student is an attribute [`Functions`]: calling it sends the arguments and returns data,
    or raises what the function raised. Functions among the arguments are called back.
-3. A process that ends, sends what is no answer, or goes on for too long raises `Ended`, which no check
+3. A process that ends, sends what is no answer, or takes too long raises `Ended`, which no check
    catches [`Functions.request`, `deadline`].
 """
 
@@ -25,7 +25,7 @@ from .wire import MOST_BYTES, BadMessage, Channel, Expression, names_of, packed,
 LARGEST_FILE = MEGABYTE
 """Bytes of the largest Python file that is sent: a lab has some kilobytes."""
 
-MOST_FILES = 50
+MOST_FILES = 100
 """Python files of a student that are sent."""
 
 MOST_CALLBACKS = 100_000

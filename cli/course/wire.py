@@ -46,7 +46,7 @@ STUDENT = "student"
 
 
 class BadMessage(WamnetError):
-    """Bytes that are no message: something else than the grader's own code wrote to the pipe."""
+    """Bytes that `plain` does not give: other code than judged.py wrote to the pipe."""
 
 
 class Node(NamedTuple):
@@ -147,12 +147,14 @@ class _Pickler(pickle.Pickler):
         self.callbacks = callbacks
 
     def persistent_id(self, value: Any) -> int | None:
+        """Return the index of a closure among the callbacks."""
         if isinstance(value, FunctionType) and "<" in value.__qualname__:
             self.callbacks.append(value)
             return len(self.callbacks) - 1
         return None
 
     def reducer_override(self, value: Any) -> Any:
+        """Return the function that makes a value in the student's process, and its arguments."""
         if isinstance(value, FunctionType) and value.__module__ != __name__:
             # Not pickle's own way, which demands that no test or lab has replaced the function meanwhile.
             return named, (value.__module__, value.__qualname__)
@@ -178,6 +180,7 @@ class _Unpickler(pickle.Unpickler):
         self.call = call
 
     def persistent_load(self, index: int) -> Callable[..., Any]:
+        """Return a callback."""
         return lambda *args: self.call(index, *args)
 
 
@@ -269,7 +272,7 @@ def _array(name: str, shape: Sequence[int], writeable: bool, scalar: bool, data:
 
 
 def identifier(text: str) -> str:
-    """Return a name without characters that are none of a name's."""
+    """Return a name with an underscore for each character that a name cannot have."""
     return re.sub(r"\W", "_", text[:60], flags=re.ASCII)
 
 

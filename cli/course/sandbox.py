@@ -69,7 +69,7 @@ def bubblewrap() -> list[str]:
     # Shorter paths first: what is bound later lies on top.
     for folder in sorted(set(folders)):
         command += ["--ro-bind-try", folder, folder]
-    return [*command, "--remount-ro", "/", "--chdir", "/"]
+    return [*command, "--dev-bind", os.devnull, os.devnull, "--remount-ro", "/", "--chdir", "/"]
 
 
 def unavailable() -> str:

@@ -58,6 +58,9 @@ def graded(request, tmp_path_factory):
     bodies |= {"right": answer("print('x' * 100)"), "=formula": answer("1 / 0")}
     bodies |= {"<b>bold": answer("return '<i>'"), "\x1b[31m\udcff": answer("pass")}
     bodies["own-module"] = answer("from helper import twice")
+    bodies["own-file"] = (
+        answer("pass") + "import os\nopen('mine.txt', 'w').write('x')\nopen(os.devnull, 'w')\n"
+    )
     for name, text in bodies.items():
         (folder / name).mkdir()
         (folder / name / LAB.file).write_text(text)
@@ -79,7 +82,7 @@ def test_what_a_student_does_is_survived_and_named(graded, name):
 
 
 def test_right_answers_pass_beside_them(graded):
-    for name in ("right", "own-module", r"\x1b[31m\udcff"):
+    for name in ("right", "own-module", "own-file", r"\x1b[31m\udcff"):
         assert graded[name].of(LAB).right, graded[name].of(LAB).first
         assert graded[name].complete == 1
 

@@ -11,7 +11,7 @@
 VENV ?= .venv
 PYTHON ?= python3
 comma := ,
-WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
+WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium,bubblewrap$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 override WAMNET_REQUIRE := $(WAMNET_REQUIRE)$(if $(ALSO),$(comma)$(ALSO))
 PYTEST_OPTIONS ?= -n 2
 MINUTES ?= 10

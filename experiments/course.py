@@ -26,12 +26,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wamnet.cli.course.frame import Wrong, outcome
+from wamnet.cli.course import judged as students_process
+from wamnet.cli.course.frame import Ended, Wrong, of_exception, outcome
 from wamnet.cli.course.labs import LABS, Lab, lab_named
-from wamnet.cli.course.worker import load
+from wamnet.cli.course.student import Functions, deadline
+from wamnet.cli.course.wire import Channel
 
 COURSE = Path(__file__).resolve().parents[1] / "tests/course"
 """Right and wrong answers."""
@@ -67,13 +70,43 @@ def answers(lab: Lab) -> list[Answer]:
     return [Answer(*row) for row in module.WRONG]
 
 
+@contextmanager
+def forked(folder: Path) -> Iterator[Functions]:
+    """Give a student's functions in a fork of this process, which has no time to lose on imports."""
+    (their_reader, writer), (reader, their_writer) = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.close(writer)
+            os.close(reader)
+            os.chdir(folder)
+            with Path(os.devnull).open("wb") as nowhere:
+                os.dup2(nowhere.fileno(), 1)
+            students_process.serve(Channel(os.fdopen(their_reader, "rb"), os.fdopen(their_writer, "wb")))
+        finally:
+            os._exit(0)
+    os.close(their_reader)
+    os.close(their_writer)
+    with os.fdopen(reader, "rb") as incoming, os.fdopen(writer, "wb") as outgoing:
+        try:
+            yield Functions(Channel(incoming, outgoing))
+        finally:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
 def finding(lab: Lab, text: str, folder: Path) -> Wrong | None:
-    """Return the first thing that is wrong with an answer."""
+    """Return the first thing that is wrong with an answer; an answer that takes too long is."""
     (folder / lab.file).write_text(text, encoding="utf-8")
-    module = load(lab, folder)
-    if isinstance(module, Wrong):
-        return module
-    return next(filter(None, (outcome(check, module) for check in lab.checks)), None)
+    with forked(folder) as student:
+        try:
+            with deadline(LONGEST_S):
+                student.request(students_process.load, lab.file, {})
+                return next(filter(None, (outcome(check, student) for check in lab.checks)), None)
+        except Ended as error:
+            return Wrong("", "this answer", "an end", str(error) or "none")
+        except Exception as error:  # noqa: BLE001
+            return of_exception(error, "loading the file")
 
 
 def judged(lab: Lab, folder: Path) -> Iterator[tuple[Answer, Wrong | None, bool]]:
@@ -111,23 +144,6 @@ def difference(lab: Lab, text: str) -> str:
     right = (COURSE / "solutions" / lab.file).read_text(encoding="utf-8")
     pairs = zip(right.splitlines(), text.splitlines(), strict=True)
     return next(other.strip() for one, other in pairs if one != other)
-
-
-def caught(lab: Lab, text: str, folder: Path) -> bool:
-    """Tell whether a changed answer is caught; one that does not end is."""
-
-    def stop(*_: Any) -> None:
-        raise TimeoutError("it does not end")
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(LONGEST_S)
-    try:
-        return finding(lab, text, folder) is not None
-    except TimeoutError:
-        return True
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def class_of(students: int, labs: Sequence[Lab], folder: Path) -> int:
@@ -186,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             found = list(judged(lab, Path(made)))
             seen, told = sum(w is not None for _, w, _ in found), sum(good for _, _, good in found)
             changed = mutants((COURSE / "solutions" / lab.file).read_text(encoding="utf-8"))
-            noticed = [caught(lab, text, Path(made)) for text in changed]
+            noticed = [finding(lab, text, Path(made)) is not None for text in changed]
             rows.append((lab.name, len(found), seen, told, len(changed), sum(noticed)))
             if options.missed:
                 for text in (t for t, good in zip(changed, noticed, strict=True) if not good):

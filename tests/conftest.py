@@ -27,7 +27,7 @@ from typing import Any
 
 import hypothesis
 import pytest
-from packages import FOUND, PACKAGES, required
+from packages import FOUND, PACKAGES, SANDBOX, required
 
 pytest_plugins = ["quick", "apart", "workers"]
 
@@ -70,7 +70,7 @@ _state_key = pytest.StashKey[dict[str, str]]()
 def required_executors() -> frozenset[str]:
     """Return the executors, peers and packages that WAMNET_REQUIRE lists; numpy needs no naming."""
     names = required()
-    known = (*EXECUTORS, *PEERS, *PACKAGES)
+    known = (*EXECUTORS, *PEERS, *PACKAGES, SANDBOX)
     if unknown := sorted(names - set(known)):
         raise pytest.UsageError(f"WAMNET_REQUIRE names {unknown}: it may list only {', '.join(known)}")
     return names
@@ -246,7 +246,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if not state:
         return
     terminalreporter.section("executors")
-    for name in (*EXECUTORS, *PEERS, *PACKAGES):
+    for name in (*EXECUTORS, *PEERS, *PACKAGES, SANDBOX):
         text = state.get(name, "not requested by any test that ran")
         colour = {"ok": {"green": True}, "MISSING": {"red": True, "bold": True}}.get(
             text.partition(" ")[0].rstrip(":"), {}

@@ -1,7 +1,8 @@
 """What graders are made of: a check, what it finds wrong, and the likeliest mistake.
 
-1. A lab's checks are functions of the student's module [`Check`]. One that returns has passed; one that finds
-   something wrong raises [`Wrong`]: the clause, what was expected, what was found, the likeliest mistake.
+1. A lab's checks are functions of the student's functions [`Check`], which run in another process. One that
+   returns has passed; one that finds something wrong raises [`Wrong`]: the clause, what was expected, what
+   was found, the likeliest mistake.
 2. [`expect`] compares numbers. A list of values that known mistakes give, each with its explanation, turns
    what was found into the likeliest mistake. NaN is never within a bound.
 3. [`vectors`] asks all cases of a kind of the spec's vectors, as `wamnet conformance` does.
@@ -13,11 +14,10 @@ from __future__ import annotations
 
 import math
 import re
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from ...spec.conformance import case as cases
 from ...spec.conformance.case import Case, given, load
 from ...spec.conformance.numbers import to_json
 from ...spec.conformance.run import judge
-from .sandbox import Forbidden
+from .wire import Raised, names_of
 
 VECTORS = Path(cases.__file__).resolve().parents[1] / "vectors"
 """The spec's vectors."""
@@ -55,12 +55,15 @@ class Check(NamedTuple):
 
 
 class Wrong(Exception):
-    """What a check finds wrong: clause, what was looked at, expected, found, and the likeliest mistake."""
+    """What a check finds wrong: clause, what was looked at, expected, found, and the likeliest mistake.
+
+    A student's strings may be among the parts: each is one line without control characters.
+    """
 
     def __init__(self, clause: str, what: str, expected: str, found: str, likely: str = "") -> None:
-        super().__init__(clause, what, expected, found, likely)
-        self.clause, self.what = clause, what
-        self.expected, self.found, self.likely = expected, found, likely
+        parts = [shown(part) for part in (clause, what, expected, found, likely)]
+        super().__init__(*parts)
+        self.clause, self.what, self.expected, self.found, self.likely = parts
 
     def __str__(self) -> str:
         """Return one line without control characters."""
@@ -197,11 +200,17 @@ OF_PROGRAMS = ("CNF-9", "RDG-4")
 """Clauses of what programs are sent, which a student's functions do not see."""
 
 
+@cache
+def cases_of(kind: str) -> Sequence[Case]:
+    """Return the spec's cases of a kind, which a process that grades a class reads once."""
+    return load(VECTORS / f"{kind}.json")[1]
+
+
 def vectors(
     kind: str, answer: Answer, only: Sequence[str] = (), likely: str = "", explain: Explain | None = None
 ) -> None:
     """Ask all cases of a kind; `only` are the outputs that count. Wrong names the case and its clause."""
-    for case in load(VECTORS / f"{kind}.json")[1]:
+    for case in cases_of(kind):
         if case.clause in OF_PROGRAMS:
             continue
         if only and case.expected is not None:
@@ -252,66 +261,70 @@ MASK = "a mask of another shape than the array: make that from the shape of a re
 """The explanation of a mask that does not fit."""
 
 EXPLAINED = (
-    (NotImplementedError, "", "it is still to be written"),
-    (NameError, "'np'", "`import numpy as np` is missing at the top"),
-    (NameError, "'math'", "`import math` is missing; on arrays use np instead"),
-    (NameError, "", "a misspelt name, or one that is set only on another path"),
-    (UnboundLocalError, "", "a name that is set only on another path"),
-    (ValueError, "is ambiguous", "`if`, `and`, `or`, `min` or `max` on an array: np.where, &, |"),
-    (TypeError, "can be converted to", "a function of `math`, or float(), on an array: take that of np"),
-    (TypeError, "not supported for the input types", "a number of another kind: keep constants as they are"),
-    (TypeError, "can not be traced", "an operation that a kernel does not have"),
-    (ValueError, "broadcast", "axes that do not fit: a number per ray goes with vectors as t[..., None]"),
-    (ValueError, "matmul", "the matrix is (D_out, D_in): x @ W.T"),
-    (ValueError, "read-only", "an argument is changed: make a new array"),
-    (IndexError, "for array of dimension", "one ray has no axis beside its components: axis=-1, not axis=1"),
-    (IndexError, "too many indices for array: array is 0-dimensional, but 1 were", MASK),
-    (IndexError, "boolean index", MASK),
-    (IndexError, "too many indices", "one ray has no axis beside its components: [..., 0], not [:, 0]"),
-    (IndexError, "", "an index beyond the end"),
-    (KeyError, "", "a name that the dictionary does not hold"),
-    (AttributeError, "'NoneType'", "a function without `return` gives None"),
-    (AttributeError, "has no attribute", "a function or constant of the skeleton is gone or renamed"),
-    (RecursionError, "", "a function that calls itself without an end"),
-    (MemoryError, "", "an array that grows with every turn, or an axis too many"),
-    (ZeroDivisionError, "", "a divisor that can be 0: guard it"),
-    (OSError, "File too large", "it prints or writes more than is allowed: remove the prints"),
-    (SystemExit, "", "it calls sys.exit or exit: return a value"),
-    (Forbidden, "", "a lab only computes: its functions need no files, processes or network"),
+    ("NotImplementedError", "", "it is still to be written"),
+    ("NameError", "'np'", "`import numpy as np` is missing at the top"),
+    ("NameError", "'math'", "`import math` is missing; on arrays use np instead"),
+    ("NameError", "", "a misspelt name, or one that is set only on another path"),
+    ("UnboundLocalError", "", "a name that is set only on another path"),
+    ("ValueError", "is ambiguous", "`if`, `and`, `or`, `min` or `max` on an array: np.where, &, |"),
+    ("TypeError", "can be converted to", "a function of `math`, or float(), on an array: take that of np"),
+    (
+        "TypeError",
+        "not supported for the input types",
+        "a number of another kind: keep constants as they are",
+    ),
+    ("TypeError", "can not be traced", "an operation that a kernel does not have"),
+    ("ValueError", "broadcast", "axes that do not fit: a number per ray goes with vectors as t[..., None]"),
+    ("ValueError", "matmul", "the matrix is (D_out, D_in): x @ W.T"),
+    ("ValueError", "read-only", "an argument is changed: make a new array"),
+    (
+        "IndexError",
+        "for array of dimension",
+        "one ray has no axis beside its components: axis=-1, not axis=1",
+    ),
+    ("IndexError", "too many indices for array: array is 0-dimensional, but 1 were", MASK),
+    ("IndexError", "boolean index", MASK),
+    ("IndexError", "too many indices", "one ray has no axis beside its components: [..., 0], not [:, 0]"),
+    ("IndexError", "", "an index beyond the end"),
+    ("KeyError", "", "a name that the dictionary does not hold"),
+    ("AttributeError", "'NoneType'", "a function without `return` gives None"),
+    ("AttributeError", "has no attribute", "a function or constant of the skeleton is gone or renamed"),
+    ("RecursionError", "", "a function that calls itself without an end"),
+    ("MemoryError", "", "an array that grows with every turn, or an axis too many"),
+    ("ZeroDivisionError", "", "a divisor that can be 0: guard it"),
+    (
+        "ImportError",
+        "",
+        "the course needs NumPy and wamnet only; other packages are not there when it is graded",
+    ),
+    ("SyntaxError", "", "the file is not Python: a bracket, a colon or an indentation"),
+    ("SystemExit", "", "it calls sys.exit or exit: return a value"),
+    ("OSError", "", "a lab only computes: its functions need no files, processes or network"),
 )
-"""Exceptions, a part of their message, and what they are likely to mean; the first that fits counts."""
+"""Names of exceptions, a part of their message, and their likely meaning; the first that fits counts."""
 
 
-def of_exception(error: BaseException, name: str, file: str) -> Wrong:
+class Ended(BaseException):
+    """The student's process has ended, or is to be ended; no check continues."""
+
+
+def of_exception(error: BaseException, name: str) -> Wrong:
     """Return an exception of the student's code as a finding, with its line."""
     if isinstance(error, Wrong):
         return error
-    told = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    if isinstance(error, SyntaxError):
-        lines = [error.lineno or 0]
-    where = f", line {lines[-1]}" if lines else ""
-    likely = ""
-    for kind, part, text in EXPLAINED:
-        if isinstance(error, kind) and part in str(error):
-            likely = text
-            break
-    if isinstance(error, ImportError):
-        likely = "the course needs NumPy and wamnet only; other packages are not there when it is graded"
-    if isinstance(error, SyntaxError):
-        likely = "the file is not Python: a bracket, a colon or an indentation"
-    return Wrong("", name, "a result", f"{told}{where}", likely)
+    names, text = names_of(error), str(error)
+    where = f", line {error.line}" if isinstance(error, Raised) and error.line else ""
+    likely = next((told for kind, part, told in EXPLAINED if kind in names and part in text), "")
+    return Wrong("", name, "a result", f"{names[0]}{f': {text}' if text else ''}{where}", likely)
 
 
-def outcome(check: Check, student: ModuleType) -> Wrong | None:
-    """Return what a check finds wrong with a student's module, or None; Ctrl-C is passed on."""
+def outcome(check: Check, student: Any) -> Wrong | None:
+    """Return what a check finds wrong with a student's functions, or None."""
     try:
         with np.errstate(all="ignore"):
             check.run(student)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # noqa: BLE001
-        return of_exception(error, check.name, str(student.__file__))
+    except Exception as error:  # noqa: BLE001
+        return of_exception(error, check.name)
     return None
 
 

@@ -1,48 +1,51 @@
-"""Grade a student's folder, or a class of them, each lab in a process with limits.
+"""Grade a student's folder, or a class of them.
 
-1. A lab's folder is copied: Python files only, so that nothing that the code does reaches the original
-   [`copied`]. The worker runs in a folder of its own that goes afterwards [`grade`].
-2. Its records are read when it has ended, by itself or by a limit; a check that has begun and not ended is
-   where it was stopped, and how it ended says why [`_stopped`]. Checks after it are not reached.
-3. A class is a folder of folders, one a student; labs run side by side [`grade_class`].
+1. A lab is graded beside a new process that runs the student's code [`grade`, student.py]. Its checks run
+   here, and only what they find counts.
+2. A process that ends before the last check is the finding of the check that was running, and of those after
+   it [`_stopped`].
+3. A class is a folder of folders, one a student; labs are graded side by side, in processes that grade one
+   after another [`grade_class`, worker.py]. One that ends is replaced, and costs its lab only.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from selectors import EVENT_READ, DefaultSelector
 
-from ...refimpl.errors import InputError
-from .frame import Wrong
+from ...refimpl.errors import InputError, shown
+from .frame import Ended, Wrong, of_exception, outcome
+from .judged import load
 from .labs import LABS, Lab
-from .sandbox import LIMITS, MEGABYTE, Limits
-from .worker import LOADING
+from .sandbox import LIMITS, Limits
+from .student import deadline, sources, started
 
-LARGEST_FILE = MEGABYTE
-"""Bytes of the largest Python file that is copied: a lab has some kilobytes."""
+LOADING = "loading the file"
+"""The finding's name before the first check."""
 
-MOST_FILES = 100
-"""Python files of a student that are copied."""
+STARTING = "starting a process"
+"""The finding's name before that, when nothing of the student's has been executed."""
+
+LONGEST_END_S = 60
+"""Wall-clock time beyond that of a lab after which the process that grades it is replaced."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a lab: for each check None or what is wrong, and what else was seen of the process."""
+    """What came of a lab: for each check None or what is wrong."""
 
     lab: Lab
     checks: tuple[tuple[str, Wrong | None], ...]
-    notes: tuple[str, ...] = ()
 
     @property
     def passed(self) -> int:
@@ -60,101 +63,71 @@ class Result:
         return next((wrong for _, wrong in self.checks if wrong is not None), None)
 
 
-def copied(source: Path, target: Path) -> None:
-    """Copy a student's Python files (plain ones, not links) to a new folder."""
-    target.mkdir()
-    found = [path for path in sorted(source.glob("*.py")) if path.is_file() and not path.is_symlink()]
-    for path in found[:MOST_FILES]:
-        if path.stat().st_size <= LARGEST_FILE:
-            shutil.copyfile(path, target / path.name)
+def grade(
+    lab: Lab, folder: Path, limits: Limits = LIMITS, *, trusted: bool = False, shows: bool = False
+) -> Result:
+    """Grade a lab in a student's folder; `shows`: what the code prints is shown.
 
-
-def grade(lab: Lab, folder: Path, limits: Limits = LIMITS, shows: bool = False) -> Result:
-    """Grade a lab in a student's folder; `shows`: what the code prints is shown."""
-    with tempfile.TemporaryDirectory(prefix="wamnet-course-", ignore_cleanup_errors=True) as made:
-        place = Path(made)
-        copied(folder, place / "work")
-        before = {path.name for path in (place / "work").iterdir()}
-        records, said = place / "records", place / "said"
-        command = [sys.executable, "-m", "wamnet.cli.course.worker", lab.name, str(place / "work")]
-        with said.open("wb") as printed:
-            output = None if shows else printed
-            with _process([*command, str(records), *map(str, limits)], place, output) as process:
-                try:
-                    status = process.wait(limits.longest_wait_s)
-                except subprocess.TimeoutExpired:
-                    status = None
-        after = {path.name for path in (place / "work").iterdir()} if (place / "work").is_dir() else set()
-        lines = records.read_text(encoding="utf-8", errors="replace") if records.is_file() else ""
-        notes = [f"it wrote {name}" for name in sorted(after - before) if name != "__pycache__"]
-        notes += [f"it deleted {name}" for name in sorted(before - after)]
-        tail = said.read_bytes()[-400:].decode(errors="replace")
-        return _read(lab, lines, status, limits, notes, tail)
-
-
-@contextmanager
-def _process(command: Sequence[str], place: Path, output: IO[bytes] | None) -> Iterator[Any]:
-    """Run the worker in a session of its own; whatever ends the block ends the worker and its children."""
-    quiet = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "PYTHONDONTWRITEBYTECODE"), "1")
-    kept = {name: os.environ[name] for name in ("PATH", "PYTHONPATH", "VIRTUAL_ENV") if name in os.environ}
-    process = subprocess.Popen(
-        command,
-        cwd=place,
-        env={**kept, **quiet, "HOME": str(place / "work"), "TMPDIR": str(place / "work")},
-        stdin=subprocess.DEVNULL,
-        stdout=output,
-        stderr=subprocess.STDOUT if output else None,
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-def _read(lab: Lab, lines: str, status: int | None, limits: Limits, notes: list[str], tail: str) -> Result:
-    """Return what the worker's records say, and what is missing in them."""
-    found: dict[str, Wrong | None] = {}
-    begun, ended = "", False
-    for line in lines.splitlines():
+    `trusted`: without the sandbox, in the folder itself.
+    """
+    with started(folder, limits, trusted, shows) as (student, process):
+        found: dict[str, Wrong | None] = {}
+        running = STARTING
         try:
-            record = json.loads(line)
-        except ValueError:
-            continue
-        begun, ended = record.get("begun", begun), ended or "end" in record
-        if "check" in record:
-            found[record["check"]] = Wrong(*record["wrong"]) if record["wrong"] else None
-        if "refused" in record:
-            notes.insert(0, f"it {record['refused']}: refused")
-    names = [check.name for check in lab.checks]
-    if not ended:
-        found[begun or LOADING] = _stopped(begun or LOADING, status, limits, tail)
-    elif LOADING not in found:
-        return Result(lab, tuple((name, found[name]) for name in names), tuple(dict.fromkeys(notes)))
-    cause = found.get(LOADING) or found.get(begun)
+            files = sources(folder)
+            if lab.file not in files:
+                rule = "a plain file of this name, at most one megabyte"
+                raise Wrong("", LOADING, lab.file, "no such file", rule)
+            with deadline(limits.longest_wait_s):
+                student.request(os.getpid)
+                running = LOADING
+                student.request(load, lab.file, {} if trusted else files)
+                for check in lab.checks:
+                    running = check.name
+                    found[running] = outcome(check, student)
+            cause = None
+        except Ended as error:
+            cause = _stopped(running, _status(process), limits, str(error))
+        except Exception as error:  # noqa: BLE001
+            cause = of_exception(error, LOADING)
+    return result_of(lab, found, running, cause)
+
+
+def result_of(lab: Lab, found: dict[str, Wrong | None], running: str, cause: Wrong | None) -> Result:
+    """Return the result of a lab of which some checks have been made, and why there are no others."""
     missing = Wrong("", "this check", "an answer", "none", "what stopped the process before it")
-    checks = [(name, found.get(name, cause if LOADING in found else missing)) for name in names]
-    return Result(lab, tuple(checks), tuple(dict.fromkeys(notes)))
+    first = cause if running in (STARTING, LOADING) else missing
+    return Result(
+        lab,
+        tuple((c.name, found.get(c.name, cause if c.name == running else first)) for c in lab.checks),
+    )
 
 
-def _stopped(begun: str, status: int | None, limits: Limits, tail: str) -> Wrong:
-    """Return why a process has ended before its last record."""
-    loop = "a loop that does not end: look at its condition"
-    if status == -signal.SIGXCPU or (status == -signal.SIGKILL and begun):
-        return Wrong("", begun, f"an end within {limits.seconds} s of computing", "none", loop)
-    if status is None:
-        return Wrong(
-            "", begun, f"an end within {limits.longest_wait_s} s", "none", "it sleeps, or waits for input"
-        )
-    if status < 0:
-        name = signal.Signals(-status).name
-        return Wrong("", begun, "an answer", f"an end by signal {name}", "a crash in a library's C code")
-    if "MemoryError" in tail:
-        return Wrong("", begun, f"at most {limits.memory_mb} MB of memory", "more", "an array that grows")
-    found = f"the process ended with status {status}"
-    return Wrong("", begun, "an answer", found, "os._exit, or exit in a thread: return a value")
+def _status(process: subprocess.Popen[bytes]) -> int | None:
+    """Return how a process has ended, the number of a signal below 0, or None where it runs."""
+    try:
+        status = process.wait(1)
+    except subprocess.TimeoutExpired:
+        return None
+    # Bubblewrap ends like a shell where a signal has ended the process in it.
+    return 128 - status if status > 128 else status
+
+
+def _stopped(running: str, status: int | None, limits: Limits, reason: str) -> Wrong:
+    """Return why a process has not answered."""
+    if running == STARTING:
+        return Wrong("", running, "a process", f"none, status {status}", "the machine: grade this one again")
+    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+        loop = "a loop that does not end: look at its condition"
+        return Wrong("", running, f"an end within {limits.seconds} s of computing", "none", loop)
+    if reason:
+        return Wrong("", running, "an answer", reason, "it sleeps, waits, or writes to the grader's pipe")
+    if status is None or status >= 0:
+        found = "none" if status is None else f"the process ended with status {status}"
+        return Wrong("", running, "an answer", found, "os._exit, or exit in a thread: return a value")
+    names = {number.value: number.name for number in signal.Signals}
+    found = f"an end by signal {names.get(-status, -status)}"
+    return Wrong("", running, "an answer", found, "a crash in a library's C code")
 
 
 @dataclass(frozen=True)
@@ -189,25 +162,88 @@ def students_of(folder: Path) -> list[Path]:
     return found
 
 
+def files_of(folder: Path, labs: Sequence[Lab]) -> list[tuple[Path, Lab]]:
+    """Return each student of a class with each lab of which there is a file."""
+    return [
+        (path, lab)
+        for path in students_of(folder)
+        for lab in labs
+        # Unlike Path.is_file, it takes a folder without rights for an empty one.
+        if os.access(path / lab.file, os.F_OK)
+    ]
+
+
+class Grader:
+    """A process that grades lab after lab [worker.py]; a new one is started when it is needed."""
+
+    process: subprocess.Popen[str] | None = None
+
+    def begin(self, lab: Lab, folder: Path, limits: Limits, trusted: bool) -> int:
+        """Begin with a lab; return the file number to wait for."""
+        if self.process is None:
+            command = [sys.executable, "-m", "wamnet.cli.course.worker"]
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+            )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.lab, self.late = lab, time.monotonic() + limits.longest_wait_s + LONGEST_END_S
+        with suppress(BrokenPipeError):
+            print(json.dumps([lab.name, str(folder), limits, trusted]), file=self.process.stdin, flush=True)
+        return self.process.stdout.fileno()
+
+    def result(self) -> Result:
+        """Return what it has found, or why there is nothing."""
+        assert self.process is not None
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if line.endswith("\n"):
+            rows = json.loads(line)
+            return Result(self.lab, tuple((name, Wrong(*row) if row else None) for name, row in rows))
+        self.close()
+        wrong = Wrong("", LOADING, "a grade", "the process that grades has ended", "grade this one by itself")
+        return result_of(self.lab, {}, LOADING, wrong)
+
+    def close(self) -> None:
+        """End the process."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.communicate()
+            self.process = None
+
+
 def grade_class(
     folder: Path,
     labs: Sequence[Lab] = LABS,
     limits: Limits = LIMITS,
     workers: int = 2,
     on_progress: Callable[[int], None] = lambda count: None,
+    *,
+    trusted: bool = False,
 ) -> list[Student]:
     """Grade all students of a folder, `workers` labs at a time."""
-    found = students_of(folder)
-    jobs = [(path, lab) for path in found for lab in labs if (path / lab.file).is_file()]
-
-    def run(job: tuple[Path, Lab]) -> Result:
-        result = grade(job[1], job[0], limits)
-        on_progress(1)
-        return result
-
-    with ThreadPoolExecutor(max(1, workers)) as pool:
-        results = list(pool.map(run, jobs))
+    students = students_of(folder)
+    jobs = files_of(folder, labs)
+    results: dict[tuple[Path, Lab], Result] = {}
+    waiting = iter(jobs)
+    with ExitStack() as stack, DefaultSelector() as selector:
+        idle = [stack.enter_context(closing(Grader())) for _ in range(workers)]
+        while len(results) < len(jobs):
+            for job in islice(waiting, len(idle)):
+                grader = idle.pop()
+                number = grader.begin(job[1], job[0], limits, trusted)
+                selector.register(number, EVENT_READ, (grader, job))
+            ready = selector.select(1.0)
+            for key in list(selector.get_map().values()):
+                if key.data[0].late < time.monotonic():
+                    key.data[0].process.kill()
+            for key, _ in ready:
+                grader, job = key.data
+                selector.unregister(key.fileobj)
+                results[job] = grader.result()
+                idle.append(grader)
+                on_progress(1)
     return [
-        Student(path.name, tuple(r for (whose, _), r in zip(jobs, results, strict=True) if whose == path))
-        for path in found
+        Student(shown(path.name), tuple(results[path, lab] for lab in labs if (path, lab) in results))
+        for path in students
     ]

@@ -1,27 +1,43 @@
-"""What a student's code may use while it is graded: time, memory, and files of its own folder.
+"""The sandbox of a student's code: Bubblewrap, and limits that the process sets for itself.
 
-1. The operating system limits computing time, memory and the size of a file [`limit`], `resource.setrlimit`.
-2. A hook of Python refuses what leaves the folder: other files, processes, signals, the network [`confine`].
-   A hook cannot be removed. It stops mistakes; it does not stop somebody who means harm, because code in
-   C that Python loads does not ask it. Grade untrusted code in a container or a virtual machine.
-3. Each refusal is an exception that `except Exception` does not catch [`Forbidden`], and is noted as well.
+1. Bubblewrap gives the process namespaces of its own, no network, a file system that holds Python and this
+   package read-only, and an empty folder in memory [`bubblewrap`, `unavailable`].
+2. The process limits its computing time, memory, and the size and number of open files, and gives up the
+   system calls that make processes, programs and sockets, or hold memory elsewhere [`confine`].
+3. It ends when its parent ends [`die_with_parent`].
 """
 
 from __future__ import annotations
 
+import ctypes
+import importlib.util
 import os
+import platform
 import resource
+import signal
+import struct
+import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
 
 MEGABYTE = 1 << 20
 """Bytes."""
 
+BASE_MB = 256
+"""Address space of Python, NumPy and this package, in megabytes: about 160 are used."""
+
+FOLDER = "/tmp"
+"""The working folder inside Bubblewrap: in memory, and gone with the process."""
+
+FOLDER_MB = 16
+"""Its size."""
+
 
 class Limits(NamedTuple):
-    """Computing time of a lab in seconds; memory, and one file, in megabytes; files that may be opened."""
+    """Computing time of a lab in seconds; memory, and one file, in megabytes; files that may be open."""
 
     seconds: int = 60
     memory_mb: int = 1024
@@ -38,100 +54,107 @@ LIMITS = Limits()
 """What suits all labs."""
 
 
-class Forbidden(BaseException):
-    """What a student's code may not do while it is graded."""
+def bubblewrap() -> list[str]:
+    """Return the command that runs another one in a sandbox."""
+    parts = (importlib.util.find_spec(f"wamnet.{name}") for name in ("cli", "compiler", "kernels", "refimpl"))
+    packages = [place for part in parts if part for place in part.submodule_search_locations or ()]
+    folders = ["/usr", "/etc/alternatives", "/etc/ld.so.cache", sys.base_prefix, sys.prefix]
+    folders.append(str(Path(sys.executable).resolve().parents[1]))
+    folders += [str(Path(np.__file__).parents[1]), *packages]
+    command = ["bwrap", "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session"]
+    command += ["--cap-drop", "ALL", "--size", str(FOLDER_MB * MEGABYTE), "--tmpfs", FOLDER]
+    for folder in ("/lib", "/lib64"):
+        command += ["--symlink", f"usr{folder}", folder] if Path(folder).is_symlink() else []
+        folders += [folder] if not Path(folder).is_symlink() else []
+    # Shorter paths first: what is bound later lies on top.
+    for folder in sorted(set(folders)):
+        command += ["--ro-bind-try", folder, folder]
+    return [*command, "--dev-bind", os.devnull, os.devnull, "--remount-ro", "/", "--chdir", "/"]
 
 
-WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-"""Flags of `open` that change a file."""
-
-PATHS = {
-    "os.remove": ("deletes", 1),
-    "os.rmdir": ("deletes", 1),
-    "os.rename": ("renames", 2),
-    "os.mkdir": ("makes", 1),
-    "os.truncate": ("empties", 1),
-    "os.link": ("links", 2),
-    "os.symlink": ("links", 2),
-    "os.chmod": ("changes the rights of", 1),
-    "os.chown": ("changes the owner of", 1),
-    "os.utime": ("changes the times of", 1),
-    "shutil.rmtree": ("deletes", 1),
-    "os.chdir": ("leaves for", 1),
-}
-"""Events of Python on files: the verb, and how many of its arguments are paths."""
-
-NEVER = {
-    "os.system": "starts a program",
-    "os.exec": "starts a program",
-    "os.posix_spawn": "starts a program",
-    "os.spawn": "starts a program",
-    "os.fork": "starts a process",
-    "os.forkpty": "starts a process",
-    "subprocess.Popen": "starts a program",
-    "os.kill": "sends a signal",
-    "os.killpg": "sends a signal",
-    "signal.pthread_kill": "sends a signal",
-    "resource.setrlimit": "changes its limits",
-    "socket.connect": "uses the network",
-    "socket.bind": "uses the network",
-    "socket.sendto": "uses the network",
-    "socket.getaddrinfo": "uses the network",
-    "urllib.Request": "uses the network",
-}
-"""Events that are refused whatever their arguments are."""
+def unavailable() -> str:
+    """Return why there is no sandbox on this machine, or ""."""
+    try:
+        done = subprocess.run(
+            [*bubblewrap(), sys.executable, "-c", "import numpy"],
+            capture_output=True, text=True, errors="replace", check=False, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except OSError as error:
+        return f"bwrap: {error.strerror}"
+    return "" if done.returncode == 0 else ([*done.stderr.splitlines(), "no message"])[0]
 
 
-def limit(limits: Limits) -> None:
-    """Limit this process from now on: seconds and memory count in addition to what it has used by now."""
+# ---- inside ------------------------------------------------------------------------------------------------
+
+_SET_DEATH_SIGNAL, _SET_SECCOMP, _NO_NEW_PRIVILEGES = 1, 22, 38
+"""Of prctl(2)."""
+
+_DENIED = (
+    *("fork", "vfork", "execve", "execveat", "socket", "socketpair", "ptrace", "unshare", "setns", "mount"),
+    *("umount2", "pivot_root", "keyctl", "add_key", "request_key", "bpf", "perf_event_open", "userfaultfd"),
+    *("io_uring_setup", "memfd_create", "shmget", "msgget", "mq_open"),
+)
+"""System calls that a lab never needs: processes, programs, sockets, memory outside of the address
+space, and parts of the kernel with a history of defects."""
+
+_SYSTEMS = {
+    "x86_64": (
+        0xC000003E, 56,
+        (57, 58, 59, 322, 41, 53, 101, 272, 308, 165, 166, 155, 250, 248, 249, 321, 298, 323, 425, 319, 29,
+         68, 240),
+    ),
+    "aarch64": (
+        0xC00000B7, 220,
+        (221, 281, 198, 199, 117, 97, 268, 40, 39, 41, 219, 217, 218, 280, 241, 282, 425, 279, 194, 186, 180),
+    ),
+}  # fmt: skip
+"""By machine: its number for seccomp(2), that of clone, those of _DENIED (aarch64 has no fork and vfork)."""
+
+_CLONE3, _CLONE_THREAD, _X32 = 435, 0x10000, 0x40000000
+"""clone3, which is everywhere the same; the flag of a new thread; numbers of x86_64's other interface."""
+
+_LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
+"""Operations of a filter: load a word of the call, jump by comparing it, return."""
+
+_ALLOW, _NOT_PERMITTED, _NO_SUCH_CALL = 0x7FFF0000, 0x50001, 0x50026
+"""What a filter returns: continue, EPERM, ENOSYS, on which the C library takes clone in place of clone3."""
+
+
+def _filter(architecture: int, clone: int, denied: tuple[int, ...]) -> bytes:
+    """Return a filter of seccomp(2): instructions of (operation, jump if true, jump if false, operand)."""
+    rows = [(_LOAD, 0, 0, 4), (_EQUAL, 1, 0, architecture), (_RETURN, 0, 0, _NOT_PERMITTED), (_LOAD, 0, 0, 0)]
+    for number in denied:
+        rows += [(_EQUAL, 0, 1, number), (_RETURN, 0, 0, _NOT_PERMITTED)]
+    rows += [(_AT_LEAST, 0, 1, _X32), (_RETURN, 0, 0, _NOT_PERMITTED)]
+    rows += [(_EQUAL, 0, 1, _CLONE3), (_RETURN, 0, 0, _NO_SUCH_CALL)]
+    rows += [(_EQUAL, 0, 3, clone), (_LOAD, 0, 0, 16), (_ANY_BIT, 1, 0, _CLONE_THREAD)]
+    rows += [(_RETURN, 0, 0, _NOT_PERMITTED), (_RETURN, 0, 0, _ALLOW)]
+    return b"".join(struct.pack("HBBI", *row) for row in rows)
+
+
+def die_with_parent() -> None:
+    """Let the kernel kill this process when the thread that started it ends."""
+    ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+
+
+def confine(limits: Limits) -> None:
+    """Limit this process from now on; seconds count in addition to what it has used by now."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     seconds = int(used.ru_utime + used.ru_stime) + 1 + limits.seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    memory = pages * resource.getpagesize() + limits.memory_mb * MEGABYTE
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    size = limits.file_mb * MEGABYTE
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-class Confinement:
-    """A hook for `sys.addaudithook` that refuses what is outside of a folder, and tells `note` about it."""
-
-    def __init__(self, folder: Path, limits: Limits, note: Callable[[str], None]) -> None:
-        self.own, self.limits, self.note, self.opened = os.path.realpath(folder), limits, note, 0
-
-    def __call__(self, event: str, given: tuple[Any, ...]) -> None:
-        if event == "open":
-            path, _, flags = given
-            if isinstance(flags, int) and flags & WRITING and path is not None:
-                self._write(path)
-        elif event in PATHS:
-            verb, count = PATHS[event]
-            for path in given[:count]:
-                if not self._inside(path):
-                    self._refuse(f"{verb} {os.fsdecode(path)}")
-        elif event in NEVER:
-            self._refuse(NEVER[event])
-
-    def _inside(self, path: Any) -> bool:
-        if isinstance(path, int):
-            return True
-        where = os.path.realpath(os.fsdecode(path))
-        return where == self.own or where.startswith(self.own + os.sep) or where == os.devnull
-
-    def _write(self, path: Any) -> None:
-        self.opened += not isinstance(path, int)
-        if not self._inside(path):
-            self._refuse(f"writes {os.fsdecode(path)}")
-        if self.opened > self.limits.files:
-            self._refuse(f"writes more than {self.limits.files} files")
-
-    def _refuse(self, told: str) -> None:
-        self.note(told)
-        raise Forbidden(f"it {told}")
-
-
-def confine(folder: Path, limits: Limits, note: Callable[[str], None]) -> None:
-    """Refuse from now on what is outside of a folder, and tell `note` about it."""
-    sys.addaudithook(Confinement(folder, limits, note))
+    memory, size = (BASE_MB + limits.memory_mb) * MEGABYTE, limits.file_mb * MEGABYTE
+    for kind, value, most in (
+        (resource.RLIMIT_CPU, seconds, seconds + 1),
+        (resource.RLIMIT_AS, memory, memory),
+        (resource.RLIMIT_FSIZE, size, size),
+        (resource.RLIMIT_NOFILE, limits.files, limits.files),
+        (resource.RLIMIT_CORE, 0, 0),
+    ):
+        resource.setrlimit(kind, (value, most))
+    if platform.machine() in _SYSTEMS:
+        code = _filter(*_SYSTEMS[platform.machine()])
+        buffer = ctypes.create_string_buffer(code, len(code))
+        program = struct.pack("HxxxxxxQ", len(code) // 8, ctypes.addressof(buffer))
+        libc = ctypes.CDLL(None, use_errno=True)
+        libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+        if libc.prctl(_SET_SECCOMP, 2, program, 0, 0):
+            raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))

@@ -1,11 +1,11 @@
 """The teacher's tables of a class: two of CSV, one page of HTML.
 
 1. grades.csv has a line a student and a column a lab: checks passed of all, empty where there is no file
-   [`grades`]. findings.csv has a line for each check that is not passed, and for each note [`findings`].
+   [`grades`]. findings.csv has a line for each check that is not passed [`findings`].
 2. index.html has both, with the findings below the table; it loads nothing and runs no script [`page`].
 
-Names and messages come from students: a cell of CSV that a spreadsheet would take for a formula gets a quote
-before it, and HTML is escaped.
+Names and messages come from students. They have no control characters [frame.py, grading.py]; a cell of CSV
+that a spreadsheet would take for a formula gets a quote before it, and HTML is escaped.
 """
 
 from __future__ import annotations
@@ -63,7 +63,6 @@ def findings(students: Sequence[Student]) -> str:
                 if wrong is not None:
                     told = (wrong.clause, wrong.what, wrong.expected, wrong.found, wrong.likely)
                     rows.append([student.name, result.lab.name, name, *told])
-            rows += [[student.name, result.lab.name, "note", "", note, "", "", ""] for note in result.notes]
     return _csv(rows)
 
 
@@ -101,6 +100,5 @@ def _details(student: Student, number: int) -> str:
         for name, wrong in result.checks:
             if wrong is not None:
                 parts.append(f"<dt>{html.escape(name)}</dt><dd>{html.escape(str(wrong))}</dd>\n")
-        parts += [f"<dt>note</dt><dd>{html.escape(note)}</dd>\n" for note in result.notes]
         parts.append("</dl>\n")
     return "".join(parts)

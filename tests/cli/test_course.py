@@ -69,7 +69,7 @@ def test_a_class_is_graded(wamnet, tmp_path):
     for name, text in (("ada", (SOLUTIONS / "lab08_adam.py").read_text()), ("bob", "import sys; sys.exit()")):
         (tmp_path / "class" / name).mkdir(parents=True)
         (tmp_path / "class" / name / "lab08_adam.py").write_text(text)
-    outcome = wamnet("course", "grade", "class", "-o", "out", "--workers", "1", "--seconds", "20")
+    outcome = wamnet("course", "grade", "class", "-o", "out", "--workers", "1", "--trusted")
     assert outcome.status == 0
     assert "wrote index.html, grades.csv and findings.csv to out" in outcome.out
     lines = (tmp_path / "out/grades.csv").read_text().splitlines()
@@ -117,3 +117,15 @@ def test_the_folder_works_with_pytest_and_make(started):
     make = ["make", "--no-print-directory", "lab8", f"WAMNET={sys.executable} -m wamnet.cli"]
     done = subprocess.run(make, cwd=started, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "lab08_adam: 6 of 6 checks, passed\n")
+
+
+def test_without_a_sandbox_the_command_asks_for_trust(refused, wamnet, tmp_path, monkeypatch):
+    (tmp_path / "class/ada").mkdir(parents=True)
+    (tmp_path / "class/ada" / "lab01_sphere.py").write_text((SOLUTIONS / "lab01_sphere.py").read_text())
+    monkeypatch.setenv("PATH", "")
+    message = refused("course", "grade", "class", "-o", "out", "--lab", "1")
+    assert message.count("\n") == 1
+    assert "sandbox is bwrap: No such file or directory" in message
+    assert "install bubblewrap, or add --trusted" in message
+    assert wamnet("course", "grade", "class", "-o", "out", "--lab", "1", "--trusted").status == 0
+    assert (tmp_path / "out/grades.csv").read_text().splitlines()[1] == "ada,11/11,1"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import course as measured
 import pytest
 
-from wamnet.cli.course.frame import Wrong, outcome
+from wamnet.cli.course.frame import Wrong
 from wamnet.cli.course.labs import LABS, lab_named
-from wamnet.cli.course.worker import load
 from wamnet.refimpl.errors import InputError
 
 SOLUTIONS = Path(__file__).parent / "solutions"
@@ -23,37 +23,34 @@ ROOT = Path(__file__).resolve().parents[2]
 EVERY = [pytest.param(lab, id=lab.name) for lab in LABS]
 
 
-def first_wrong(lab, folder):
+def first_wrong(lab, folder, here):
     """Return the first finding about a lab's file in a folder, or None."""
-    module = load(lab, folder)
-    if isinstance(module, Wrong):
-        return module
-    return next(filter(None, (outcome(check, module) for check in lab.checks)), None)
+    return measured.finding(lab, (folder / lab.file).read_text(), here)
 
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """Work in an empty folder: a grader writes beside itself."""
+    """Work in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.mark.parametrize("lab", EVERY)
 def test_a_right_answer_passes(lab, here):
-    assert first_wrong(lab, SOLUTIONS) is None
+    assert first_wrong(lab, SOLUTIONS, here) is None
 
 
 @pytest.mark.parametrize("path", sorted(STYLES.glob("*.py")), ids=lambda path: path.stem)
 def test_another_style_passes(path, here):
     lab = lab_named(path.stem.rpartition("_")[0])
     shutil.copy(path, here / lab.file)
-    assert first_wrong(lab, here) is None
+    assert first_wrong(lab, here, here) is None
 
 
 @pytest.mark.parametrize("lab", EVERY)
 def test_a_skeleton_is_still_to_be_written(lab, here):
     (here / lab.file).write_text(lab.skeleton)
-    wrong = first_wrong(lab, here)
+    wrong = first_wrong(lab, here, here)
     assert "NotImplementedError" in wrong.found
     assert wrong.likely == "it is still to be written"
 
@@ -119,7 +116,7 @@ def test_an_unknown_lab_is_refused():
 )
 def test_what_python_says_is_explained(code, found, likely, here):
     (here / "lab01_sphere.py").write_text(code)
-    wrong = first_wrong(lab_named("1"), here)
+    wrong = first_wrong(lab_named("1"), here, here)
     pattern = found.partition("|")[0].split(": .*")[0]
     assert pattern in f"{wrong.what} {wrong.found}"
     assert likely in wrong.likely

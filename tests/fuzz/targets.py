@@ -11,7 +11,7 @@ import io
 import json
 import shutil
 from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,10 +21,12 @@ import numpy as np
 
 from wamnet.cli.commands import demo
 from wamnet.cli.common import inputs as cli_inputs
+from wamnet.cli.course import frame, wire
 from wamnet.cli.files import dataset_files, exr, images
 from wamnet.cli.main import main
 from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core.ir import Node, Program, Type
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
@@ -38,6 +40,17 @@ from wamnet.refimpl.network import denoise, siren, train
 from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.reading import parse_json
 from wamnet.spec.conformance import case, report
+
+STUDENTS = [
+    json.dumps(message).encode()
+    for message in (
+        ["value", wire.plain((np.arange(6.0).reshape(2, 3), [np.float32(1), 2, "x"], {"a": None}, len))],
+        ["value", wire.plain(Program((Node("constant", (), Type(), (("value", 1.0),)),), (("color", 0),)))],
+        ["raised", [["KeyError", "LookupError"], "a message", 3]],
+        ["call", wire.plain([0, np.ones(3, np.uint32)])],
+    )
+]
+"""Messages of a student's process."""
 
 VECTORS = Path(case.__file__).parents[1] / "vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""
@@ -171,6 +184,7 @@ def readers(good: Good) -> list[Target]:
         Target("vectors", "json", vectors or [b"{}"], _vectors),
         Target("track", "json", [good.read("track.json")], _track),
         Target("answer", "json", [b'{"id": "a", "output": {"x": ["0x1p+0", 2, "nan"]}}'], _answer),
+        Target("student", "json", STUDENTS, lambda message, _: _student(message)),
         Target("recipe", "json", texts[:1], lambda text, _: train.recipe_from_json(text.decode())),
         Target("ranges", "json", texts[1:], lambda text, _: variation.ranges_from_json(text.decode())),
         Target(
@@ -179,6 +193,14 @@ def readers(good: Good) -> list[Target]:
         Target("frame", "bytes", [frame], partial(_frame, good)),
         Target("picture", "bytes", [picture], _picture),
     ]
+
+
+def _student(message: bytes) -> None:
+    """Use what a student's process sends as graders do; what a check finds wrong is right."""
+    kind, value = wire.read(message)
+    for part in (value, kind):
+        with suppress(frame.Wrong):
+            frame.expect("", "a result", part, np.arange(6.0).reshape(2, 3), 1e-9)
 
 
 def _file(content: bytes, folder: Path, name: str) -> Path:

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from wamnet.cli.course.sandbox import unavailable
+
 PACKAGES = {
     "torch": "PyTorch",
     "pyoidn": "Open Image Denoise",
@@ -20,6 +22,9 @@ PACKAGES = {
     "onnxruntime": "ONNX Runtime",
 }
 """Their names for Python and for people."""
+
+SANDBOX = "bubblewrap"
+"""The sandbox of students' code, a program that is required like a package."""
 
 EXTRAS = {"onnx": "targets", "onnxruntime": "targets"}
 """Which extra brings a package, where it is not `baselines`."""
@@ -47,6 +52,16 @@ def needed(name: str) -> Any:
         pytest.skip(f"package {name} is {FOUND[name]}", allow_module_level=True)
     FOUND[name] = f"ok (version {version(name)})"
     return module
+
+
+def needed_sandbox() -> None:
+    """Skip the test where students' code has no sandbox; fail where it is required."""
+    if reason := unavailable():
+        FOUND[SANDBOX] = f"MISSING: {reason}; apt-get install bubblewrap"
+        if SANDBOX in required():
+            pytest.fail(f"{SANDBOX} is required and {FOUND[SANDBOX]}", pytrace=False)
+        pytest.skip(f"{SANDBOX} is {FOUND[SANDBOX]}")
+    FOUND[SANDBOX] = "ok"
 
 
 class Late:

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..frame import Check, Wrong, hold, spread
 from ..kernel_text import Lane, TextError, parsed
+from ..wire import Node, Program
 
 COUNT, MORE = 12, 4
 """Numbers of an input, and work items beyond them."""
-
-
-class Node(NamedTuple):
-    """A node as lab 9 has it."""
-
-    op: str
-    args: tuple[int, ...] = ()
-    value: Any = None
-
-
-class Program(NamedTuple):
-    """A program as lab 9 has it."""
-
-    nodes: tuple[Node, ...]
-    output: int
 
 
 MEANING: dict[str, Callable[..., Any]] = {

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ....compiler.core.interpret import interpret
 from ....compiler.core.ir import Gather, Image, Type
-from ....compiler.core.trace import trace
+from ....compiler.core.verify import verify
 from ....compiler.proof.whole import RULES, Rounds, known
 from ....refimpl.errors import CompileError
 from ....refimpl.network import siren
@@ -15,6 +16,7 @@ from ....refimpl.network.dataset import Window
 from ....refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
 from ....spec.conformance.kinds.whole import network_from
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors
+from ..wire import Expression
 
 PHASES = 64
 """Random phases that are looked at."""
@@ -214,6 +216,14 @@ def network_vectors(student: Any) -> None:
     vectors("whole.forward", answer, likely="sine(phase(numbers @ weights.T, factor, bias), amplitude)")
 
 
+TRACE = Expression(
+    "lambda rows, amplitude, types, gather: import_module('wamnet.compiler.core.trace').trace("
+    "lambda window: import_module('functools').reduce("
+    "lambda numbers, row: student.layer(*row, amplitude, numbers), rows, window), types, gather)"
+)
+"""Traces a network of the student's layers, as `forward` calls them."""
+
+
 def nothing_rounds(student: Any) -> None:
     """The compiler's own proof, of a network of the student's layers."""
     network = rounded(siren.init([12, 8, 8, 3], 30.0, 30.0, seed=1), 2)
@@ -221,7 +231,9 @@ def nothing_rounds(student: Any) -> None:
     types = {"window": Type(shape=(gather.n_inputs,))}
     what, wanted = "the compiler's proof", "that nothing rounds"
     try:
-        known(trace(lambda window: forward(student, network, window)[-1], types, gather))
+        rows = list(zip(network.weights[:-1], network.factors, network.biases, strict=False))
+        program = verify(student.request(TRACE, rows, network.amplitude, types, gather), "of the layers")
+        known(program)
     except Rounds as reason:
         # Without a rule is what the proof cannot follow; with one, what may round.
         op = str(reason).partition(" ")[0]
@@ -232,6 +244,10 @@ def nothing_rounds(student: Any) -> None:
     except CompileError as reason:
         text = "an operation that cannot be traced: use only the operations that the task names"
         raise Wrong("WHO-3", what, wanted, str(reason).partition(";")[0], text) from None
+    numbers = whole(117, (20, gather.n_inputs), -127, 127).astype(np.float32)
+    found = interpret(program, {"window": numbers}, np.float32)["color"]
+    text = "a layer asks what its arguments are"
+    expect("WHO-3", "the traced layers", found, forward(student, network, numbers)[-1], 0.0, (), text)
 
 
 CHECKS = (

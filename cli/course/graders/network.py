@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..frame import Check, Likely, alike, expect, hold, spread, vectors
+from ..frame import Check, Likely, alike, expect, hold, spread, still, vectors
 
 OMEGAS = (3.0, 2.5)
 """omega of the first sines and of the others."""
@@ -128,10 +128,7 @@ def slopes(student: Any) -> None:
     """Loss and derivatives, last layer first."""
     w, b = network()
     x, target = spread(51, (COUNT, SIZES[0]), -1.0, 1.0), spread(52, (COUNT, SIZES[-1]), 0.0, 1.0)
-    kept = [v.copy() for v in (*w, *b, x, target)]
-    found = student.gradients(w, b, OMEGAS, x, target)
-    same = all(np.array_equal(v, k) for v, k in zip((*w, *b, x, target), kept, strict=True))
-    hold("SIR-7", "the arguments of gradients", same, "no change", "a change", "`-=` or `*=` on an argument")
+    found = student.gradients(list(still(*w)), list(still(*b)), OMEGAS, *still(x, target))
     good = isinstance(found, (tuple, list)) and len(found) == 3
     hold("SIR-7", "the result of gradients", good, "(loss, [dW], [db])", str(type(found)))
     loss, dw, db = found

@@ -6,13 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from ....compiler.core.interpret import interpret
 from ....compiler.core.ir import Type
 from ....compiler.core.sine import POLYNOMIALS
-from ....compiler.core.trace import trace
+from ....compiler.core.verify import verify
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, vectors
+from ..wire import Expression
 
 KNOWN = {"input", "constant", "add", "subtract", "multiply", "floor", "minimum", "maximum", "negative"}
 """The operations that a sine may be made of."""
+
+TRACE = Expression("lambda types: import_module('wamnet.compiler.core.trace').trace(student.sine, types)")
+"""Traces the student's function."""
 
 
 def near_zero(student: Any) -> None:
@@ -39,12 +44,16 @@ def near_zero(student: Any) -> None:
 
 
 def simple(student: Any) -> None:
-    """Traced, it has only simple operations."""
-    program = trace(student.sine, {"x": Type()})
+    """Traced, it has only simple operations, and is the same function."""
+    program = verify(student.request(TRACE, {"x": Type()}), "of sine")
     others = sorted({node.op for node in program.nodes} - KNOWN)
     if others:
         text = "a kernel has no sine of its own here: +, -, *, np.floor, np.minimum, np.maximum"
         raise Wrong("SIN-1", "operations", "only simple ones", ", ".join(others), text)
+    x = np.linspace(-20.0, 20.0, 1001, dtype=np.float32)
+    found = interpret(program, {"x": x}, np.float32)["color"]
+    text = "the function asks what its argument is"
+    expect("SIN-1", "sines of the traced program", found, student.sine(x), 0.0, (), text)
 
 
 def everywhere(student: Any) -> None:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,13 @@ from ....kernels.verify.renderers import Own
 from ....refimpl import encoding, vectors
 from ....refimpl.light import intersection, transport
 from ....refimpl.light.shapes.sphere import sphere_distance
-from ....spec.conformance import vectors as all_vectors
-from ....spec.conformance.case import Case, load
+from ....spec.conformance.case import Case
 from ....spec.conformance.kinds import FUNCTIONS
 from ....spec.conformance.numbers import to_json
 from ....spec.conformance.program import of_reference
 from ....spec.conformance.report import first_blamed
 from ....spec.conformance.run import Verdict, judge
-from ..frame import Check, Wrong, hold
+from ..frame import Check, Wrong, cases_of, hold
 
 SUITE = (
     *("vector", "camera.ray", "sampling.cosine_hemisphere", "intersection.sphere", "intersection.box"),
@@ -89,8 +89,7 @@ def verdict(kind: str, case: Case) -> Verdict:
 
 def asked(kinds: Sequence[str] = SUITE, most: int | None = MOST_CASES) -> list[Verdict]:
     """Return the verdicts of some kinds."""
-    folder = all_vectors.FOLDER
-    return [verdict(kind, case) for kind in kinds for case in load(folder / f"{kind}.json")[1][:most]]
+    return [verdict(kind, case) for kind in kinds for case in cases_of(kind)[:most]]
 
 
 def failures(verdicts: Sequence[Verdict], kind: str) -> int:
@@ -151,10 +150,16 @@ def break_path(student: Any) -> None:
         blamed(asked(), "LTR-2", "weights (...) of what a path meets by chance, and nothing else")
 
 
+@cache
+def right_pictures() -> tuple[Any, dict[str, Any]]:
+    """Return questions about layers, and the reference's pictures by the scene's name."""
+    few = [q for q in questions() if q.shot.layers and q.rule in RULES]
+    return few, {shot.name: Own().pictures(shot, range(PICTURES)) for shot in run.shots_of(few)}
+
+
 def break_picture(student: Any) -> None:
     """The rule `depth` is blamed, and the layer is one over the distance."""
-    few = [q for q in questions() if q.shot.layers and q.rule in RULES]
-    right = {shot.name: Own().pictures(shot, range(PICTURES)) for shot in run.shots_of(few)}
+    few, right = right_pictures()
     found = {name: [student.break_picture(p) for p in pictures] for name, pictures in right.items()}
     first = judgement.first_blamed(judgement.judge(few, found))
     told = "none" if first is None else first.rule

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ....refimpl import rng
 from ..frame import Check, Wrong, hold, kind_of_number, number_text, spread
+from ..wire import Expression, Node, Program
 
 COUNT = 50
 """Lanes in which numbers are compared."""
+
+OPS = (
+    *("add", "subtract", "multiply", "divide", "negative", "absolute", "sqrt", "floor", "sin", "cos"),
+    *("minimum", "maximum", "less", "greater", "select", "bitwise_xor", "right_shift"),
+)
+"""The names of OPS in the skeleton."""
 
 
 def listed(program: Any) -> str:
@@ -25,9 +32,14 @@ def listed(program: Any) -> str:
         return repr(program)
 
 
-def traced(student: Any, function: Callable[..., Any], names: Sequence[str]) -> Any:
-    """Return the student's program, which is checked to be one."""
-    program = student.trace(function, tuple(names))
+def function_of(body: str, names: Sequence[str]) -> Expression:
+    """Return the function with a body of these arguments."""
+    return Expression(f"lambda {', '.join(names)}: {body}")
+
+
+def traced(student: Any, body: str, names: Sequence[str]) -> Any:
+    """Return the student's program of a function, which is checked to be one."""
+    program = student.trace(function_of(body, names), tuple(names))
     nodes: Any = getattr(program, "nodes", None)
     good = isinstance(nodes, (tuple, list)) and all(hasattr(n, "op") and hasattr(n, "args") for n in nodes)
     hold(
@@ -55,7 +67,7 @@ def traced(student: Any, function: Callable[..., Any], names: Sequence[str]) -> 
             repr(node.args),
             "append operands first",
         )
-        known = node.op in student.OPS or node.op in ("input", "const")
+        known = node.op in (*OPS, "input", "const")
         hold(
             "IR-3",
             f"the operation of node {number}",
@@ -69,7 +81,7 @@ def traced(student: Any, function: Callable[..., Any], names: Sequence[str]) -> 
 
 def short(student: Any) -> None:
     """Programs of few nodes, which are known."""
-    found = traced(student, lambda a, b: a + b, "ab")
+    found = traced(student, "a + b", "ab")
     nodes = [(n.op, tuple(n.args), n.value) for n in found.nodes]
     wanted = [("input", (), "a"), ("input", (), "b"), ("add", (0, 1), None)]
     text = "inputs first, in their order; then each operation when NumPy asks for it"
@@ -77,12 +89,12 @@ def short(student: Any) -> None:
         text = "the operands are exchanged"
     hold("IR-1", "the program of a + b", nodes == wanted, "input a, input b, add (0, 1)", listed(found), text)
     hold("IR-1", "the output of a + b", found.output == 2, "2", str(found.output), "the index of the result")
-    found = traced(student, lambda a, b: a, "ab")
+    found = traced(student, "a", "ab")
     text = "the output is the index of what is returned, not the last node"
     hold(
         "IR-1", "the program of a function that returns a", found.output == 0, "output 0", listed(found), text
     )
-    found = traced(student, lambda a: 3.0, "a")
+    found = traced(student, "3.0", "a")
     node = found.nodes[found.output]
     text = "a function may return a number: it is a constant then"
     hold(
@@ -101,45 +113,33 @@ def given() -> dict[str, Any]:
     return {**values, "c": np.abs(values["c"]) + np.float32(0.5)}
 
 
-FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
-    "a, after b * c": (lambda a, b, c: (b * c, a)[1], "the output's value, not the last node's"),
-    "a - b": (lambda a, b, c: a - b, "the order of the operands"),
-    "2.5 - a": (
-        lambda a, b, c: 2.5 - a,
-        "the first operand may be the number: take all operands in their order",
-    ),
-    "a / c": (lambda a, b, c: a / c, "the order of the operands"),
-    "1 / c": (lambda a, b, c: 1 / c, "the first operand may be the number: take all operands in their order"),
-    "-a * b": (lambda a, b, c: -a * b, "negative has one operand"),
-    "abs(a)": (lambda a, b, c: abs(a), "abs is np.absolute"),
-    "np.sqrt(c)": (lambda a, b, c: np.sqrt(c), ""),
-    "np.minimum(a, 0.5)": (
-        lambda a, b, c: np.minimum(a, 0.5),
-        "the operations by name: np.minimum is `minimum`",
-    ),
-    "np.maximum(a, b)": (lambda a, b, c: np.maximum(a, b), "np.maximum is `maximum`"),
-    "np.sin(a) + np.cos(b)": (lambda a, b, c: np.sin(a) + np.cos(b), "sin and cos are exchanged"),
-    "np.floor(a)": (lambda a, b, c: np.floor(a), ""),
-    "np.where(a < b, a, c)": (
-        lambda a, b, c: np.where(a < b, a, c),
-        "np.where(condition, where true, where false)",
-    ),
-    "np.where(a > 0, 1.0, c)": (
-        lambda a, b, c: np.where(a > 0, 1.0, c),
-        "numbers are constants in np.where too",
-    ),
-    "np.add(a, a) * 0.1": (lambda a, b, c: np.add(a, a) * 0.1, "both operands may be the same node"),
-    "a * 0.0 + c * 0.0": (lambda a, b, c: a * 0.0 + c * 0.0, ""),
+FUNCTIONS = {
+    "a, after b * c": ("(b * c, a)[1]", "the output's value, not the last node's"),
+    "a - b": ("a - b", "the order of the operands"),
+    "2.5 - a": ("2.5 - a", "the first operand may be the number: take all operands in their order"),
+    "a / c": ("a / c", "the order of the operands"),
+    "1 / c": ("1 / c", "the first operand may be the number: take all operands in their order"),
+    "-a * b": ("-a * b", "negative has one operand"),
+    "abs(a)": ("abs(a)", "abs is np.absolute"),
+    "np.sqrt(c)": ("np.sqrt(c)", ""),
+    "np.minimum(a, 0.5)": ("np.minimum(a, 0.5)", "the operations by name: np.minimum is `minimum`"),
+    "np.maximum(a, b)": ("np.maximum(a, b)", "np.maximum is `maximum`"),
+    "np.sin(a) + np.cos(b)": ("np.sin(a) + np.cos(b)", "sin and cos are exchanged"),
+    "np.floor(a)": ("np.floor(a)", ""),
+    "np.where(a < b, a, c)": ("np.where(a < b, a, c)", "np.where(condition, where true, where false)"),
+    "np.where(a > 0, 1.0, c)": ("np.where(a > 0, 1.0, c)", "numbers are constants in np.where too"),
+    "np.add(a, a) * 0.1": ("np.add(a, a) * 0.1", "both operands may be the same node"),
+    "a * 0.0 + c * 0.0": ("a * 0.0 + c * 0.0", ""),
 }
-"""Functions of a, b and c, and the likeliest mistake of a wrong number."""
+"""Functions of a, b and c by name, and the likeliest mistake of a wrong number."""
 
 
 def numbers(student: Any) -> None:
     """Each program gives what its function gives, to the bit."""
     inputs = given()
-    for name, (function, likely) in FUNCTIONS.items():
-        program = traced(student, function, "abc")
-        found, wanted = student.evaluate(program, inputs), function(*inputs.values())
+    for name, (body, likely) in FUNCTIONS.items():
+        program = traced(student, body, "abc")
+        found, wanted = student.evaluate(program, inputs), function_of(body, "abc")(*inputs.values())
         if np.shape(found) != np.shape(wanted):
             raise Wrong(
                 "IR-3",
@@ -160,18 +160,18 @@ def numbers(student: Any) -> None:
 def constants(student: Any) -> None:
     """Constants that are equal for Python and are not the same."""
     inputs = {"a": np.array([1.0, -1.0, np.inf], np.float32)}
-    program = traced(student, lambda a: 1.0 / (0.0 / a) + 1.0 / (-0.0 / a), "a")
+    program = traced(student, "1.0 / (0.0 / a) + 1.0 / (-0.0 / a)", "a")
     found = student.evaluate(program, inputs)
     text = "0.0 == -0.0 for Python: compare constants by type and repr"
     hold("IR-3", "1 / (0.0 / a) + 1 / (-0.0 / a) at a = 1", np.isnan(found[0]), "nan", found[0], text)
     words = np.array([5, 7], np.uint32)
-    program = traced(student, lambda v: (v ^ (v >> np.uint32(1))) * np.uint32(3), "v")
+    program = traced(student, "(v ^ (v >> np.uint32(1))) * np.uint32(3)", "v")
     found = student.evaluate(program, {"v": words})
     text = "constants are kept as they are given: np.uint32(3) is not a float"
     kind_of_number("IR-3", "(v ^ (v >> 1)) * 3 of words", found, np.uint32)
     wanted = (words ^ (words >> np.uint32(1))) * np.uint32(3)
     hold("IR-3", "(v ^ (v >> 1)) * 3 of words", np.array_equal(found, wanted), str(wanted), str(found), text)
-    program = traced(student, lambda a: a * 1.0 + a * 1, "a")
+    program = traced(student, "a * 1.0 + a * 1", "a")
     held = sorted(repr(n.value) for n in program.nodes if n.op == "const")
     text = "1 == 1.0 for Python: compare constants by type and repr"
     hold("IR-1", "the constants of a * 1.0 + a * 1", held == ["1", "1.0"], "1 and 1.0", ", ".join(held), text)
@@ -179,37 +179,22 @@ def constants(student: Any) -> None:
 
 def once(student: Any) -> None:
     """The same operation on the same operands is the same node."""
-    for name, function, count, text in (
-        ("a * b + a * b", lambda a, b: a * b + a * b, 4, "look an operation up before you add it"),
-        (
-            "(a + 2.0) * (b + 2.0)",
-            lambda a, b: (a + 2.0) * (b + 2.0),
-            6,
-            "look a constant up before you add it",
-        ),
-        (
-            "a - b + (b - a)",
-            lambda a, b: a - b + (b - a),
-            5,
-            "a - b and b - a are different: operands have an order",
-        ),
-        (
-            "np.sin(a) + np.cos(a)",
-            lambda a, b: np.sin(a) + np.cos(a),
-            5,
-            "the operation belongs to what is compared",
-        ),
+    for body, count, text in (
+        ("a * b + a * b", 4, "look an operation up before you add it"),
+        ("(a + 2.0) * (b + 2.0)", 6, "look a constant up before you add it"),
+        ("a - b + (b - a)", 5, "a - b and b - a are different: operands have an order"),
+        ("np.sin(a) + np.cos(a)", 5, "the operation belongs to what is compared"),
     ):
-        found = traced(student, function, "ab")
+        found = traced(student, body, "ab")
         hold(
             "IR-1",
-            f"nodes of {name}",
+            f"nodes of {body}",
             len(found.nodes) == count,
             str(count),
             f"{len(found.nodes)}: {listed(found)}",
             text,
         )
-    first, second = (traced(student, lambda a: np.sin(a) + 1.0, "a") for _ in range(2))
+    first, second = (traced(student, "np.sin(a) + 1.0", "a") for _ in range(2))
     text = "the list of nodes is one of the program, not one of the module"
     hold(
         "IR-1",
@@ -227,38 +212,31 @@ BRANCH = "`__bool__` has to raise TypeError: else an `if` takes one branch, sile
 
 def refusals(student: Any) -> None:
     """What is not in the table is refused."""
-    cases: Sequence[tuple[str, Callable[..., Any], str]] = (
-        ("np.exp2(a)", np.exp2, "a ufunc that OPS does not have: raise TypeError"),
-        ("np.add.reduce(a)", np.add.reduce, "method is not `__call__`: raise TypeError"),
-        ("np.clip(a, 0, 1)", lambda a: np.clip(a, 0, 1), "any function but np.where: raise TypeError"),
-        ("np.sort(a)", np.sort, "any function but np.where: raise TypeError"),
-        ("1.0 if a > 0 else a", lambda a: 1.0 if a > 0 else a, BRANCH),
-        ("np.add(a, 1, where=False)", lambda a: np.add(a, 1, where=False), "a ufunc with options: TypeError"),
-    )  # fmt: skip
-    for name, function, likely in cases:
+    for body, likely in (
+        ("np.exp2(a)", "a ufunc that OPS does not have: raise TypeError"),
+        ("np.add.reduce(a)", "method is not `__call__`: raise TypeError"),
+        ("np.clip(a, 0, 1)", "any function but np.where: raise TypeError"),
+        ("np.sort(a)", "any function but np.where: raise TypeError"),
+        ("1.0 if a > 0 else a", BRANCH),
+        ("np.add(a, 1, where=False)", "a ufunc with options: TypeError"),
+    ):
         try:
-            found = student.trace(function, ("a",))
+            found = student.trace(function_of(body, "a"), ("a",))
         except TypeError:
             continue
         except NotImplementedError:
             raise
         except (ArithmeticError, LookupError, ValueError, AttributeError, RecursionError) as error:
             raise Wrong(
-                "IR-3", f"tracing {name}", "TypeError", f"{type(error).__name__}: {error}", likely
+                "IR-3", f"tracing {body}", "TypeError", f"{type(error).__name__}: {error}", likely
             ) from None
-        raise Wrong("IR-3", f"tracing {name}", "TypeError", listed(found), likely)
+        raise Wrong("IR-3", f"tracing {body}", "TypeError", listed(found), likely)
 
 
 def dead(student: Any) -> None:
     """Nodes that the output does not need go, and numbers stay."""
-
-    def function(a: Any, b: Any) -> Any:
-        np.sin(b * 3.0)
-        kept = a + 1.0
-        np.cos(kept)
-        return kept * a
-
-    program = traced(student, function, "ab")
+    body = "(np.sin(b * 3.0), kept := a + 1.0, np.cos(kept), kept * a)[-1]"
+    program = traced(student, body, "ab")
     found = student.live(program)
     held = [n.op for n in found.nodes]
     text = "from the output backwards, operands of operands: what is not reached goes"
@@ -293,7 +271,7 @@ def shown(student: Any) -> None:
     """The text of a program."""
     value = np.float32(0.1)
     nodes = ("input", (), "a"), ("const", (), value), ("multiply", (0, 1), None)
-    program = student.Program(tuple(student.Node(*node) for node in nodes), 2)
+    program = Program(tuple(Node(*node) for node in nodes), 2)
     wanted = f"%0 = input a\n%1 = const {value!r}\n%2 = multiply %0 %1\noutput %2\n"
     found = student.text(program)
     hold("IR-1", "the result of text", isinstance(found, str), "a text", type(found).__name__)
@@ -315,7 +293,8 @@ def reference(student: Any) -> None:
     """A function of the reference, unchanged: the four words of PCG4D."""
     words = {n: rng.counter(np.arange(COUNT) * k + 3) for n, k in zip("pqrs", (1, 5, 77, 9001), strict=True)}
     for number in range(4):
-        program = student.live(traced(student, lambda *v, i=number: rng.pcg4d(*v)[i], "pqrs"))
+        body = f"import_module('wamnet.refimpl.rng').pcg4d(p, q, r, s)[{number}]"
+        program = student.live(traced(student, body, "pqrs"))
         found = student.evaluate(program, words)
         wanted = rng.pcg4d(*words.values())[number]
         same = np.array_equal(found, wanted)

@@ -113,7 +113,7 @@ WRONG = [
         "error = values[-1] - target",
         "error = values[-1] - target\n    target += 1",
         "an argument is changed",
-        "`-=`",
+        "an argument is changed",
     ),
 ]
 """Old, new, the mistake in words, and what the explanation must hold."""

@@ -36,7 +36,12 @@ WRONG = [
         "corrected ones are kept",
         "kept as they are",
     ),
-    ("m = 0.9 * m + (1 - 0.9) * g", "m *= 0.9\n    m = m + (1 - 0.9) * g", "m in place", "`\\*=` or `\\+=`"),
+    (
+        "m = 0.9 * m + (1 - 0.9) * g",
+        "m *= 0.9\n    m = m + (1 - 0.9) * g",
+        "m in place",
+        "an argument is changed",
+    ),
     (
         "learning_rate * (1 + np.cos(np.pi * k / steps)) / 2",
         "learning_rate * (1 + np.cos(np.pi * k / steps))",

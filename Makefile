@@ -52,7 +52,7 @@ long: setup ## Test kernels with other cases each time, many and wide (2 hours o
 	@$(ONE_THREAD) PYTEST_OPTIONS="$(PYTEST_OPTIONS)" .ci/long $(TESTS)
 
 fuzz: setup ## Feed changed files and options to every reader and command; MINUTES=10, SEED=n repeats a run, ONLY=name, AT=n one input
-	@$(ONE_THREAD) PYTHONPATH=tests/fuzz $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
+	@$(ONE_THREAD) PYTHONPATH=tests/fuzz:tests/support $(VENV)/bin/python tests/fuzz/fuzz.py --minutes $(MINUTES) \
 		$(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only "$(ONLY)") $(if $(AT),--at $(AT)) \
 		$(if $(STATE),--state $(STATE)) $(if $(INPUTS),--inputs $(INPUTS))
 

@@ -357,7 +357,8 @@ def _choose(wanted: str) -> Any:
     found = _devices()
     if not found:
         raise ExecutorUnavailable(
-            "OpenCL: no platform is installed; pip install 'wamnet[opencl]' brings PoCL, for any processor"
+            "OpenCL: no platform is installed; pip install 'wamnet[opencl]' brings PoCL on x86-64, other "
+            "processors need a package of the system (Debian: pocl-opencl-icd)"
         )
     found.sort(key=lambda device: not device.type & cl.device_type.GPU)
     matching = [device for device in found if wanted.lower() in _describe(device).lower()]

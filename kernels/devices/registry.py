@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -74,6 +75,8 @@ def open_executor(name: str, **options: Any) -> Executor:
     try:
         return EXECUTORS[name](**options)
     except ImportError as error:
-        raise ExecutorUnavailable(
-            f"{name}: package {error.name or error} cannot be imported; pip install 'wamnet[{name}]'"
-        ) from None
+        missing = error.name or error
+        fix = f"pip install 'wamnet[{name}]'"
+        if platform.machine().lower() not in ("x86_64", "amd64"):
+            fix += f"; if this processor has no wheel, build one: pip install {missing} (g++, libx11-dev)"
+        raise ExecutorUnavailable(f"{name}: package {missing} cannot be imported; {fix}") from None

@@ -35,6 +35,7 @@ from typing import Any
 
 import numpy as np
 from lines import lines
+from machines import machines
 from mutations import WAYS
 from talks import talks
 from targets import Good, Target, commands, readers
@@ -139,7 +140,7 @@ def _hang(_number: int, _frame: object) -> None:
 
 def every(good: Good) -> list[Target]:
     """Return all targets."""
-    return [*readers(good), *talks(), *commands(good), *lines(good)]
+    return [*readers(good), *talks(), *commands(good), *lines(good), *machines(good)]
 
 
 def prepare() -> None:

@@ -35,6 +35,8 @@ INPUTS = {
     "wamnet": 5,
     "options,": 5,
     "apart,": 2,
+    "machine": 4,
+    "renderer": 5,
     "model": 30,
     "certificate": 30,
     "kernel": 30,
@@ -42,7 +44,7 @@ INPUTS = {
 }
 """Inputs of a target, by the first word of its name; of others 150."""
 
-NEVER_REFUSED = ("cache", "weights", "request to view", "options, executors")
+NEVER_REFUSED = ("cache", "weights", "request to view", "options, executors", "machine", "renderer")
 """Damaged entries of the cache are ignored; a certificate is refused by an outcome of its own; a request gets
 an answer."""
 

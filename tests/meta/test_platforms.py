@@ -1,0 +1,91 @@
+"""Extras can be installed on each processor and Python that the project names."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import re
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+tomllib = pytest.importorskip("tomllib", reason="Python 3.10 reads no TOML")
+
+PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
+
+WITHOUT = {
+    "pocl-binary-distribution": lambda machine, python: machine != "x86_64",
+    "moderngl": lambda machine, python: machine != "x86_64",
+    "glcontext": lambda machine, python: machine != "x86_64",
+    "flip-evaluator": lambda machine, python: machine != "x86_64" or python == "3.14",
+}
+"""Packages without wheels for Linux, by processor and Python, as the index had them in November 2026."""
+
+BRINGS = {("pyopencl", "pocl"): {"pocl-binary-distribution"}, ("moderngl", ""): {"glcontext"}}
+"""What these install in turn, with an extra or always."""
+
+
+@pytest.fixture(scope="module")
+def project(house):
+    """Return the table of the project."""
+    return tomllib.loads((house.root / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def installed(project, extra, machine, python):
+    """Return the packages that an extra of the project installs on a processor with a Python."""
+    environment = {
+        "platform_machine": machine,
+        "python_version": python,
+        "sys_platform": "linux",
+        "extra": "",
+    }
+    found, waiting = set(), [f"wamnet[{extra}]"]
+    while waiting:
+        requirement = Requirement(waiting.pop())
+        if requirement.marker is not None and not requirement.marker.evaluate(environment):
+            continue
+        if requirement.name == "wamnet":
+            options = project["project"]["optional-dependencies"]
+            waiting += itertools.chain.from_iterable(options[each] for each in requirement.extras)
+            continue
+        found.add(requirement.name)
+        for each in ("", *requirement.extras):
+            found |= BRINGS.get((requirement.name, each), set())
+    return found
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
+@pytest.mark.parametrize("python", PYTHONS)
+def test_no_extra_needs_a_package_without_files(project, machine, python):
+    """wamnet[opencl], make demo and make setup could not be installed on arm64."""
+    for extra in project["project"]["optional-dependencies"]:
+        lacking = {name for name, lacks in WITHOUT.items() if lacks(machine, python)}
+        assert not installed(project, extra, machine, python) & lacking, extra
+    assert "pyopencl" in installed(project, "opencl", machine, python)
+    if machine == "x86_64":
+        assert "pocl-binary-distribution" in installed(project, "opencl", machine, python)
+        assert "moderngl" in installed(project, "opengl", machine, python)
+
+
+def test_the_classifiers_name_each_python(project):
+    named = [
+        line.rpartition(" ")[2] for line in project["project"]["classifiers"] if ":: Python :: 3." in line
+    ]
+    assert tuple(named) == PYTHONS
+    assert all(python in SpecifierSet(project["project"]["requires-python"]) for python in PYTHONS)
+    assert project["tool"]["ruff"]["target-version"] == f"py{PYTHONS[0].replace('.', '')}"
+
+
+def test_all_sources_are_of_the_oldest_python(house):
+    oldest = tuple(int(part) for part in PYTHONS[0].split("."))
+    for source in house.parts():
+        assert ast.parse((house.root / source.path).read_text(encoding="utf-8"), feature_version=oldest)
+
+
+def test_the_guide_names_what_is_left_out(house, project):
+    page = (house.root / "docs/guide/install.md").read_text(encoding="utf-8")
+    marked = re.findall(r'"([\w-]+)[^";]*; platform_machine', (house.root / "pyproject.toml").read_text())
+    assert len(marked) == 3
+    for name in marked:
+        assert name.removesuffix("-binary-distribution").lower() in page.lower()

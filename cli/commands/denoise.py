@@ -10,7 +10,7 @@ import typer
 from ...refimpl.errors import ExecutorUnavailable
 from ..common import options
 from ..common.domain import check_domain
-from ..common.inputs import load_model, need_layers
+from ..common.inputs import load_model
 from ..common.options import ExecutorName
 from ..common.terminal import say, table
 from ..files.outputs import check_output
@@ -82,23 +82,24 @@ def denoise(
     from ...kernels import denoise_on, open_executor
     from ...kernels.run.tune import first_time
     from ...refimpl.encoding import from_display
-    from ..files import exr
+    from ..files import exr, images
 
     check_output(output, (".exr",) if keep_layers else (".exr", ".png"), [model, frame])
     network, noisy = load_model(model), exr.read_frame(frame, False, say, view_layer)
-    need_layers(
-        frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
-    )
+    why, way_out = "the model was trained with it", "render or export that layer too"
+    exr.need_layers(frame, noisy, network.features, why, way_out, view_layer)
     _say_what_is_no_number(frame, noisy, network)
     check_domain(frame, noisy, network, anyway)
     with open_executor(executor.value) as runner:
         result = denoise_on(runner, network, noisy, profile, schedule, with_rank(variant or FULL, rank))
         first = first_time(runner, result.kernel, result.seconds_compile)
-    if keep_layers:
-        linear = from_display(result.image, network.normalization.exposure_stops)
-        say(f"{output}: layer {exr.write_beside(output, frame, linear, view_layer)} is the denoised picture")
+    if output.suffix.lower() == ".png":
+        images.write_png(output, result.image)
     else:
-        write_denoised(output, result.image, network, noisy)
+        linear = from_display(result.image, network.normalization.exposure_stops)
+        layer = exr.write_denoised(output, frame, linear, view_layer, keep_layers, denoised="true")
+        if layer:
+            say(f"{output}: layer {layer} is the denoised image")
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {executor.value} ({result.device})")
     say(f"schedule {result.schedule}; {result.reason}")
     if result.variant:

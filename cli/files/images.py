@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -19,7 +19,7 @@ from ...refimpl import encoding
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Floats
 from ...refimpl.reading import check_room, read_file
-from ..common.inputs import check_input, need_layers
+from ..common.inputs import check_input
 from ..common.packages import need
 from . import exr
 from .outputs import replacing
@@ -124,15 +124,15 @@ def read_png(path: Path) -> Floats:
     return encoding.from_8bit(levels)
 
 
-def read_image(path: Path, exposure_stops: float = 0.0) -> Image:
-    """Read a PNG, or the colour of an EXR, in both forms at the given exposure."""
+def read_image(path: Path, exposure_stops: float = 0.0, tell: Callable[[str], None] | None = None) -> Image:
+    """Read a PNG, or the colour of an EXR, in both forms at the given exposure; `tell` is given remarks."""
     suffix = path.suffix.lower()
     if suffix == ".png":
         display = read_png(path)
         return Image(display, encoding.from_display(display, exposure_stops))
     if suffix == ".exr":
-        frame = exr.read_frame(path)
-        need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
+        frame = exr.read_frame(path, tell=tell)
+        exr.need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
         linear = frame["color"]
         return Image(encoding.to_display(linear, exposure_stops), linear)
     if path.is_dir():

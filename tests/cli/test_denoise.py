@@ -222,7 +222,7 @@ def test_the_frame_s_layers_are_kept(wamnet, refused, here, picture) -> None:
     """FRM-7: the same pixels as without, as linear radiance in a layer of their own."""
     outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--keep-layers", "-o", "all.exr")
     assert outcome.status == 0, outcome.err
-    assert "all.exr: layer wamnet is the denoised picture" in outcome.out
+    assert "all.exr: layer wamnet is the denoised image" in outcome.out
     frame = exr.read_frame(here / "all.exr")
     before = exr.read_frame(here / "noisy.exr")
     assert all((frame[name] == values).all() for name, values in before.layers.items())

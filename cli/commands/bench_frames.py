@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import ExecutorUnavailable, InputError
-from ..common.inputs import need_layers, unlike_training
+from ..common.inputs import unlike_training
 from ..common.terminal import say
 from ..files import dataset_files
 from . import dataset
@@ -72,11 +72,15 @@ class Frames:
 
 def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
     """Return a data set's frames of a split; refuse one without any, or whose frames lack a layer."""
+    from ..files import exr
+
     pairs = dataset_files.read_pairs(folder, split, tell=say)
     if not pairs:
         raise InputError("data set", str(folder), f"it has no {split} frames", "make one with --test 1")
     for noisy, _ in pairs:
-        need_layers(folder, noisy, model.features, "the model was trained with it", "make another data set")
+        exr.need_layers(
+            folder, noisy, model.features, "the model was trained with it", "make another data set"
+        )
     manifest = dataset_files.read_manifest(folder)
     chosen = [frame for frame in manifest["frames"] if frame["split"] == split]
     asked = manifest["request"]

@@ -11,7 +11,7 @@ import typer
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.options import ExecutorName
-from ..common.terminal import table
+from ..common.terminal import table, tell
 
 EXAMPLES = """Examples:
 
@@ -104,7 +104,7 @@ def compare_pictures(image: Path, reference: Path, exposure: float, as_json: boo
     from ..files.images import read_image
     from ..reports.scores import as_data, measure
 
-    a, b = read_image(image, exposure), read_image(reference, exposure)
+    a, b = read_image(image, exposure, tell), read_image(reference, exposure, tell)
     if a.display.shape != b.display.shape:
         (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape
         rule = f"{reference} has {columns}x{rows}"

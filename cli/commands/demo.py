@@ -395,9 +395,9 @@ def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[s
 
 def write_pictures(output: Path, results: Results) -> None:
     """Write each test frame's pictures as PNG, and the denoised one as EXR too."""
-    from ...refimpl.encoding import normal_to_display, to_display
-    from ..files import images
-    from .denoise import write_denoised
+    from ...refimpl.encoding import from_display, normal_to_display, to_display
+    from ...refimpl.frame import Frame
+    from ..files import exr, images
 
     stops = results.model.normalization.exposure_stops
     folder = output / report.FOLDER
@@ -405,9 +405,11 @@ def write_pictures(output: Path, results: Results) -> None:
     for index, frame in enumerate(results.unseen):
         for name, picture in (("noisy", frame.noisy), ("reference", frame.reference)):
             images.write_png(folder / f"{index}-{name}.png", to_display(picture["color"], stops))
-        for suffix in (".exr", ".png"):
-            path = folder / f"{index}-denoised{suffix}"
-            write_denoised(path, frame.denoised, results.model, frame.noisy.info)
+        denoised = Frame(
+            {"color": from_display(frame.denoised, stops)}, {**frame.noisy.info, "denoised": "true"}
+        )
+        exr.write_frame(folder / f"{index}-denoised.exr", denoised)
+        images.write_png(folder / f"{index}-denoised.png", frame.denoised)
         images.write_png(folder / f"{index}-normal.png", normal_to_display(frame.noisy["normal"]))
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +21,7 @@ import typer
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..common import options
 from ..common.domain import check_domain
-from ..common.inputs import load_model, model_path, need_layers
+from ..common.inputs import load_model, model_path
 from ..common.options import ExecutorName
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
@@ -103,23 +103,24 @@ class Job:
         model = self.denoiser.full
         noisy = exr.read_frame(path, False, self.notes.add, self.view_layer)
         because, remedy = "the model was trained with it", "render or export that layer too"
-        need_layers(path, noisy, model.features, because, remedy)
+        exr.need_layers(path, noisy, model.features, because, remedy, self.view_layer)
         _note_what_is_no_number(path, noisy, model, self.notes)
         check_domain(path, noisy, model, self.anyway, self.notes.add)
         return noisy, self.denoiser.images(noisy)
 
-    def write(self, output: Path, source: Path, noisy: Frame, encoded: Any, origin: str) -> None:
-        """Write a denoised image (H, W, 3), display-encoded."""
+    def write(self, output: Path, source: Path, encoded: Any, origin: str) -> None:
+        """Write a denoised image (H, W, 3), display-encoded: as it is to PNG, as linear colour to EXR."""
         from ...refimpl.encoding import from_display
-        from ..files import exr
+        from ..files import exr, images
 
-        model = self.denoiser.full
-        if self.keep_layers:
-            linear = from_display(encoded, model.normalization.exposure_stops)
-            layer = exr.write_beside(output, source, linear, self.view_layer)
+        if output.suffix.lower() == ".png":
+            images.write_png(output, encoded, origin)
+            return
+        linear = from_display(encoded, self.denoiser.full.normalization.exposure_stops)
+        facts = {"denoised": "true", **({exr.ORIGIN: origin} if origin else {})}
+        layer = exr.write_denoised(output, source, linear, self.view_layer, self.keep_layers, **facts)
+        if layer:
             self.notes.add(f"{output}: layer {layer} is the denoised image")
-        else:
-            write_denoised(output, encoded, model, {**noisy.info, **({exr.ORIGIN: origin} if origin else {})})
 
 
 def denoise(
@@ -193,7 +194,7 @@ def _denoise_one(job: Job, path: Path, output: Path) -> None:
     job.notes.counts.clear()
     result = denoiser.run(noisy, images)
     first = first_time(denoiser.executor, result.kernel, result.seconds_compile)
-    job.write(output, path, noisy, result.image, "")
+    job.write(output, path, result.image, "")
     job.notes.say()
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {denoiser.executor.name} ({result.device})")
     say(f"schedule {result.schedule}; {result.reason}")
@@ -212,12 +213,11 @@ def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], outpu
     tasks = [(path, out, _origin(path, how)) for path, out in zip(paths, outputs, strict=True)]
     missing = [task for task in tasks if not task[2] or read_origin(task[1]) != task[2]]
 
-    def work(read: tuple[Frame, Images]) -> tuple[Frame, Any]:
-        noisy, images = read
-        return noisy, job.denoiser.image(images)
+    def work(read: tuple[Frame, Images]) -> Any:
+        return job.denoiser.image(read[1])
 
-    def write(task: tuple[Path, Path, str], done: tuple[Frame, Any]) -> None:
-        job.write(task[1], task[0], *done, task[2])
+    def write(task: tuple[Path, Path, str], encoded: Any) -> None:
+        job.write(task[1], task[0], encoded, task[2])
 
     with (
         hint_on_interrupt(lambda: f"{output}: the same command resumes with the remaining frames"),
@@ -283,19 +283,6 @@ def chosen_variant(variant: str | None, rank: int) -> str:
     from ...compiler.variants import with_rank
 
     return with_rank(variant or FULL, rank)
-
-
-def write_denoised(path: Path, encoded: Any, model: Model, info: Mapping[str, str]) -> None:
-    """Write display-encoded colour (H, W, 3): as it is to PNG, as linear radiance to EXR."""
-    from ...refimpl.encoding import from_display
-    from ...refimpl.frame import Frame
-    from ..files import exr, images
-
-    if path.suffix.lower() == ".png":
-        images.write_png(path, encoded, info.get(exr.ORIGIN, ""))
-    else:
-        color = from_display(encoded, model.normalization.exposure_stops)
-        exr.write_frame(path, Frame({"color": color}, {**info, "denoised": "true"}))
 
 
 def executors() -> None:

@@ -14,7 +14,7 @@ import typer
 
 from ...refimpl.errors import InputError
 from ..common import options
-from ..common.inputs import CHECKPOINT_MARK, need_layers
+from ..common.inputs import CHECKPOINT_MARK
 from ..common.options import Preset, TrainerName
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files.alone import alone_at
@@ -360,8 +360,8 @@ def read_pairs(
     for noisy, target in zip(inputs, targets, strict=True):
         pair = exr.read_frame(noisy, tell=say), exr.read_frame(target, tell=say)
         way_out = "render or export it too, or choose other --features"
-        need_layers(noisy, pair[0], features, "the network is to see it", way_out)
-        need_layers(target, pair[1], ("color",), "it is what the network learns", "export it too")
+        exr.need_layers(noisy, pair[0], features, "the network is to see it", way_out)
+        exr.need_layers(target, pair[1], ("color",), "it is what the network learns", "export it too")
         pairs.append(pair)
     return pairs
 

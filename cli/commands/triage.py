@@ -23,7 +23,7 @@ import typer
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
-from ..common.inputs import load_model, model_path, need_layers
+from ..common.inputs import load_model, model_path
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
@@ -112,7 +112,7 @@ def triage(
     profile_named(profile)
     model = model_path(model)
     network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
-    need_layers(
+    exr.need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
     kept = kept_kernel(kernel, network, profile) if kernel else None

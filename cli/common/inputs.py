@@ -11,7 +11,6 @@ from . import options
 from .terminal import tell
 
 if TYPE_CHECKING:
-    from ...refimpl.frame import Frame
     from ...refimpl.light.scene import Scene
     from ...refimpl.network.denoise import Model
 
@@ -117,17 +116,6 @@ def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
         return []
     own = canonical(scene).lights if scene in CANONICAL else ()
     return outside(ranges_from_json(text), info, [light.color for light in own])
-
-
-def need_layers(path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str) -> None:
-    """Refuse the frame in `path` if it lacks a layer that one of the features needs."""
-    from ...refimpl.network.dataset import FEATURES
-
-    # Unknown features are refused where they come from.
-    for layer in (layer for name in features if name in FEATURES for layer in FEATURES[name].layers):
-        if layer not in frame.layers:
-            rule = f"{layer} must be among them, because {because}"
-            raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, way_out)
 
 
 def load_scene(

@@ -1,79 +1,43 @@
 """Frames as multi-layer OpenEXR files.
 
 1. A layer is a group of channels: `R,G,B` is colour, then `albedo.R`, `normal.X`, `depth.Z`, `position.X`,
-   `direction.X` and so on [`CHANNELS`]; float32, losslessly compressed, facts about the frame as text
-   attributes [`write_frame`].
-2. Reading also knows the names that other renderers and denoisers use [`ALIASES`], in upper or lower case and
-   behind a prefix such as a view layer's; half floats are widened, other channels ignored [`read_frame`].
-3. The picture is the data window; where it lies in the display window does not matter to a denoiser.
-4. A depth of 1e9 or more in a file of another program stands for a miss and is read as 0, as ours are.
+   `direction.X` and so on [`exr_layers.CHANNELS`]; float32, losslessly compressed, facts about the frame as
+   text attributes [`write_frame`].
+2. Reading also accepts the names that other renderers and denoisers use [`exr_layers.py`]; half floats are
+   widened, and other channels ignored [`read_frame`].
+3. Colours are converted to linear RGB of Rec. 709, and back in a file that is written for another program
+   [`primaries.py`].
+4. The image is the data window. A depth of 1e9 or more in a file of another program means a miss and is read
+   as 0, as ours are.
 5. What comes from a file is checked before anything else sees it; errors start with the file's name.
-6. A denoised picture can be written beside all channels of the file that it was made of, as a layer of its
-   own, for a compositor [`write_beside`].
+6. A denoised image is written with the attributes of the file that it was made from: by itself, or as a layer
+   among all channels of that file, for a compositor [`write_denoised`].
 """
 
 from __future__ import annotations
 
 import os
 import threading
-from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, redirect_stdout, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from tempfile import TemporaryFile
+from typing import Any
 
 import numpy as np
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import HISTORY, LAYERS, SEEN, SUN, Floats, Frame, validate
-from ...refimpl.network.dataset import FARTHEST_DEPTH
+from ...refimpl.frame import Floats, Frame, validate
+from ...refimpl.network.dataset import FARTHEST_DEPTH, FEATURES
 from ...refimpl.reading import check_room, refusing
-from ..common.inputs import check_input
 from ..common.packages import need
+from . import primaries
+from .exr_header import File, read_headers
+from .exr_layers import CHANNELS, Plane, Selection, select, unused
 from .outputs import replacing, spelled, unwritable
 
-CHANNELS: Mapping[str, tuple[str, ...]] = {
-    "color": ("R", "G", "B"),
-    "albedo": ("albedo.R", "albedo.G", "albedo.B"),
-    "normal": ("normal.X", "normal.Y", "normal.Z"),
-    "depth": ("depth.Z",),
-    "position": ("position.X", "position.Y", "position.Z"),
-    "direction": ("direction.X", "direction.Y", "direction.Z"),
-    "unshadowed": ("unshadowed.R", "unshadowed.G", "unshadowed.B"),
-    "seen_albedo": ("seen_albedo.R", "seen_albedo.G", "seen_albedo.B"),
-    "seen_normal": ("seen_normal.X", "seen_normal.Y", "seen_normal.Z"),
-    "seen_depth": ("seen_depth.Z",),
-    "seen_position": ("seen_position.X", "seen_position.Y", "seen_position.Z"),
-    "seen_emission": ("seen_emission.R", "seen_emission.G", "seen_emission.B"),
-    "history": ("history.R", "history.G", "history.B"),
-    "history_weight": ("history_weight.V",),
-    "sun": ("sun.X", "sun.Y", "sun.Z"),
-}
-"""The channels that hold each layer in the files that are written here."""
-
-ALIASES: Mapping[str, tuple[str, ...]] = {
-    "color": ("", "color", "rgb", "rgba", "beauty", "combined", "noisy image"),
-    "albedo": ("albedo", "denoising albedo", "diffuse_albedo", "diffusealbedo"),
-    "normal": ("normal", "normals", "n", "denoising normal", "sh_normal"),
-    "depth": ("depth", "z", "denoising depth", ""),
-    "position": ("position", "p"),
-    "direction": ("direction", "raydirection"),
-    "unshadowed": ("unshadowed",),
-    **{name: (name,) for name in (*SEEN, *HISTORY, SUN)},
-}
-"""Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
-
-COMPONENTS: Mapping[int, tuple[tuple[str, ...], ...]] = {
-    3: (("r", "g", "b"), ("x", "y", "z")),
-    1: (("z",), ("v",), ("y",), ("t",), ("depth",)),
-}
-"""Last parts of the channels' names of a layer of 3 or 1 channels, lower case, best first."""
-
-DENOISED = "wamnet"
-"""Layer of a denoised picture among another program's channels."""
-
-BOUND = ("channels", "chunkCount", "compression", "name", "tiles", "type", "version")
+BOUND = ("channels", "chunkCount", "compression", "lineOrder", "name", "tiles", "type", "version")
 """Attributes that say how a file was written; another one has its own."""
 
 INFO_PREFIX = "wamnet."
@@ -85,61 +49,93 @@ ORIGIN = "origin"
 EXR_BYTES = 12
 """Memory that a pixel of a channel takes until it is in a frame: as read, as float32, in its layer."""
 
+COLORS = ("color", "albedo", "unshadowed", "seen_albedo", "seen_emission", "history")
+"""Layers whose channels are mixtures of the file's primaries."""
 
-class Plane(NamedTuple):
-    """One channel: its name in the file, and its pixels (H, W)."""
-
-    name: str
-    pixels: Any
-
-
-Group = Mapping[str, Plane]
-"""Channels of one layer by the lower-case last part of their names."""
+SQUARE = 1.0
+"""Aspect ratio of the pixels that a denoiser assumes, and a PNG has."""
 
 
-def write_frame(path: Path, frame: Frame) -> None:
-    """Write a valid frame as float32, losslessly compressed, all of it or nothing."""
+def write_frame(path: Path, frame: Frame, compress: bool = True) -> None:
+    """Write a valid frame as float32, losslessly compressed or not at all, all of it or nothing."""
     validate(frame)
-    openexr = need("OpenEXR", "to write EXR files", "files")
     channels = {
         name: np.ascontiguousarray(values[:, :, index], np.float32)
         for layer, values in frame.layers.items()
         for index, name in enumerate(CHANNELS[layer])
     }
-    _write(path, openexr, channels, {INFO_PREFIX + name: text for name, text in frame.info.items()})
+    _write(
+        path,
+        [("", {INFO_PREFIX + name: text for name, text in frame.info.items()}, channels)],
+        None,
+        compress,
+    )
 
 
-def write_beside(path: Path, source: Path, color: Floats, view_layer: str = "") -> str:
-    """Write all channels of `source` as they are, and linear colour (H, W, 3) as a layer [`DENOISED`] more.
+def write_denoised(
+    path: Path, source: Path, color: Floats, view_layer: str = "", keep: bool = False, **info: str
+) -> str:
+    """Write linear colour (H, W, 3) of Rec. 709 in the primaries and with the attributes of its source.
 
-    It is beside the colour of its view layer, in place of an earlier one. Returns the layer's name.
+    `keep`: all parts and channels of the source too, as they are; the colour is a layer more beside theirs,
+    in place of an earlier one. `info` is added to the facts about the frame. Returns the layer's name.
     """
-    channels, header = _read_channels(source, whole=True)
-    planes = _layer(source, "color", _group(_of_view_layer(source, channels, view_layer)))
-    if planes is None:
-        names = ", ".join(sorted(channels))
-        raise InputError(f"{source}: list of channels", names, "no colour is among them", "export it too")
-    beside = planes[0].name.rpartition(".")[0].rpartition(".")[0]
-    layer = f"{beside}.{DENOISED}" if beside else DENOISED
-    kept = {name: channel.pixels for name, channel in channels.items()}
-    own = zip("RGB", np.moveaxis(np.asarray(color, np.float32), -1, 0), strict=True)
-    kept |= {f"{layer}.{name}": np.ascontiguousarray(plane) for name, plane in own}
-    facts = {name: value for name, value in header.items() if name not in BOUND}
-    _write(path, need("OpenEXR", "to write EXR files", "files"), kept, facts)
+    file = read_headers(source)
+    selection = select(source, file.parts, view_layer)
+    if "color" not in selection.layers:
+        raise _missing(source, file, selection, "no colour is among them", "export it too")
+    deep = [part.text("name") for part in file.parts if part.deep]
+    if keep and deep:
+        rule = "parts with several samples per pixel cannot be kept"
+        raise InputError(f"{source}: deep parts", ", ".join(deep), rule, "leave out --keep-layers, or them")
+    index = selection.layers["color"][0].part
+    matrix, _ = _matrix(source, file, index)
+    own = np.asarray(color, np.float32)
+    own = own if matrix is None else primaries.converted(own, np.linalg.inv(matrix))
+    layer = selection.denoised_layer() if keep else ""
+    planes = zip("RGB", np.moveaxis(own, -1, 0), strict=True)
+    image = {f"{layer}.{name}" if layer else name: np.ascontiguousarray(plane) for name, plane in planes}
+    parts = []
+    for number, (name, header, channels) in enumerate(_load(file, keep)):
+        facts = {key: value for key, value in header.items() if key not in BOUND}
+        if number == index:
+            facts |= {INFO_PREFIX + key: text for key, text in info.items()}
+            channels = {**channels, **image} if keep else image
+        if not keep and facts.pop("multiView", None):
+            facts["view"] = selection.view
+        if keep or number == index:
+            parts.append((name, facts, channels))
+    # The last bits of computed colour are noise: compressing it takes as long as the network, and saves 6 %.
+    _write(path, parts, file, compress=keep)
     return layer
 
 
-def _write(path: Path, openexr: Any, channels: Mapping[str, Any], header: Mapping[str, Any]) -> None:
-    """Write channels (H, W), losslessly compressed, all of them or nothing."""
-    form = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
+def _write(
+    path: Path,
+    parts: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]],
+    source: File | None = None,
+    compress: bool = True,
+) -> None:
+    """Write the name, attributes and channels (H, W) of each part, or nothing.
+
+    Text that came from a source gets its bytes.
+    """
+    openexr = need("OpenEXR", "to write EXR files", "files")
+    compression = openexr.ZIP_COMPRESSION if compress else openexr.NO_COMPRESSION
+    form = {"compression": compression, "type": openexr.scanlineimage}
     with replacing(path) as new, spelled(new) as name:
         try:
-            with _quiet:
-                openexr.File({**header, **form}, dict(channels)).write(name)
+            with _quiet():
+                all_parts = [
+                    openexr.Part({**header, **form}, dict(planes), part) for part, header, planes in parts
+                ]
+                openexr.File(all_parts).write(name)
         except (RuntimeError, ValueError, TypeError) as error:
             # The package tells a full disk in this way, with the temporary file's name.
             reason = " ".join(str(error).replace(str(new), str(path)).split())
             raise unwritable(path, RuntimeError(reason)) from None
+        if source is not None:
+            source.restore(new)
 
 
 def read_frame(
@@ -147,27 +143,29 @@ def read_frame(
 ) -> Frame:
     """Read the known layers of an EXR file as a float32 frame that is valid, `finite` or not.
 
-    `tell` is given a sentence on layers that stand under other names than ours, and on depths of misses. Of a
-    file with several view layers the one that is named is read.
+    `tell` is given a sentence on what was chosen, converted or left out. Of a file with several views, parts
+    or view layers the one that is named is read.
     """
-    channels, header = _read_channels(path)
-    groups = _group(_of_view_layer(path, channels, view_layer))
-    found = {name: planes for name in LAYERS if (planes := _layer(path, name, groups)) is not None}
-    layers = {name: _stack(path, name, planes) for name, planes in found.items()}
-    told = _taken(found)
-    ours = any(key.startswith(INFO_PREFIX) for key in header)
-    if "depth" in layers and not ours and (missed := _without_misses(layers)):
-        told.append(f"{missed} depths of {FARTHEST_DEPTH:g} or more are read as 0: nothing is hit there")
-    if tell is not None and told:
-        tell(f"{path}: {'; '.join(told)}")
-    if not layers:
-        names = ", ".join(sorted(channels))
-        rule = "no known layer is among them"
-        raise InputError(
-            f"{path}: list of channels", names, rule, "name colour R,G,B and normals normal.X,..."
-        )
-    with refusing(f"{path}: attributes", "damaged", "they must be texts in UTF-8", "export it again"):
-        info = {k.removeprefix(INFO_PREFIX): str(v) for k, v in header.items() if k.startswith(INFO_PREFIX)}
+    file = read_headers(path)
+    selection = select(path, file.parts, view_layer)
+    if not selection.layers:
+        way_out = "name colour R,G,B and normals normal.X,..."
+        raise _missing(path, file, selection, "no known layer is among them", way_out)
+    notes = [*selection.notes, *_attribute_notes(path, file, selection)]
+    _check_planes(path, file, selection)
+    pixels = [channels for _, _, channels in _load(file)]
+    layers = {name: _stack(path, name, planes, pixels) for name, planes in selection.layers.items()}
+    for name in COLORS:
+        if name in layers and (matrix := _matrix(path, file, selection.layers[name][0].part)[0]) is not None:
+            layers[name] = primaries.converted(layers[name], matrix)
+    attributes = file.parts[0].attributes
+    info = {
+        k.removeprefix(INFO_PREFIX): file.parts[0].text(k) for k in attributes if k.startswith(INFO_PREFIX)
+    }
+    if "depth" in layers and not info and (missed := _without_misses(layers)):
+        notes.append(f"{missed} depths of {FARTHEST_DEPTH:g} or more are read as 0: nothing is hit there")
+    if tell is not None and notes:
+        tell(f"{path}: {'; '.join(notes)}")
     frame = Frame(layers, info)
     try:
         validate(frame, finite)
@@ -178,128 +176,127 @@ def read_frame(
 
 def read_origin(path: Path) -> str | None:
     """Return the text that names the origin of a frame, or None."""
-    check_input(path)
-    openexr = need("OpenEXR", "to read EXR files", "files")
-    with suppress(RuntimeError, ValueError, TypeError), _quiet:
-        for part in openexr.File(str(path), header_only=True).parts:
-            return str(part.header.get(INFO_PREFIX + ORIGIN, ""))
+    with suppress(InputError):
+        return max(part.text(INFO_PREFIX + ORIGIN) for part in read_headers(path).parts)
     return None
 
 
-def _read_channels(path: Path, whole: bool = False) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return all channels of all parts by name, and the first part's header.
+def need_layers(
+    path: Path, frame: Frame, features: Sequence[str], because: str, way_out: str, view_layer: str = ""
+) -> None:
+    """Refuse the frame in `path` if it lacks a layer that one of the features needs."""
+    # Unknown features are refused where they come from.
+    for layer in (layer for name in features if name in FEATURES for layer in FEATURES[name].layers):
+        if layer not in frame.layers:
+            rule = f"{layer} must be among them, because {because}"
+            if path.is_file():
+                file = read_headers(path)
+                left = unused(file.parts, select(path, file.parts, view_layer))
+                rule += f" (channels that are not used: {', '.join(left)})" if left else ""
+            raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, way_out)
 
-    `whole`: parts with a channel of one name are refused, since all but the last would be lost.
-    """
-    check_input(path)
-    openexr = need("OpenEXR", "to read EXR files", "files")
-    try:
-        with _quiet, spelled(path) as name:
-            headers = openexr.File(name, header_only=True).parts
-            expected = len(headers)
-            _check_room(path, headers)
-            parts = openexr.File(name, separate_channels=True).parts
-    except InputError:
-        raise
-    except (RuntimeError, ValueError, TypeError):
-        raise InputError(
-            "input file", str(path), "it is not an OpenEXR image", "render or export it as .exr"
-        ) from None
-    # The package reports a part that it cannot read by leaving it out.
-    if len(parts) < expected or not parts:
-        rule = "its pixels cannot be read (cut short, damaged, or subsampled)"
-        raise InputError("input file", str(path), rule, "export it again, without subsampling")
-    windows = {str([corner.tolist() for corner in part.header["dataWindow"]]) for part in parts}
+
+def _missing(path: Path, file: File, selection: Selection, rule: str, way_out: str) -> InputError:
+    """Return the error for a file without a layer that it needs."""
+    names = unused(file.parts, selection)
+    deep = [part.text("name") for part in file.parts if part.deep]
+    if deep:
+        rule, way_out = "its pixels are deep: they have several samples each", "flatten it"
+    elif {"Y", "RY", "BY"} <= {name for part in file.parts for name in part.channels}:
+        rule, way_out = "its colour is stored as luminance and chroma", "export R, G, B"
+    return InputError(f"{path}: list of channels", ", ".join(names), rule, way_out)
+
+
+def _check_planes(path: Path, file: File, selection: Selection) -> None:
+    """Refuse planes of different sizes or positions, and images that do not fit the memory."""
+    chosen = [plane for planes in selection.layers.values() for plane in planes]
+    sampled = [p.name for p in chosen if file.parts[p.part].channels[p.name] != (1, 1)]
+    if sampled:
+        rule = "they are subsampled: they have fewer pixels than the image"
+        raise InputError(f"{path}: channels", ", ".join(sampled), rule, "export them in full resolution")
+    windows = {_corners(file.parts[plane.part].window) for plane in chosen}
     if len(windows) > 1:
         text = ", ".join(sorted(windows))
         raise InputError(f"{path}: data windows", text, "all parts must have the same", "export full frames")
-    names = Counter(name for part in parts for name in part.channels)
-    twice = [name for name, count in names.items() if count > 1]
-    if whole and twice:
-        rule = "they are in several parts, and one part is written"
-        way_out = "export it with the layers' names in those of the channels"
-        raise InputError(f"{path}: channels", ", ".join(sorted(twice)), rule, way_out)
-    return {name: channel for part in parts for name, channel in part.channels.items()}, parts[0].header
+    needed = 0.0
+    # A file of a few bytes may state any size.
+    for part in file.parts:
+        left, top, right, bottom = part.window
+        needed += EXR_BYTES * (right - left + 1) * (bottom - top + 1) * len(part.channels)
+    check_room(int(needed), "input file", str(path), "cut the image, or leave channels out")
 
 
-def _check_room(path: Path, headers: Sequence[Any]) -> None:
-    """Refuse pictures that do not fit the memory: a file of a few bytes may stand for any size."""
-    needed = 0
-    for part in headers:
-        (left, top), (right, bottom) = (corner.tolist() for corner in part.header["dataWindow"])
-        needed += EXR_BYTES * (right - left + 1) * (bottom - top + 1) * len(part.header["channels"])
-    check_room(needed, "input file", str(path), "cut the picture, or leave channels out")
+def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[str]:
+    """Yield sentences on attributes that change what the pixels mean."""
+    used = dict.fromkeys(plane.part for planes in selection.layers.values() for plane in planes)
+    spaces: dict[str, None] = {}
+    for name in COLORS:
+        for plane in selection.layers.get(name, ())[:1]:
+            matrix, space = _matrix(path, file, plane.part)
+            spaces |= {} if matrix is None else {space: None}
+    if spaces:
+        yield f"colours are converted to Rec. 709 from the primaries {' and '.join(spaces)}"
+    part = file.parts[next(iter(used))]
+    with refusing(f"{path}: attributes", "damaged", "they must be of OpenEXR's types", "export it again"):
+        display = part.numbers("displayWindow", "<i4", part.window)
+        (aspect,) = part.numbers("pixelAspectRatio", "<f4", (SQUARE,))
+        (white,) = part.numbers("whiteLuminance", "<f4", (0.0,))
+    if display != part.window:
+        yield f"the image is the data window {_corners(part.window)}, not all of {_corners(display)}"
+    if aspect != SQUARE:
+        yield f"pixels have the aspect ratio {aspect:g}, which an .exr keeps and a .png does not"
+    if white:
+        yield f"whiteLuminance is {white:g} cd/m², and no value is scaled by it"
+    deep = [part.text("name") for part in file.parts if part.deep]
+    if deep:
+        yield f"deep parts are left out: {', '.join(deep)}"
 
 
-def _of_view_layer(path: Path, channels: Mapping[str, Any], view_layer: str) -> dict[str, Any]:
-    """Return the channels of a view layer, all of them if none is named."""
-    found = {name: c for name, c in channels.items() if not view_layer or name.startswith(f"{view_layer}.")}
-    if not found:
-        known = dict.fromkeys(name.split(".")[0] for name in sorted(channels) if name.count(".") > 1)
-        rule = f"no channel's name begins so; those of the file begin with {', '.join(known) or 'no name'}"
-        raise InputError(f"{path}: view layer", view_layer, rule, "name one of these, or leave it out")
-    return found
+def _corners(window: Sequence[float]) -> str:
+    """Return a window as text."""
+    left, top, right, bottom = (int(value) for value in window)
+    return f"({left}, {top})-({right}, {bottom})"
 
 
-def _group(channels: Mapping[str, Any]) -> dict[str, dict[str, Group]]:
-    """Group channels by layer: alias of the layer -> full prefix -> last part of the name -> pixels."""
-    groups: dict[str, dict[str, dict[str, Plane]]] = defaultdict(lambda: defaultdict(dict))
-    for name, channel in channels.items():
-        prefix, _, component = name.rpartition(".")
-        alias = prefix.rpartition(".")[2].lower()
-        groups[alias][prefix][component.lower()] = Plane(name, channel.pixels)
-    return {alias: dict(prefixes) for alias, prefixes in groups.items()}
+def _matrix(path: Path, file: File, index: int) -> tuple[Floats | None, str]:
+    """Return the matrix from a part's colours to Rec. 709, None for the identity, and their space."""
+    return primaries.to_rec_709(str(path), file.parts[index])
 
 
-def _layer(path: Path, name: str, groups: Mapping[str, Mapping[str, Group]]) -> list[Plane] | None:
-    """Return the planes of layer `name` under the best of its aliases, or None if none is in the file."""
-    for alias in ALIASES[name]:
-        candidates = groups.get(alias, {})
-        whole = {
-            prefix: found
-            for prefix, group in candidates.items()
-            if (found := _components(name, alias, group))
-        }
-        if len(whole) > 1:
-            text = ", ".join(sorted(whole))
-            rule = f"each of them could be {name}"
-            raise InputError(f"{path}: layers", text, rule, "name one view layer, or leave others out")
-        if whole:
-            return next(iter(whole.values()))
-    return None
+def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Return the name, the attributes and, if pixels are read, the channels (H, W) of each part."""
+    openexr = need("OpenEXR", "to read EXR files", "files")
+    path, log = file.path, [""]
+    with file.in_utf8() as readable:
+        try:
+            with _quiet(log):
+                opened = openexr.File(str(readable), separate_channels=True, header_only=not pixels)
+                parts = {part.part_index: part for part in opened.parts}
+        except (RuntimeError, ValueError, TypeError) as error:
+            log[0], parts = str(error), {}
+    # The package leaves out a part that it cannot read, and prints why.
+    missing = [part.text("name") or str(i) for i, part in enumerate(file.parts) if i not in parts]
+    if missing:
+        reason = " ".join(log[0].replace(str(readable), str(path)).split())
+        of = f" of part {missing[0]!r}" if len(file.parts) > 1 else ""
+        rule = f"its pixels{of} cannot be read ({reason})"
+        raise InputError("input file", str(path), rule, "it may be cut short or damaged: export it again")
+    return [
+        (part.name(), dict(part.header), {name: c.pixels for name, c in part.channels.items()})
+        for _, part in sorted(parts.items())
+    ]
 
 
-def _components(name: str, alias: str, group: Group) -> list[Plane] | None:
-    """Return the channels that make up a layer, in order, or None if one is missing.
-
-    Without a layer's name, one channel is depth only if it is called Z: a lone Y is luminance.
-    """
-    choices = COMPONENTS[LAYERS[name].channels]
-    for components in choices if alias or len(choices[0]) > 1 else (("z",),):
-        if all(component in group for component in components):
-            return [group[component] for component in components]
-    return None
-
-
-def _stack(path: Path, name: str, planes: list[Plane]) -> Floats:
+def _stack(path: Path, name: str, planes: Sequence[Plane], pixels: Sequence[Mapping[str, Any]]) -> Floats:
     """Return the planes (H, W) of one layer as float32 (H, W, C)."""
-    kinds = sorted({str(plane.pixels.dtype) for plane in planes})
+    channels = [pixels[plane.part][plane.name] for plane in planes]
+    kinds = sorted({str(channel.dtype) for channel in channels})
     if not set(kinds) <= {"float16", "float32"}:
         rule = "they must be half or float"
         raise InputError(
             f"{path}: pixels of {name}", ", ".join(kinds), rule, "export them as 16 or 32 bit floats"
         )
-    return np.stack([plane.pixels.astype(np.float32) for plane in planes], axis=-1)
-
-
-def _taken(found: Mapping[str, list[Plane]]) -> list[str]:
-    """Return which channels became which layer, where their names are not ours."""
-    names = {layer: [plane.name for plane in planes] for layer, planes in found.items()}
-    return [
-        f"{layer} is taken from {', '.join(channels)}"
-        for layer, channels in names.items()
-        if channels != list(CHANNELS[layer])
-    ]
+    return np.stack([channel.astype(np.float32) for channel in channels], axis=-1)
 
 
 def _without_misses(layers: dict[str, Floats]) -> int:
@@ -310,8 +307,8 @@ def _without_misses(layers: dict[str, Floats]) -> int:
     return int(missed.sum())
 
 
-class _Quiet:
-    """Silence what the OpenEXR package prints by itself about a bad file: our error says it in one line.
+class _Printed:
+    """Take what the OpenEXR package prints about a bad file from the terminal, its last line into a log.
 
     Threads may read and write at once: the first that enters redirects, the last that leaves restores.
     """
@@ -319,22 +316,37 @@ class _Quiet:
     def __init__(self) -> None:
         self._lock, self._count, self._restore = threading.Lock(), 0, ExitStack()
 
-    def __enter__(self) -> None:
+    @contextmanager
+    def __call__(self, log: list[str] | None = None) -> Iterator[None]:
         with self._lock:
             if not self._count:
-                saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-                for descriptor in (saved, nowhere):
-                    self._restore.callback(os.close, descriptor)
-                self._restore.callback(os.dup2, saved, 2)
-                os.dup2(nowhere, 2)
-                self._restore.enter_context(redirect_stdout(StringIO()))
+                self._redirect()
             self._count += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                if log is not None:
+                    log[:] = [self._last()]
+                self._count -= 1
+                if not self._count:
+                    self._restore.close()
 
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._count -= 1
-            if not self._count:
-                self._restore.close()
+    def _redirect(self) -> None:
+        """Send standard error to a file, and what Python prints to a text."""
+        saved = os.dup(2)
+        self._restore.callback(os.close, saved)
+        self._errors = self._restore.enter_context(TemporaryFile())  # noqa: SIM115 (the stack closes it)
+        self._restore.callback(os.dup2, saved, 2)
+        os.dup2(self._errors.fileno(), 2)
+        self._text = self._restore.enter_context(redirect_stdout(StringIO()))
+
+    def _last(self) -> str:
+        """Return the end of the last line."""
+        descriptor = self._errors.fileno()
+        errors = os.pread(descriptor, os.fstat(descriptor).st_size, 0).decode(errors="replace")
+        lines = (errors + self._text.getvalue()).splitlines()
+        return lines[-1].rpartition(" - ")[2] if lines else ""
 
 
-_quiet = _Quiet()
+_quiet = _Printed()

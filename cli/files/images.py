@@ -1,6 +1,7 @@
 """Pictures on disk: PNG for looking, EXR for computing, and one way to open either.
 
-1. PNG holds display-encoded colour in 8 bits a channel [`write_png`], [`read_png`].
+1. PNG holds display-encoded colour in 8 bits a channel; other colours than sRGB are converted [`write_png`],
+   [`read_png`].
 2. Pictures side by side have labels, and a text that names their origin [`write_panels`], [`read_origin`].
 3. A picture to be compared is a PNG or the colour of an EXR; either knows its display-encoded and its linear
    form [`read_image`], [`Image`].
@@ -8,26 +9,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...refimpl import encoding
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Floats
 from ...refimpl.reading import check_room, read_file
-from ..common.inputs import check_input, need_layers
+from ..common.inputs import check_input
 from ..common.packages import need
-from . import exr
+from . import exr, png_colors
 from .outputs import replacing
-
-EIGHT_BIT_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
-"""Pillow's modes that fit 8 bits a channel; others would lose precision silently."""
-
 
 PNG_BYTES = 64
 """Memory that a pixel takes until it is linear: levels, and a few pictures of three float32 on the way."""
@@ -106,38 +101,44 @@ def read_origin(path: Path) -> str | None:
         return None
 
 
-def read_png(path: Path) -> Floats:
-    """Read a PNG of 8 bits a channel as display-encoded colour (H, W, 3); transparency is ignored."""
+def read_png(path: Path, tell: Callable[[str], None] | None = None) -> Floats:
+    """Read a PNG of up to 8 bits a channel as display-encoded colour (H, W, 3) of sRGB.
+
+    `tell` is given a sentence on what was converted or ignored.
+    """
     check_input(path)
     pillow = need("PIL.Image", "to read PNG files", "files")
     # Not from the file itself: of a chunk that says it is huge, a file would give room for all of it.
-    content = BytesIO(read_file(path))
+    content = read_file(path)
+    chunks = png_colors.read_chunks(path, content)
     try:
-        with pillow.open(content, formats=["PNG"]) as picture:
-            mode, (width, height) = picture.mode, picture.size
-            # A file of a few bytes may stand for a picture of any size.
+        with pillow.open(BytesIO(content), formats=["PNG"]) as picture:
+            width, height = picture.size
+            # A file of a few bytes may state any size.
             check_room(PNG_BYTES * width * height, f"size of {path}", f"{width} x {height}", "cut it")
-            levels = np.asarray(picture.convert("RGB"))
+            rgb, remarks = picture.convert("RGB"), list(png_colors.notes(chunks, picture))
     except InputError:
         raise
-    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError):
-        raise InputError("input file", str(path), "it is not a readable PNG", "export it again") from None
-    if mode not in EIGHT_BIT_MODES:
-        raise InputError(
-            f"{path}: pixel format", mode, "a PNG must have 8 bits a channel", "use .exr for more"
-        )
-    return encoding.from_8bit(levels)
+    except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError) as error:
+        rule = f"its pixels cannot be read ({error})"
+        raise InputError("input file", str(path), rule, "export it again") from None
+    encoded, source = png_colors.in_srgb(path, chunks, rgb)
+    if source:
+        remarks.insert(0, f"colours are converted to sRGB from {source}")
+    if tell is not None and remarks:
+        tell(f"{path}: {'; '.join(remarks)}")
+    return encoded
 
 
-def read_image(path: Path, exposure_stops: float = 0.0) -> Image:
-    """Read a PNG, or the colour of an EXR, in both forms at the given exposure."""
+def read_image(path: Path, exposure_stops: float = 0.0, tell: Callable[[str], None] | None = None) -> Image:
+    """Read a PNG, or the colour of an EXR, in both forms at the given exposure; `tell` is given remarks."""
     suffix = path.suffix.lower()
     if suffix == ".png":
-        display = read_png(path)
+        display = read_png(path, tell)
         return Image(display, encoding.from_display(display, exposure_stops))
     if suffix == ".exr":
-        frame = exr.read_frame(path)
-        need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
+        frame = exr.read_frame(path, tell=tell)
+        exr.need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
         linear = frame["color"]
         return Image(encoding.to_display(linear, exposure_stops), linear)
     if path.is_dir():

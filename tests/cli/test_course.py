@@ -127,5 +127,7 @@ def test_without_a_sandbox_the_command_asks_for_trust(refused, wamnet, tmp_path,
     assert message.count("\n") == 1
     assert "sandbox is bwrap: No such file or directory" in message
     assert "install bubblewrap, or add --trusted" in message
-    assert wamnet("course", "grade", "class", "-o", "out", "--lab", "1", "--trusted").status == 0
+    # A lab that is named twice is graded once.
+    outcome = wamnet("course", "grade", "class", "-o", "out", "--lab", "1", "--lab", "sphere", "--trusted")
+    assert outcome.status == 0
     assert (tmp_path / "out/grades.csv").read_text().splitlines()[1] == "ada,11/11,1"

@@ -185,7 +185,7 @@ def grade(
 
 
 def _labs(words: Sequence[str] | None) -> Sequence[Lab]:
-    """Return the labs that are named, all without names."""
+    """Return the labs that are named, each once, or all without names."""
     from ...course.labs import LABS, lab_named
 
-    return tuple(lab_named(word) for word in words) if words else LABS
+    return tuple(dict.fromkeys(map(lab_named, words))) if words else LABS

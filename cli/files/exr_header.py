@@ -4,7 +4,7 @@
    damaged header, and an attribute or channel that appears twice are rejected, each with its own message.
 2. Text is UTF-8. If an attribute's is not, all of it is read as Latin-1, which gives every byte a character
    and keeps the order of channels.
-3. The OpenEXR package takes UTF-8 alone: it is given a copy [`File.in_utf8`], and what it writes gets the
+3. The OpenEXR package takes only UTF-8: it is given a copy [`File.in_utf8`], and what it writes gets the
    source's bytes back [`File.restore`]. A header of another length moves the chunks, so their offsets change.
 
 Source: "OpenEXR File Layout" of the OpenEXR documentation.

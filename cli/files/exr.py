@@ -208,7 +208,7 @@ def _check_planes(path: Path, file: File, selection: Selection) -> None:
 def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[str]:
     """Yield sentences on attributes that change what the pixels mean."""
     used = dict.fromkeys(plane.part for planes in selection.layers.values() for plane in planes)
-    spaces = {}
+    spaces: dict[str, None] = {}
     for name in COLORS:
         for plane in selection.layers.get(name, ())[:1]:
             matrix, space = _matrix(path, file, plane.part)
@@ -257,7 +257,7 @@ def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], di
     missing = [part.text("name") or str(i) for i, part in enumerate(file.parts) if i not in parts]
     if missing:
         reason = " ".join(log[0].replace(str(readable), str(path)).split())
-        of = f" of part {missing[0]!r}" if len(file.parts) > 1 else ""
+        of = f" of part {missing[0]!r}" if parts else ""
         rule = f"its pixels{of} cannot be read ({reason})"
         raise InputError("input file", str(path), rule, "it may be cut short or damaged: export it again")
     return [

@@ -66,7 +66,7 @@ def conversion(chromaticities: Sequence[float], neutral: Sequence[float]) -> Flo
     cones = [BRADFORD @ (x / y, 1.0, (1.0 - x - y) / y) for x, y in (neutral, D65)]
     adaptation = np.linalg.inv(BRADFORD) @ np.diag(cones[1] / cones[0]) @ BRADFORD
     source, target = (to_xyz(np.reshape(space, (4, 2))) for space in (chromaticities, REC_709))
-    matrix = np.linalg.inv(target) @ adaptation @ source
+    matrix: Floats = np.linalg.inv(target) @ adaptation @ source
     if not np.isfinite(matrix).all() or not np.linalg.cond(matrix) <= LARGEST_CONDITION:
         raise ValueError("the matrix of this space has no inverse")
     return matrix

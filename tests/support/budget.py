@@ -36,7 +36,7 @@ BUDGET = {
     "cli/commands": 6100,
     "cli/common": 1160,
     "cli/course": 5620,
-    "cli/files": 2060,
+    "cli/files": 2075,
     "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""

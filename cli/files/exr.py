@@ -278,7 +278,7 @@ def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], di
     missing = [part.text("name") or str(i) for i, part in enumerate(file.parts) if i not in parts]
     if missing:
         reason = " ".join(log[0].replace(str(readable), str(path)).split())
-        of = f" of part {missing[0]!r}" if len(file.parts) > 1 else ""
+        of = f" of part {missing[0]!r}" if parts else ""
         rule = f"its pixels{of} cannot be read ({reason})"
         raise InputError("input file", str(path), rule, "it may be cut short or damaged: export it again")
     return [

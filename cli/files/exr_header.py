@@ -70,7 +70,9 @@ class Part:
     def texts(self, name: str) -> list[str]:
         """Return a list of texts, empty where there is none."""
         attribute = self.attributes.get(name)
-        return [text.decode() for text in _strings(attribute.data)] if attribute else []
+        if attribute is None or attribute.kind != b"stringvector":
+            return []
+        return [text.decode() for text in _strings(attribute.data)]
 
     def numbers(self, name: str, kind: str, default: Sequence[float]) -> tuple[float, ...]:
         """Return an attribute of as many numbers as the default, which stands for one that is missing."""
@@ -114,6 +116,10 @@ class File:
     def restore(self, path: Path) -> None:
         """Give attributes and channels that a written file has of this one their bytes back."""
         own: dict[tuple[bytes, bytes], bytes] = {}
+
+        def restored(attribute: Attribute) -> Attribute:
+            return _changed(attribute, lambda text: own.get((attribute.name, text), text))
+
         for attribute in (attribute for header in self.headers for attribute in header):
             read = _in_utf8(attribute)
             if read != attribute:
@@ -121,10 +127,7 @@ class File:
                 own |= {(read.name, new): old for new, old in pairs}
         if own:
             written = _read(path)
-            headers = [
-                [_changed(a, lambda text, name=a.name: own.get((name, text), text)) for a in header]  # type: ignore[misc, arg-type]
-                for header in written.headers
-            ]
+            headers = [[restored(attribute) for attribute in header] for header in written.headers]
             path.write_bytes(_rewritten(path, written, headers))
 
 

@@ -116,13 +116,15 @@ def read_png(path: Path, tell: Callable[[str], None] | None = None) -> Floats:
             width, height = picture.size
             # A file of a few bytes may state any size.
             check_room(PNG_BYTES * width * height, f"size of {path}", f"{width} x {height}", "cut it")
-            rgb, remarks = picture.convert("RGB"), list(png_colors.notes(chunks, picture))
+            # Pillow warns of a palette with transparency that becomes RGB in one step.
+            rgba = picture.convert("RGBA")
     except InputError:
         raise
     except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError) as error:
         rule = f"its pixels cannot be read ({error})"
         raise InputError("input file", str(path), rule, "export it again") from None
-    encoded, source = png_colors.in_srgb(path, chunks, rgb)
+    encoded, source = png_colors.in_srgb(path, chunks, rgba.convert("RGB"))
+    remarks = list(png_colors.notes(chunks, rgba))
     if source:
         remarks.insert(0, f"colours are converted to sRGB from {source}")
     if tell is not None and remarks:

@@ -114,9 +114,8 @@ def _by_numbers(path: Path, chunks: Mapping[bytes, bytes], encoded: Floats) -> t
 
 
 def notes(chunks: Mapping[bytes, bytes], picture: Any) -> Iterator[str]:
-    """Yield sentences on what the colours of a picture do not show."""
-    transparent = b"tRNS" in chunks or "A" in picture.getbands()
-    if transparent and picture.convert("RGBA").getextrema()[3][0] < encoding.LEVELS:
+    """Yield sentences on what the colours of an RGBA picture do not show."""
+    if picture.getextrema()[3][0] < encoding.LEVELS:
         yield "transparency is ignored"
     if int.from_bytes(chunks.get(b"acTL", b"")[:4], "big") > 1:
         yield "it is animated, and its default image is read"

@@ -164,7 +164,7 @@ def test_layers_of_another_program_are_told_once(tmp_path, monkeypatch) -> None:
     said: list[str] = []
     files.read_pairs(tmp_path, tell=said.append)
     assert said == []
-    monkeypatch.setattr("wamnet.cli.files.exr._taken", lambda _found: ["color is taken from a, b, c"])
+    monkeypatch.setattr("wamnet.cli.files.exr._attribute_notes", lambda *_: ["color is taken from a, b, c"])
     pairs = files.read_pairs(tmp_path, tell=said.append)
     assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} pictures: color is taken from a, b, c"]
 

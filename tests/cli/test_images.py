@@ -130,6 +130,9 @@ def test_transparency_is_named(tmp_path: Path) -> None:
     read_png(write_raw(tmp_path / "a.png", levels=(1, 2, 3, 255)), told.append)
     read_png(write_raw(tmp_path / "b.png", levels=(1, 2, 3, 254)), told.append)
     assert told == [f"{tmp_path / 'b.png'}: transparency is ignored"]
+    PIL.Image.new("P", (1, 1)).save(tmp_path / "b.png", transparency=bytes([0, 255]))
+    read_png(tmp_path / "b.png", told.append)
+    assert told[1] == told[0]
 
 
 @given(st.lists(st.tuples(st.sampled_from([*png_colors.ONCE, b"tEXt"]), st.binary(max_size=40)), max_size=4))

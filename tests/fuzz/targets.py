@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
+from PIL import Image, ImageCms
 
 from wamnet.cli.commands import demo
 from wamnet.cli.common import inputs as cli_inputs
@@ -33,6 +35,7 @@ from wamnet.compiler.proof import checker
 from wamnet.kernels import cache
 from wamnet.kernels.run import curve
 from wamnet.refimpl.errors import WamnetError
+from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scene, variation
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
@@ -89,7 +92,10 @@ class Good:
         save_model(folder / "model.safetensors", self.model)
         self.frame = render(canonical("minicubes"), Job(5, 4, 1, 1)).frame
         exr.write_frame(folder / "frame.exr", self.frame)
+        foreign(folder / "foreign.exr", self.frame)
         images.write_png(folder / "picture.png", np.clip(self.frame["color"], 0, 1))
+        profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+        Image.new("P", (5, 4)).save(folder / "palette.png", transparency=3, dpi=(72, 36), icc_profile=profile)
         recipe = replace(
             train.SHORT,
             features=("color", "depth"),
@@ -135,6 +141,15 @@ def tiny_curve(model: denoise.Model) -> dict[str, Any]:
     numbers = (1.0, 0.1, 0.01, 0.2, float("nan"))
     points = tuple(curve.Point(name, "plain", "c", *numbers) for name in ("full", "rank1"))
     return curve.Curve(variants.digest_of(model), "a device", (4, 5), "ieee", points).as_data()
+
+
+def foreign(path: Path, frame: Frame) -> None:
+    """Write the colour as another program's file: two views in parts, primaries, and windows that differ."""
+    planes = {name: np.ascontiguousarray(frame["color"][..., i]) for i, name in enumerate("RGB")}
+    header = {"type": OpenEXR.scanlineimage, "chromaticities": (0.7, 0.3, 0.2, 0.8, 0.1, 0.1, 0.32, 0.34)}
+    header["displayWindow"] = (np.array([-3, 2], np.int32), np.array([90, 40], np.int32))
+    parts = [OpenEXR.Part({**header, "view": name}, dict(planes), name) for name in ("left", "right")]
+    OpenEXR.File(parts).write(str(path))
 
 
 def dataset(folder: Path) -> None:
@@ -190,8 +205,8 @@ def readers(good: Good) -> list[Target]:
         Target(
             "normalization", "json", [parts.encode()], lambda text, _: normalization_from_json(text.decode())
         ),
-        Target("frame", "bytes", [frame], partial(_frame, good)),
-        Target("picture", "bytes", [picture], _picture),
+        Target("frame", "bytes", [frame, good.read("foreign.exr")], partial(_frame, good)),
+        Target("picture", "bytes", [picture, good.read("palette.png")], _picture),
     ]
 
 

@@ -36,7 +36,7 @@ BUDGET = {
     "cli/commands": 6250,
     "cli/common": 1350,
     "cli/course": 6110,
-    "cli/files": 2130,
+    "cli/files": 2145,
     "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""

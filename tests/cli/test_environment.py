@@ -102,7 +102,7 @@ def test_a_cache_of_somebody_else_is_named_and_left_alone(place: Path, executor:
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_folders_that_run_no_programs(place: Path, executor: str) -> None:
-    """The message requested a compiler, which was there."""
+    """The message told to install a compiler, which was there."""
     mounted = place / "mounted"
     mounted.mkdir()
     done = subprocess.run(

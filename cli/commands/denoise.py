@@ -64,7 +64,10 @@ KeepLayers = Annotated[
     typer.Option("--keep-layers", help="Write all layers of FRAME too, and the picture as layer wamnet."),
 ]
 ViewLayer = Annotated[
-    str, typer.Option(metavar="NAME", help="View layer of FRAME to denoise.", show_default="the only one")
+    str,
+    typer.Option(
+        metavar="NAME", help="View, part or view layer of FRAME to denoise.", show_default="the first view"
+    ),
 ]
 
 

@@ -233,13 +233,14 @@ def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], outpu
     runner = job.denoiser.executor
     rate = f", {done / seconds:.2f} frames per second" if done else ""
     besides = f"; {there} were there already" if there else ""
-    say(f"{output}: {done} frames in {seconds:.1f} s{rate}{besides}; {runner.name} ({runner.device})")
+    count = f"{done} frame{'' if done == 1 else 's'}"
+    say(f"{output}: {count} in {seconds:.1f} s{rate}{besides}; {runner.name} ({runner.device})")
     for _, error in failed:
         tell(f"error: {error}")
     if failed:
-        count = f"{len(failed)} of {len(tasks)}"
+        share = f"{len(failed)} of {len(tasks)}"
         rule = "they could not be denoised, for the reasons above"
-        raise InputError("number of frames that failed", count, rule, "fix them, or leave them out")
+        raise InputError("number of frames that failed", share, rule, "fix them, or leave them out")
 
 
 def _digest(*parts: object) -> str:

@@ -267,17 +267,17 @@ def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], di
     """Return the name, the attributes and, if pixels are read, the channels (H, W) of each part."""
     openexr = need("OpenEXR", "to read EXR files", "files")
     path, log = file.path, [""]
-    with file.in_utf8() as readable:
+    with file.in_utf8() as readable, spelled(readable) as name:
         try:
             with _quiet(log):
-                opened = openexr.File(str(readable), separate_channels=True, header_only=not pixels)
+                opened = openexr.File(name, separate_channels=True, header_only=not pixels)
                 parts = {part.part_index: part for part in opened.parts}
         except (RuntimeError, ValueError, TypeError) as error:
             log[0], parts = str(error), {}
     # The package leaves out a part that it cannot read, and prints why.
     missing = [part.text("name") or str(i) for i, part in enumerate(file.parts) if i not in parts]
     if missing:
-        reason = " ".join(log[0].replace(str(readable), str(path)).split())
+        reason = " ".join(log[0].replace(name, str(path)).split())
         of = f" of part {missing[0]!r}" if parts else ""
         rule = f"its pixels{of} cannot be read ({reason})"
         raise InputError("input file", str(path), rule, "it may be cut short or damaged: export it again")

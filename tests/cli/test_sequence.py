@@ -222,7 +222,7 @@ def test_an_interrupted_sequence_says_how_to_go_on(wamnet, here, monkeypatch):
     assert "out: the same command resumes with the remaining frames" in outcome.err
     monkeypatch.setattr(denoise.Job, "write", write)
     assert re.search(
-        r": [1-4] frames in .*; [1-4] were there already",
+        r": [1-4] frames? in .*; [1-4] were there already",
         wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out").out,
     )
 

@@ -67,7 +67,8 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
             raise InputError("--range", name, "the network has no such input", f"inputs are {known}")
     reader = Reader(graph, border)
     sources: list[Source] = []
-    for name, sizes in graph.inputs.items():
+    for name, each in graph.inputs.items():
+        sizes = each.sizes
         layout = _layout(name, sizes)
         source = _source(name, sizes[layout.index("C")], ranges, [source.name for source in sources])
         sources.append(source)

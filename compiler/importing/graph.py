@@ -171,7 +171,7 @@ def _plain(path: Path, model: Any) -> Graph:
     graph = Graph(inputs, [], made.output[0].name, constants, opset, model.producer_name)
     nodes, computed = [], 0
     for number, each in enumerate(made.node):
-        attributes = {a.name: helper.get_attribute_value(a) for a in each.attribute}
+        attributes = {a.name: _decoded(helper.get_attribute_value(a)) for a in each.attribute}
         results = tuple(name for name in each.output if name)
         name = each.name or f"number {number}"
         node = GraphNode(each.op_type, tuple(each.input), results, attributes, name)
@@ -186,6 +186,11 @@ def _plain(path: Path, model: Any) -> Graph:
             nodes.append(node)
     graph.nodes = nodes
     return graph
+
+
+def _decoded(value: Any) -> Any:
+    """Return an attribute's value: strings come as bytes."""
+    return value.decode() if isinstance(value, bytes) else value
 
 
 def _input(value: Any) -> GraphInput:

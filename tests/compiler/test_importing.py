@@ -228,7 +228,7 @@ def test_without_margins_a_border_is_chosen(tmp_path):
 CONV, RELU = ("Conv", "xw", "a", {"pads": [1] * 4}), ("Relu", "a", "b")
 
 REFUSED = {
-    "unknown": ([("Sigmoid", "x", "y")], {}, r"node n0 \(Sigmoid\) is Sigmoid: known are Add, .*; export"),
+    "unknown": ([("Sigmoid", "x", "y")], {}, r"node n0 \(Sigmoid\) is Sigmoid: supported are Add, .*; exp"),
     "stride": (
         [("Conv", "xw", "y", {"strides": [2, 2]})],
         {"w": W},
@@ -251,13 +251,13 @@ REFUSED = {
         {},
         r"node n0 \(Sin\) is sine: what an image gives skips past it, .* use Relu",
     ),
-    "flat": ([("Flatten", "x", "y")], {}, r"n0 \(Flatten\) is axes N, C, H, W: it mixes pixels and channels"),
+    "flat": ([("Flatten", "x", "y")], {}, r"n0 \(Flatten\) is axes 1, C, H, W to 1, CHW: it mixes pixels"),
     "reshaped": (
         [("Reshape", "xs", "y")],
         {"s": np.array([-1, 3])},
-        r"n0 \(Reshape\) is axes N, C, H, W to \[-1, 3\]: the last axis must stay the 2 channels",
+        r"n0 \(Reshape\) is axes 1, C, H, W to -1, 3: it splits or swaps axes, of sizes that the inputs do",
     ),
-    "no matrix": ([("MatMul", "xm", "y")], {"m": M}, r"n0 \(MatMul\) is axes N, C, H, W, 2 channels"),
+    "no matrix": ([("MatMul", "xm", "y")], {"m": M}, r"n0 \(MatMul\) is axes 1, C, H, W, 2 channels"),
     "a column": ([("Add", "xc", "y")], {"c": np.ones((2,))}, r"\(Add\) is a constant of shape \(2,\) beside"),
     "open clip": (
         [("Clip", ["x", "", "h"], "a"), ("Conv", "aw", "y", {"pads": [0] * 4})],
@@ -315,7 +315,7 @@ def test_graphs_of_other_forms_are_refused(tmp_path):
     with pytest.raises(InputError, match="input x: channels is any: a size from 1 to 1024"):
         import_network(path, {})
     graph(path, [node], shape=(1, 1, 2, 3, 4))
-    with pytest.raises(InputError, match="input x: axes is 5: rows of numbers"):
+    with pytest.raises(InputError, match="input x: axes is 5: rows of values"):
         import_network(path, {})
     graph(path, [node])
     with pytest.raises(InputError, match="--range is z: the network has no such input; inputs are x"):

@@ -37,7 +37,7 @@ import numpy as np
 from lines import lines
 from mutations import WAYS
 from talks import talks
-from targets import Good, Target, commands, readers
+from targets import Good, Target, commands, networks, readers
 
 from wamnet.refimpl.errors import WamnetError
 
@@ -139,7 +139,7 @@ def _hang(_number: int, _frame: object) -> None:
 
 def every(good: Good) -> list[Target]:
     """Return all targets."""
-    return [*readers(good), *talks(), *commands(good), *lines(good)]
+    return [*readers(good), *networks(), *talks(), *commands(good), *lines(good)]
 
 
 def prepare() -> None:

@@ -202,7 +202,8 @@ def _leaky(reader: Reader, node: GraphNode) -> Field:
 
 def _clip(reader: Reader, node: GraphNode) -> Field:
     """x between both ends; with a lower end only it is a rectifier."""
-    low, high = reader.number(node, "min", 1, -math.inf), reader.number(node, "max", 2, math.inf)
+    ends = (reader.number(node, "min", 1, -math.inf), reader.number(node, "max", 2, math.inf))
+    low, high = (float(np.float32(end)) for end in ends)
     # Ends that a version before 11 writes for none.
     largest = float(np.finfo(np.float32).max)
     low, high = -math.inf if low <= -largest else low, math.inf if high >= largest else high

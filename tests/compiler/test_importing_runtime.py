@@ -89,7 +89,12 @@ RIGHT = {
         {"dtype": "uint8"},
     ),
     "float16": ([("Neg", "x", "a"), ("Relu", "a", "y")], {}, SHAPE, {"dtype": "float16"}),
-    "float64": ([("Sin", "x", "y")], {}, SHAPE, {"dtype": "float64"}),
+    "float64": (
+        [("Clip", "xlh", "y")],
+        {"l": np.array(0.1), "h": np.array(0.7)},
+        SHAPE,
+        {"dtype": "float64"},
+    ),
 }
 """Graphs of two channels that are imported: nodes, constants, the input's shape, and options."""
 

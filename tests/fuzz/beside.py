@@ -182,11 +182,11 @@ def _pictures(tensor: Array, shape: tuple[int, ...]) -> list[Array]:
     else:
         assert channels in (plain.shape[0], plain.shape[-1]), f"{channels} channels of {tensor.shape}"
         both = [each for each in (plain, np.moveaxis(plain, 0, -1)) if each.shape[-1] == channels]
+    if both[0].ndim == 3:
+        return both
     if plain.size == rows * columns * channels:
         return [each.reshape(shape) for each in both]
-    if rows == 1:
-        return [each.reshape(1, -1, channels) for each in both]
-    return [each for each in both if each.ndim == 3]
+    return [each.reshape(1, -1, channels) for each in both] if rows == 1 else []
 
 
 def main() -> None:

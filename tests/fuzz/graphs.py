@@ -274,7 +274,7 @@ def _activation(make: Maker, x: Value, _values: list[Value]) -> Value | None:
     if op == "LeakyRelu" and make.maybe(0.7):
         attributes = {"alpha": make.random.choice([0.25, 0.1])}
     if op == "Clip":
-        ends = {"min": make.random.choice([0.0, -0.5]), "max": make.random.choice([1.0, 0.75, 1e9])}
+        ends = {"min": make.random.choice([0.0, -0.5, 0.1]), "max": make.random.choice([1.0, 0.75, 1e9])}
         if make.maybe(0.02):
             ends["max"] = np.ones(2)
         attributes = make.option(11, inputs, **ends)

@@ -73,7 +73,8 @@ def bound(graph: Graph) -> float:
             m, e = 1.0, e + 8 * u + u * m
         elif node.op == "Clip":
             ends = [*weights, *map(abs, node.attributes.values())]
-            m, e = m + sum(float(np.max(end)) for end in ends if np.max(end) < 1e8), e + u * m
+            m += sum(float(np.max(end)) for end in ends if np.max(end) < 1e8)
+            e += u * m
         elif node.op == "Concat":
             m, e = max(a for a, _ in both), max(b for _, b in both)
         elif node.op == "LeakyRelu":
@@ -97,22 +98,23 @@ def compared(content: bytes, folder: Path, border: str | None = None, inward: in
     graph = read(path)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.log_severity_level = 1, 4
-    rows, columns, tensors = _images(graph, result)
+    images, tensors = _images(graph, result)
     try:
         session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
         theirs = session.run(None, tensors)[0]
     except Exception:  # noqa: BLE001 - whatever the runtime does not run
         return "not run"
-    network = result.model.siren
-    images = {
-        source.name: tensor.reshape(rows, columns, -1) if _last(graph, name) else _turned(tensor)
-        for source, (name, tensor) in zip(network.sources, tensors.items(), strict=True)
-    }
     with np.errstate(all="ignore"):
-        ours = evaluate(network, result.model.window, images)
+        ours = evaluate(result.model.siren, result.model.window, images)
         within = bound(graph)
     if not np.isfinite(within):
         return "overflows"
+    rows, columns = ours.shape[:2]
+    batch = sum(tensor.size for tensor in tensors.values()) // sum(image.size for image in images.values())
+    if batch > 1:
+        # The batch is first, by itself or with the axes that are merged with it.
+        theirs = theirs.squeeze()
+        theirs = theirs[: len(theirs) // batch]
     candidates = _pictures(theirs.astype(np.float64), ours.shape)
     if not candidates:
         return "merged"
@@ -133,41 +135,33 @@ def _error(ours: Array, theirs: Array, margin: int) -> float:
     return float(np.abs(inside - expected).max()) if inside.shape == expected.shape else float("inf")
 
 
-def _last(graph: Graph, name: str) -> bool:
-    """Return whether the channels of an input are its last axis."""
-    sizes = graph.inputs[name].sizes
-    return len(sizes) != 4 or (sizes[1] is None and sizes[3] is not None)
+def _images(graph: Graph, result: Found) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return random inputs as images by the model's names, and as tensors by the graph's.
 
-
-def _turned(tensor: Array) -> Array:
-    """Return the image (H, W, C) of a tensor (1, C, H, W)."""
-    return np.moveaxis(tensor[0], 0, -1)
-
-
-def _images(graph: Graph, result: Found) -> tuple[int, int, dict[str, Array]]:
-    """Return rows and columns, and each input as a tensor of random values in its range."""
+    Of a batch the first image is compared; the others must not matter.
+    """
     rng = np.random.default_rng(1)
-    rows, columns, tensors = 9, 11, {}
-    for each in graph.inputs.values():
-        sizes = each.sizes
-        if len(sizes) == 1:
-            rows, columns = 1, 1
-        elif len(sizes) == 2:
-            rows, columns = (rows, columns) if sizes[0] is None else (1, sizes[0])
-        else:
-            first = 1 if len(sizes) == 4 and _last(graph, next(iter(graph.inputs))) else len(sizes) - 2
-            first = 0 if len(sizes) == 3 else first
-            rows, columns = sizes[first] or rows, sizes[first + 1] or columns
+    plain = {1: "C", 2: "PC", 3: "HWC", 4: "NCHW"}
+    layouts, sizes = {}, {"N": 1, "H": 9, "W": 11}
+    for name, each in graph.inputs.items():
+        last = len(each.sizes) == 4 and each.sizes[1] is None and each.sizes[3] is not None
+        layouts[name] = "NHWC" if last else plain[len(each.sizes)]
+        sizes |= {label: size for label, size in zip(layouts[name], each.sizes, strict=True) if size}
+    sizes |= {"H": 1, "W": sizes["P"]} if "P" in sizes else {}
+    sizes |= {"H": 1, "W": 1} if "C" in layouts.values() else {}
+    images, tensors = {}, {}
     for (name, each), source in zip(graph.inputs.items(), result.model.siren.sources, strict=True):
-        image = source.low + (source.high - source.low) * rng.random((rows, columns, source.channels))
-        image = image.astype(each.dtype) if each.dtype.startswith("f") else np.rint(image).astype(each.dtype)
-        sizes = each.sizes
-        if len(sizes) == 4:
-            tensors[name] = image[None] if _last(graph, name) else np.moveaxis(image, -1, 0)[None]
-        else:
-            shape = image.shape if len(sizes) == 3 else (-1, source.channels)[2 - len(sizes) :]
-            tensors[name] = image.reshape(shape)
-    return rows, columns, {name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}
+        shares = rng.random((*(sizes[label] for label in "NHW"), source.channels))
+        batch = source.low + (source.high - source.low) * shares
+        batch = (batch if each.dtype.startswith("f") else np.rint(batch)).astype(each.dtype)
+        images[source.name] = batch[0]
+        if layouts[name] == "NCHW":
+            batch = np.moveaxis(batch, -1, 1)
+        elif layouts[name] != "NHWC":
+            shape = {"HWC": batch.shape[1:], "PC": (-1, source.channels), "C": (-1,)}[layouts[name]]
+            batch = batch[0].reshape(shape)
+        tensors[name] = np.ascontiguousarray(batch)
+    return images, tensors
 
 
 def _pictures(tensor: Array, shape: tuple[int, ...]) -> list[Array]:

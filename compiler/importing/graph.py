@@ -4,11 +4,12 @@
 2. Operators whose inputs are all constants are computed: exporters write shapes and margins so [`_folded`].
 3. What is left are the nodes that the inputs reach, in the order of the graph [`Graph`].
 
-Nothing in a file is believed: sizes are limited before anything is computed.
+Nothing in a file is trusted: sizes are limited before anything is computed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,25 +27,59 @@ OPSETS = (7, 22)
 MOST_NODES = 1000
 """Most nodes of a graph: small networks have tens."""
 
+MOST_INPUTS = 64
+"""Most inputs of a graph."""
+
+MOST_READ = 2**14
+"""Most inputs of all nodes together."""
+
 MOST_FOLDED = 2**12
-"""Most numbers of constants that are computed: shapes and margins, not weights. Two make 2^22 at most."""
+"""Most elements of a constant that is computed: shapes and margins, not weights."""
+
+MOST_WRITTEN = 2**22
+"""Most elements of all constants that are computed: those that only move or change type may be weights."""
+
+MOVED = ("Cast", "Identity", "Transpose")
+"""Operators that exporters apply to weights."""
+
+BROADCAST = ("Add", "Div", "Mul", "Sub")
+"""Operators on constants that may return more elements than each operand has."""
 
 FOLDED = {
-    *("Cast", "Concat", "Constant", "Div", "Floor", "Gather", "Identity", "Mul", "Neg", "Reshape", "Add"),
-    *("Slice", "Squeeze", "Sub", "Transpose", "Unsqueeze"),
+    *("Concat", "Constant", "ConstantOfShape", "Floor", "Gather", "Neg", "Reshape", "Slice", "Squeeze"),
+    *("Unsqueeze", *MOVED, *BROADCAST),
 }
-"""Operators on constants that are computed: none makes more numbers than it is given, up to broadcasting."""
+"""Operators on constants that are computed."""
+
+CONSTANTS = {"value", "value_float", "value_floats", "value_int", "value_ints"}
+"""Attributes of Constant that are read."""
+
+FOLD = "export with constants folded"
+"""The remedy where constants are not computed."""
+
+
+@dataclass(frozen=True)
+class GraphInput:
+    """An input: its sizes (None: any), and the name of its elements' type, as NumPy has it."""
+
+    sizes: tuple[int | None, ...]
+    dtype: str
 
 
 @dataclass(frozen=True)
 class GraphNode:
-    """One operator: names of what it reads ("" where an input is left out) and of its result."""
+    """One operator: names of what it reads ("" where an input is left out) and of its results."""
 
     op: str
     inputs: tuple[str, ...]
-    output: str
+    outputs: tuple[str, ...]
     attributes: Mapping[str, Any]
     name: str
+
+    @property
+    def output(self) -> str:
+        """Return the name of the first result: others are for training."""
+        return self.outputs[0]
 
     def __str__(self) -> str:
         return f"node {self.name} ({self.op})"
@@ -56,9 +91,9 @@ class GraphNode:
 
 @dataclass
 class Graph:
-    """Inputs by name with their sizes (None: any), the nodes in order, the output's name, and constants."""
+    """Inputs by name, the nodes in order, the output's name, and constants."""
 
-    inputs: Mapping[str, tuple[int | None, ...]]
+    inputs: Mapping[str, GraphInput]
     nodes: Sequence[GraphNode]
     output: str
     constants: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -102,9 +137,15 @@ def _check_inside(path: Path, model: Any) -> None:
         if tensor.data_location == tensor.EXTERNAL:
             rule = "its numbers are in another file, which is not read"
             raise InputError(f"{path}: tensor", tensor.name, rule, "export with the weights inside")
-    if len(model.graph.node) > MOST_NODES:
-        rule = f"at most {MOST_NODES}"
-        raise InputError(f"{path}: nodes", len(model.graph.node), rule, "import a smaller network")
+    # Old files list weights among the inputs too.
+    weights = {each.name for each in model.graph.initializer}
+    for what, count, most in (
+        ("nodes", len(model.graph.node), MOST_NODES),
+        ("inputs of nodes", sum(len(each.input) for each in model.graph.node), MOST_READ),
+        ("inputs", sum(each.name not in weights for each in model.graph.input), MOST_INPUTS),
+    ):
+        if count > most:
+            raise InputError(f"{path}: {what}", count, f"at most {most}", "import a smaller network")
 
 
 def _tensors(node: Any) -> list[Any]:
@@ -126,54 +167,82 @@ def _plain(path: Path, model: Any) -> Graph:
         names = ", ".join(each.name for each in made.output)
         raise InputError(f"{path}: outputs", names, "exactly one", "export a network with one output")
     constants = {each.name: numpy_helper.to_array(each) for each in made.initializer}
-    inputs = {each.name: _sizes(each) for each in made.input if each.name not in constants}
+    inputs = {each.name: _input(each) for each in made.input if each.name not in constants}
     graph = Graph(inputs, [], made.output[0].name, constants, opset, model.producer_name)
-    nodes = []
+    nodes, computed = [], 0
     for number, each in enumerate(made.node):
-        attributes = {a.name: helper.get_attribute_value(a) for a in each.attribute}
-        node = GraphNode(
-            each.op_type, tuple(each.input), each.output[0], attributes, each.name or f"number {number}"
-        )
+        attributes = {a.name: _decoded(helper.get_attribute_value(a)) for a in each.attribute}
+        results = tuple(name for name in each.output if name)
+        name = each.name or f"number {number}"
+        node = GraphNode(each.op_type, tuple(each.input), results, attributes, name)
         if each.domain not in ("", "ai.onnx"):
             node.refuse(each.domain, "only ONNX's own operators are read", "export without others")
         if all(name in constants or not name for name in node.inputs):
             constants[node.output] = _folded(node, each, constants, opset)
+            computed += constants[node.output].size
+            if computed > MOST_WRITTEN:
+                node.refuse(computed, f"at most {MOST_WRITTEN} elements of all computed constants", FOLD)
         else:
             nodes.append(node)
     graph.nodes = nodes
     return graph
 
 
-def _sizes(value: Any) -> tuple[int | None, ...]:
-    """Return the sizes of an input, None where any will do."""
-    axes = value.type.tensor_type.shape.dim
-    return tuple(axis.dim_value if axis.HasField("dim_value") else None for axis in axes)
+def _decoded(value: Any) -> Any:
+    """Return an attribute's value: strings come as bytes."""
+    return value.decode() if isinstance(value, bytes) else value
+
+
+def _input(value: Any) -> GraphInput:
+    """Return an input's sizes and its type."""
+    from onnx import helper
+
+    tensor = value.type.tensor_type
+    dtype = str(helper.tensor_dtype_to_np_dtype(tensor.elem_type)) if tensor.elem_type else "not a tensor"
+    return GraphInput(
+        tuple(axis.dim_value if axis.dim_value > 0 else None for axis in tensor.shape.dim), dtype
+    )
 
 
 def _folded(node: GraphNode, proto: Any, constants: Mapping[str, NDArray[Any]], opset: int) -> NDArray[Any]:
-    """Return what an operator on constants is."""
+    """Return the result of an operator on constants."""
     from onnx import helper, numpy_helper
     from onnx.reference import ReferenceEvaluator
 
-    given = {name: constants[name] for name in node.inputs if name}
-    if node.op == "Constant" and "value" in node.attributes:
-        return np.asarray(numpy_helper.to_array(node.attributes["value"]))
-    if node.op == "ConstantOfShape":
-        (shape,) = given.values()
-        if np.prod(shape.astype(np.float64)) > MOST_FOLDED or np.any(shape < 0):
-            node.refuse(shape.tolist(), f"at most {MOST_FOLDED} numbers", "export with constants folded")
-    elif node.op not in FOLDED:
-        node.refuse(
-            ", ".join(given), "this operator on constants is not known", "export with constants folded"
-        )
-    sizes = [array.size for array in given.values()]
-    if sum(sizes) > MOST_FOLDED and node.op not in ("Identity", "Transpose", "Cast"):
-        node.refuse(sum(sizes), f"constants of at most {MOST_FOLDED} numbers", "export with constants folded")
-    values = [helper.make_tensor_value_info(name, 1, None) for name in (*given, node.output)]
+    operands = {name: constants[name] for name in node.inputs if name}
+    if node.op not in FOLDED:
+        node.refuse(", ".join(operands), "this operator on constants is not supported", FOLD)
+    if node.op == "Constant":
+        if not CONSTANTS.issuperset(node.attributes):
+            node.refuse(", ".join(node.attributes), f"one of {', '.join(sorted(CONSTANTS))}", FOLD)
+        if "value" in node.attributes:
+            return np.asarray(numpy_helper.to_array(node.attributes["value"]))
+    values = [helper.make_tensor_value_info(name, 1, None) for name in (*operands, node.output)]
     alone = helper.make_graph([proto], "constant", values[:-1], values[-1:])
-    made = helper.make_model(alone, opset_imports=[helper.make_opsetid("", opset)])
+    model = helper.make_model(alone, opset_imports=[helper.make_opsetid("", opset)])
     try:
-        (found,) = ReferenceEvaluator(made).run(None, given)
+        size = _size(node, list(operands.values()))
+        if size > MOST_FOLDED and node.op not in MOVED:
+            node.refuse(size, f"constants of at most {MOST_FOLDED} elements", FOLD)
+        (result,) = ReferenceEvaluator(model).run(None, operands)
+    except InputError:
+        raise
     except (*BROKEN, RuntimeError) as error:
-        node.refuse(str(error), "it cannot be computed", "export with constants folded")
-    return np.asarray(found)
+        node.refuse(str(error), "it cannot be computed", FOLD)
+    return np.asarray(result)
+
+
+def _size(node: GraphNode, operands: Sequence[NDArray[Any]]) -> int:
+    """Return an upper bound of the elements that an operator on constants reads and returns."""
+    size = sum(array.size for array in operands)
+    if node.op in BROADCAST:
+        size = max(size, math.prod(np.broadcast_shapes(*(array.shape for array in operands))))
+    elif node.op == "Gather":
+        size = max(size, operands[0].size * operands[1].size)
+    elif node.op == "ConstantOfShape":
+        size = math.prod(int(n) for n in operands[0])
+    integers = all(array.dtype.kind in "iu" for array in operands)
+    if node.op == "Div" and integers and any(np.any(array < 0) for array in operands):
+        # ONNX's reference rounds such quotients down, and runtimes to 0.
+        node.refuse("a negative integer", "only integers of at least 0 are divided", FOLD)
+    return size

@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,9 @@ MOST_WEIGHTS = 2**22
 
 MOST_NEURONS = 2**13
 """Most neurons of a layer."""
+
+MOST_READS = 2**19
+"""Most places of values that all values at all places read: each has a weight at least, and takes time."""
 
 Spot = tuple[int, int, int]
 """A value's number and the rows and columns from the output's pixel to where it is read."""
@@ -78,7 +81,7 @@ def layered(values: Sequence[Value], output: Field, sources: Sequence[Source]) -
         weights.append(weight)
         biases.append(bias)
         steps.append(step)
-    weights.append(carrier.rows([((0, 0), output, c) for c in range(output.channels)]))
+    weights.append(carrier.rows([((0, 0), output)]))
     biases.append(output.constant)
     exact = [*weights, *biases]
     with np.errstate(over="ignore"):
@@ -105,30 +108,33 @@ def _clips(step: Step) -> bool:
 
 def _needs(values: Sequence[Value], output: Field, depth: int) -> dict[Spot, int]:
     """Return the spots that are read, and the last level that reads each."""
-    spots: dict[Spot, int] = {}
+    spots: list[dict[tuple[int, int], int]] = [{} for _ in values]
+    reads = 0
 
-    def read(field: Field, row: int, column: int, level: int) -> None:
+    def read(field: Field, places: Sequence[tuple[int, int]], level: int) -> None:
+        nonlocal reads
+        reads += len(field.terms) * len(places)
+        if reads > MOST_READS:
+            rule = f"at most {MOST_READS} in all layers"
+            raise InputError("places that a pixel depends on", reads, rule, WAY_OUT)
         for value, dy, dx in field.terms:
-            spot = (value, row + dy, column + dx)
-            spots[spot] = max(spots.get(spot, 0), level)
-        if len(spots) > MOST_NEURONS * 8:
-            rule = f"at most {MOST_NEURONS * 8}"
-            raise InputError("places that a pixel depends on", len(spots), rule, WAY_OUT)
+            for row, column in places:
+                place = (row + dy, column + dx)
+                spots[value][place] = max(spots[value].get(place, 0), level)
 
-    read(output, 0, 0, depth)
+    read(output, [(0, 0)], depth)
     for number in range(len(values) - 1, -1, -1):
         argument = values[number].argument
         if argument is not None:
-            for value, row, column in [spot for spot in spots if spot[0] == number]:
-                read(argument, row, column, values[value].level)
-    return spots
+            read(argument, list(spots[number]), values[number].level)
+    return {(value, *place): last for value, places in enumerate(spots) for place, last in places.items()}
 
 
 WAY_OUT = "import a network of fewer channels, fewer layers or smaller kernels"
-"""What helps where a network is too large."""
+"""The remedy where a network is too large."""
 
 
-def _window(spots: Sequence[Spot] | dict[Spot, int], sources: int) -> int:
+def _window(spots: Mapping[Spot, int], sources: int) -> int:
     """Return the size of the smallest window that holds all places of images that are read."""
     places = [place for value, *both in spots if value < sources for place in both]
     # Of an even number of taps there is one more before the middle.
@@ -154,71 +160,83 @@ def _step_of(values: Sequence[Value]) -> Step:
     return first.step
 
 
-Parts = list[tuple[int, float]]
-"""A number as multiples of the layer's neurons: their indices and factors."""
+Parts = tuple[NDArray[np.int64], Array]
+"""A value at a place as multiples of the layer's neurons: their indices and factors, (C, parts) both."""
+
+Row = tuple[tuple[int, ...], Field]
+"""A place, and a field whose channels are neurons there."""
 
 
 class Carrier:
-    """The neurons of one layer after another, and where in them each number is that is still needed."""
+    """The neurons of one layer after another, and where in them each value is that is still read."""
 
     def __init__(
-        self, values: Sequence[Value], spots: dict[Spot, int], sources: Sequence[Source], size: int
+        self, values: Sequence[Value], spots: Mapping[Spot, int], sources: Sequence[Source], size: int
     ) -> None:
         self.values, self.spots = values, spots
-        self.places: dict[tuple[Spot, int], Parts] = {}
+        self.places: dict[Spot, Parts] = {}
         self.total, channels = 0, sum(source.channels for source in sources)
         self.width, middle, first = size * size * channels, size // 2, 0
-        for value, source in enumerate(sources):
-            for _, dy, dx in (spot for spot in spots if spot[0] == value):
+        self.levels: dict[int, list[Spot]] = {}
+        for spot in sorted(spots):
+            number, dy, dx = spot
+            self.levels.setdefault(values[number].level, []).append(spot)
+            if number < len(sources):
+                first = sum(source.channels for source in sources[:number])
                 tap = ((dy + middle) * size + dx + middle) * channels + first
-                for c in range(source.channels):
-                    self.places[(value, dy, dx), c] = [(tap + c, 1.0)]
-            first += source.channels
+                index = np.arange(tap, tap + sources[number].channels)[:, None]
+                self.places[spot] = index, np.ones(index.shape)
 
     def layer(self, level: int) -> tuple[Array, Array, Step]:
         """Return weights, biases and step of a level, whose neurons take the place of those before."""
-        own = [spot for spot in sorted(self.spots) if self.values[spot[0]].level == level]
-        step = _step_of([self.values[spot[0]] for spot in own])
-        wanted: list[tuple[tuple[int, ...], Field, int]] = []
-        new: dict[tuple[Spot, int], Parts] = {}
-        for spot in own:
+        spots = self.levels[level]
+        step = _step_of([self.values[spot[0]] for spot in spots])
+        rows: list[Row] = []
+        places: dict[Spot, Parts] = {}
+        start = 0
+        for spot in spots:
             argument = self.values[spot[0]].argument
             assert argument is not None
-            for c in range(argument.channels):
-                new[spot, c] = [(len(wanted), 1.0)]
-                wanted.append((spot[1:], argument, c))
-        matrix = self.rows(wanted)
-        carried: list[NDArray[np.float64]] = []
-        for spot in sorted(self.spots):
-            value = self.values[spot[0]]
-            if value.level < level < self.spots[spot]:
-                for c in range(value.channels):
-                    rows, parts = self._carried(spot, c, step, len(wanted) + len(carried))
-                    carried += rows
-                    new[spot, c] = parts
-        bias = [argument.constant[c] for _, argument, c in wanted] + [0.0] * len(carried)
-        self.places, self.width = new, len(bias)
-        return np.concatenate([matrix, *(row[None] for row in carried)]), np.array(bias), step
+            index = np.arange(start, start + argument.channels)[:, None]
+            places[spot] = index, np.ones(index.shape)
+            rows.append((spot[1:], argument))
+            start += argument.channels
+        matrix = self.rows(rows)
+        bias = np.concatenate([argument.constant for _, argument in rows])
+        blocks = [matrix]
+        for spot in sorted(self.places):
+            if self.spots[spot] > level:
+                block, places[spot] = self._carried(spot, step, start)
+                blocks.append(block)
+                start += len(block)
+        self.places, self.width = places, start
+        return np.concatenate(blocks), np.concatenate([bias, np.zeros(start - len(bias))]), step
 
-    def rows(self, wanted: Sequence[tuple[tuple[int, ...], Field, int]]) -> Array:
-        """Return the weights (n, width) of channels of fields at places."""
-        self.total += len(wanted) * self.width
-        if len(wanted) > MOST_NEURONS or self.total > MOST_WEIGHTS:
+    def afford(self, neurons: int) -> None:
+        """Count the weights of so many more neurons, or refuse them."""
+        self.total += neurons * self.width
+        if neurons > MOST_NEURONS or self.total > MOST_WEIGHTS:
             rule = f"at most {MOST_NEURONS}, and {MOST_WEIGHTS} weights in all"
-            raise InputError("neurons of a layer on its window", len(wanted), rule, WAY_OUT)
-        found = np.zeros((len(wanted), self.width))
-        for row, ((y, x), field, c) in enumerate(wanted):
-            for (value, dy, dx), term in field.terms.items():
-                for channel in np.flatnonzero(term[c]).tolist():
-                    for index, factor in self.places[(value, y + dy, x + dx), channel]:
-                        found[row, index] += factor * term[c, channel]
-        return found
+            raise InputError("neurons of a layer on its window", neurons, rule, WAY_OUT)
 
-    def _carried(self, spot: Spot, c: int, step: Step, start: int) -> tuple[list[Array], Parts]:
-        """Return the rows that carry a number through a layer, and what it is of them."""
-        value, before = self.values[spot[0]], self.places[spot, c]
-        # Parts of a number that is carried already are not negative.
-        signs = (1.0,) if value.positive or len(before) > 1 else (1.0, -1.0)
+    def rows(self, rows: Sequence[Row]) -> Array:
+        """Return the weights (n, width) of the channels of fields at places."""
+        total, start = sum(field.channels for _, field in rows), 0
+        self.afford(total)
+        weights = np.zeros((total, self.width))
+        for (y, x), field in rows:
+            block = weights[start : start + field.channels]
+            for (value, dy, dx), term in field.terms.items():
+                for index, factor in zip(*map(np.transpose, self.places[value, y + dy, x + dx]), strict=True):
+                    block[:, index] += factor * term
+            start += field.channels
+        return weights
+
+    def _carried(self, spot: Spot, step: Step, start: int) -> tuple[Array, Parts]:
+        """Return the rows that carry a value through a layer, and what it is of them."""
+        value, (before, factor) = self.values[spot[0]], self.places[spot]
+        # Parts of a value that is carried already are not negative.
+        signs = (1.0,) if value.positive or before.shape[1] > 1 else (1.0, -1.0)
         passes = step == Step("relu", (0.0,)) or (step.kind == "leaky" and signs == (1.0,))
         if not passes:
             node = next(v.node for v in self.values if v.level > value.level and v.step == step)
@@ -226,12 +244,9 @@ class Carrier:
             what = str(value.node) if value.node else "an image"
             rule = f"what {what} gives skips past it, which only a rectifier lets through exactly"
             node.refuse(step.kind, rule, "use Relu where values are skipped past")
-        rows: list[Array] = []
-        parts: Parts = []
-        for index, factor in before:
-            for sign in signs:
-                row = np.zeros(self.width)
-                row[index] = sign
-                parts.append((start + len(rows), factor * sign))
-                rows.append(row)
-        return rows, parts
+        neurons = before.size * len(signs)
+        self.afford(neurons)
+        rows = np.zeros((neurons, self.width))
+        rows[np.arange(neurons), np.repeat(before, len(signs))] = np.tile(signs, before.size)
+        index = np.arange(start, start + neurons).reshape(len(before), -1)
+        return rows, (index, np.einsum("cp,s->cps", factor, signs).reshape(index.shape))

@@ -13,43 +13,58 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ...refimpl.errors import InputError
 from ...refimpl.network.dataset import BORDERS, Window
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.imported import MOST_CHANNELS, Source
 from ..model_file import imported_model
 from .fields import Field
-from .graph import read
-from .layers import Value, layered
-from .operators import Reader
+from .graph import GraphInput, read
+from .layers import layered
+from .operators import run
+from .reader import Reader
 
-LAYOUTS: Mapping[int, tuple[str, ...]] = {
-    1: ("C",),
-    2: ("N", "C"),
-    3: ("H", "W", "C"),
-    4: ("N", "C", "H", "W"),
-}
-"""What the axes of an input are, by their number: rows of numbers, or a picture."""
+LAYOUTS: Mapping[int, str] = {1: "C", 2: "PC", 3: "HWC", 4: "NCHW"}
+"""The axes of an input by their number, as labels [fields.py]: rows of values, or an image."""
 
-CHANNELS_LAST = ("N", "H", "W", "C")
-"""The axes of a picture whose second axis has any size and whose last one is known."""
+CHANNELS_LAST = "NHWC"
+"""The axes of an image whose second axis has any size and whose last one is known."""
+
+OUTPUTS = ("PC", "NHWC", "NCHW")
+"""The axes of an output, of which those of one element may be missing."""
 
 RANGE = (0.0, 1.0)
-"""The range of an image's numbers, if nobody gives another."""
+"""The range of an image's values, unless the caller gives another."""
+
+TYPES: Mapping[str, tuple[float, float]] = {
+    **{
+        name: (-float(np.finfo(name).max), float(np.finfo(name).max))
+        for name in ("float16", "float32", "float64")
+    },
+    **{name: (np.iinfo(name).min, np.iinfo(name).max) for name in ("int8", "int16", "uint8", "uint16")},
+}
+"""The types of inputs, and the range of each: that of integers is the default, and float32 holds it."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A model, and what is to be said of it.
+    """A model, and its report.
 
-    `moved`: near the picture's edge the graph computes something else, in so many pixels (`margin`).
-    `rounded`: weights that are products of the graph's and were rounded once.
+    `margin`: in so many pixels from the image's edge the graph computes something else, or nothing.
+    `rounded`: weights that are products of the graph's and were rounded once. `types`: those of the images.
     """
 
     model: Model
-    moved: bool
     margin: int
     rounded: int
+    types: Mapping[str, str]
+
+    @property
+    def moved(self) -> bool:
+        """Return whether the model differs from the graph near the image's edge."""
+        return self.margin > 0
 
 
 def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border: str = "") -> Found:
@@ -67,72 +82,81 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
             raise InputError("--range", name, "the network has no such input", f"inputs are {known}")
     reader = Reader(graph, border)
     sources: list[Source] = []
-    for name, sizes in graph.inputs.items():
-        layout = _layout(name, sizes)
-        source = _source(name, sizes[layout.index("C")], ranges, [source.name for source in sources])
+    for name, each in graph.inputs.items():
+        layout = _layout(name, each.sizes)
+        if each.dtype not in TYPES:
+            rule = f"one of {', '.join(TYPES)}"
+            raise InputError(
+                f"input {name}: type of the elements", each.dtype, rule, "export with float32 inputs"
+            )
+        source = _source(name, each, layout, ranges, [source.name for source in sources])
         sources.append(source)
-        reader.image(name, source, layout)
+        reader.image(name, source, layout, each)
     for node in graph.nodes:
-        reader.run(node)
+        run(reader, node)
     if graph.output not in reader.fields:
         raise InputError("output", graph.output, "it must depend on an input", "export the network again")
-    output = _centred(reader, reader.fields[graph.output])
-    made = layered(reader.values, output, sources)
-    window = Window(made.size, reader.border or "clamp")
+    output, margin = _centred(reader, reader.fields[graph.output])
+    layers = layered(reader.values, output, sources)
+    window = Window(layers.size, reader.border or "clamp")
     info = {"imported_from": path.name, "operators": str(graph.opset), "producer": graph.producer}
-    model = imported_model(made.network, window, {name: text for name, text in info.items() if text})
+    model = imported_model(layers.network, window, {name: text for name, text in info.items() if text})
     check_model(model)
-    return Found(model, reader.moved, _margin(reader.values, output), made.rounded)
+    types = {source.name: each.dtype for source, each in zip(sources, graph.inputs.values(), strict=True)}
+    return Found(model, margin, layers.rounded, types)
 
 
-def _layout(name: str, sizes: tuple[int | None, ...]) -> tuple[str, ...]:
+def _layout(name: str, sizes: tuple[int | None, ...]) -> str:
     """Return what the axes of an input are."""
     if len(sizes) == 4 and sizes[1] is None and sizes[3] is not None:
         return CHANNELS_LAST
     if len(sizes) not in LAYOUTS:
-        rule = "rows of numbers (N, D), or a picture (N, C, H, W) or (H, W, C)"
+        rule = "rows of values (N, D), or an image (N, C, H, W) or (H, W, C)"
         raise InputError(f"input {name}: axes", len(sizes), rule, "export the network so")
     return LAYOUTS[len(sizes)]
 
 
 def _source(
-    name: str, channels: int | None, ranges: Mapping[str, tuple[float, float]], taken: list[str]
+    name: str,
+    each: GraphInput,
+    layout: str,
+    ranges: Mapping[str, tuple[float, float]],
+    taken: list[str],
 ) -> Source:
     """Return an input as an image, under a name that kernels can have."""
-    if channels is None or not 1 <= channels <= MOST_CHANNELS:
+    channels = each.sizes[layout.index("C")]
+    if channels is None or channels > MOST_CHANNELS:
         rule = f"a size from 1 to {MOST_CHANNELS} that the graph states"
         way_out = "export with a fixed number of channels"
         raise InputError(f"input {name}: channels", "any" if channels is None else channels, rule, way_out)
+    least, most = TYPES[each.dtype]
+    low, high = ranges.get(name, ranges.get("", RANGE if each.dtype.startswith("float") else (least, most)))
+    if not least <= low <= high <= most:
+        rule = f"inside [{least:g}, {most:g}], as its type is {each.dtype}"
+        raise InputError(
+            f"input {name}: range", (low, high), rule, "give the range of its values with --range"
+        )
     plain = re.sub("[^A-Za-z0-9]+", "_", name)[:32].strip("_")
     plain = plain if re.match("[A-Za-z]", plain) else f"x{plain}"
     if plain in taken:
         plain = f"{plain}_{len(taken)}"
-    return Source(plain, channels, *ranges.get(name, ranges.get("", RANGE)))
+    return Source(plain, channels, low, high)
 
 
-def _centred(reader: Reader, output: Field) -> Field:
-    """Return the output with the picture's size: without margins its pixel is the window's middle."""
-    if "C" not in output.layout or output.grown == (0, 0):
-        return output
-    shown = " and ".join(f"{n:+d} {what}" for n, what in zip(output.grown, ("rows", "columns"), strict=True))
-    if not reader.asked or any(n % 2 for n in output.grown):
-        rule = "a kernel writes a picture of the size that it reads"
-        way_out = "pad the images, or choose their border with --border zero or clamp"
-        raise InputError("size of the output beside the picture's", shown, rule, way_out)
+def _centred(reader: Reader, output: Field) -> tuple[Field, int]:
+    """Return the output with the image's size, whose pixel is the window's middle, and its margin."""
+    labels = [label for label in "".join(output.layout) if reader.size(output, label) != 1]
+    if not any(labels == [label for label in order if label in labels] for order in OUTPUTS):
+        rule = "rows of values (N, D), or an image (N, C, H, W) or (N, H, W, C), not transposed"
+        raise InputError("axes of the output", output.shown, rule, "transpose it back")
     rows, columns = output.grown
-    return output.moved(rows // 2, columns // 2, (-rows, -columns))
-
-
-def _margin(values: list[Value], output: Field) -> int:
-    """Return how far the output reads around a pixel, in all operators one after another."""
-
-    def reach(field: Field) -> int:
-        found = 0
-        for value, dy, dx in field.terms:
-            found = max(found, max(abs(dy), abs(dx)) + known[value])
-        return found
-
-    known: dict[int, int] = {}
-    for number, value in enumerate(values):
-        known[number] = 0 if value.argument is None else reach(value.argument)
-    return reach(output)
+    if (rows, columns) != (0, 0):
+        shown = f"{rows:+d} rows and {columns:+d} columns"
+        if not reader.asked or rows % 2 or columns % 2:
+            rule = "a kernel writes an image of the size that it reads"
+            way_out = "pad the images, or choose their border with --border zero or clamp"
+            raise InputError("size of the output beside the image's", shown, rule, way_out)
+        output = output.moved(rows // 2, columns // 2, (-rows, -columns))
+    # What was cut off has no pixels in the graph, and what was added is in no pixel of the model.
+    edges = zip(output.edges, (rows, columns, rows, columns), strict=True)
+    return output, max(0, *(edge - grown // 2 for edge, grown in edges))

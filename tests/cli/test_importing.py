@@ -27,7 +27,7 @@ def test_a_border_that_differs_is_said(wamnet, refused):
     told = refused("import", FOLDER / "same.onnx")
     assert "(Conv) is margins 1, 1, 1, 1, constant" in told
     outcome = wamnet("import", FOLDER / "same.onnx", "--border", "zero", "-o", "same.safetensors")
-    assert "2 pixels and more from the picture's edge the model is the network" in outcome.out
+    assert "1 pixels and more from the image's edge the model is the network" in outcome.out
 
 
 @pytest.mark.parametrize("text", ["1", "1:0", "a:b", "x=", "0:inf"])

@@ -38,7 +38,7 @@ from lines import lines
 from machines import machines
 from mutations import WAYS
 from talks import talks
-from targets import Good, Target, commands, readers
+from targets import Good, Target, commands, networks, readers
 
 from wamnet.refimpl.errors import WamnetError
 
@@ -140,7 +140,7 @@ def _hang(_number: int, _frame: object) -> None:
 
 def every(good: Good) -> list[Target]:
     """Return all targets."""
-    return [*readers(good), *talks(), *commands(good), *lines(good), *machines(good)]
+    return [*readers(good), *networks(), *talks(), *commands(good), *lines(good), *machines(good)]
 
 
 def prepare() -> None:

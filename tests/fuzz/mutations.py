@@ -5,6 +5,7 @@
    themselves are changed in the same way.
 3. A safetensors file keeps its header's length right while header and numbers change [`of_safetensors`].
 4. A command line keeps its words, some of them with other values, in other places or twice [`of_words`].
+5. A graph in ONNX's form is another one [`of_graph`].
 
 All of it is a function of a `random.Random`: the same seed gives the same input.
 """
@@ -14,6 +15,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from random import Random
 from typing import Any
 
@@ -241,10 +243,21 @@ def _changed_word(random: Random, word: str) -> str:
     return random.choice(TEXTS)
 
 
+def of_graph(random: Random, _content: bytes) -> bytes:
+    """Return a random graph in ONNX's form."""
+    from graphs import graph
+
+    return graph(random)
+
+
+HAS_ONNX = all(map(find_spec, ("onnx", "onnxruntime")))
+"""Whether graphs can be written and run."""
+
 WAYS: Mapping[str, Callable[[Random, bytes], bytes]] = {
     "bytes": of_bytes,
     "json": of_json,
     "safetensors": of_safetensors,
     "words": of_words,
+    **({"graph": of_graph} if HAS_ONNX else {}),
 }
 """Ways by the form of a file."""

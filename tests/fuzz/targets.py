@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import OpenEXR
+from mutations import HAS_ONNX
 from PIL import Image, ImageCms
 
 from wamnet.cli.commands import demo
@@ -30,6 +31,7 @@ from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Node, Program, Type
 from wamnet.compiler.core.lower import lower
+from wamnet.compiler.importing.network import import_network
 from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
 from wamnet.kernels import cache
@@ -57,6 +59,10 @@ STUDENTS = [
 
 VECTORS = Path(case.__file__).parents[1] / "vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""
+
+
+NETWORKS = Path(__file__).parents[1] / "compiler/networks"
+"""Where networks of other programs are."""
 
 
 class CommandRefused(WamnetError):
@@ -115,6 +121,8 @@ class Good:
         (folder / "vectors").mkdir()
         for name in ("metric.mse.json", "schema.json"):
             shutil.copy(VECTORS / name, folder / "vectors" / name)
+        if HAS_ONNX:
+            shutil.copy(NETWORKS / "pixels.onnx", folder / "network.onnx")
         (folder / "begun").mkdir()
         (folder / "begun/plan.json").write_text(json.dumps(asdict(demo.QUICK), indent=2) + "\n")
 
@@ -297,6 +305,20 @@ def _picture(content: bytes, folder: Path) -> None:
     finite(images.read_image(_file(content, folder, "picture.png")).linear)
 
 
+def networks() -> list[Target]:
+    """Return the import of damaged files in ONNX's form, and of other graphs beside ONNX Runtime."""
+    if not HAS_ONNX:
+        return []
+    from beside import compared
+
+    files = [(NETWORKS / f"{name}.onnx").read_bytes() for name in ("pixels", "sines")]
+    return [Target("network", "bytes", files, _network), Target("graph", "graph", files, compared)]
+
+
+def _network(content: bytes, folder: Path) -> None:
+    import_network(_file(content, folder, "network.onnx"), {}, "zero")
+
+
 # ---- commands ---------------------------------------------------------------------------------------------
 
 COMMANDS: Sequence[tuple[str, str, str, str]] = (
@@ -316,6 +338,7 @@ COMMANDS: Sequence[tuple[str, str, str, str]] = (
         "trained.checkpoint.safetensors",
         "train -i {good}/frame.exr -t {good}/frame.exr --resume -o trained.safetensors",
     ),
+    ("import", "bytes", "network.onnx", "import {} --border zero -o out.safetensors"),
     ("render", "json", "scene.json", "render {} --width 2 --height 2 --spp 1 -o out.exr"),
     ("dataset --check", "json", "set/manifest.json", "dataset --check -o set"),
     ("compare", "bytes", "picture.png", "compare {} {good}/picture.png"),

@@ -16,7 +16,7 @@ BUDGET = {
     "refimpl/network": 2750,
     "compiler": 1860,
     "compiler/core": 3500,
-    "compiler/importing": 1150,
+    "compiler/importing": 1560,
     "compiler/languages": 2725,
     "compiler/proof": 3100,
     "compiler/reading": 4050,

@@ -69,7 +69,7 @@ STRANGERS = (
     Stranger("pixels"),
     Stranger("sines", low=-1.0, channels=2, rows=True),
     Stranger("residual"),
-    Stranger("same", border="zero", margin=2),
+    Stranger("same", border="zero", margin=1),
 )
 """A rectifier network of each pixel; a network of sines on coordinates; two convolutions on a padded picture
 and what skips past them; two convolutions that pad what they read."""
@@ -136,23 +136,30 @@ def graph(
     opset: int = 17,
     inputs: Sequence[str] = ("x",),
     outputs: Sequence[str] = ("y",),
+    dtype: str = "float32",
+    rank: int = 0,
 ) -> Path:
-    """Write a graph from `x` to `y` of nodes (operator, inputs, output, attributes), and return its file."""
+    """Write a graph from `x` to `y` of nodes (operator, inputs, output, attributes), and return its file.
+
+    `dtype`: of the inputs; an output of integers is float32. `rank`: the axes of the output, 0 for as many.
+    """
     from onnx import TensorProto, helper, numpy_helper
 
     made = [
-        helper.make_node(op, list(given), [output], name=f"n{i}", **(rest[0] if rest else {}))
+        helper.make_node(op, list(given), output.split(), name=f"n{i}", **(rest[0] if rest else {}))
         for i, (op, given, output, *rest) in enumerate(nodes)
     ]
     held = {
         name: array if isinstance(array, np.ndarray) else np.asarray(array, np.float32)
         for name, array in (constants or {}).items()
     }
+    of = helper.np_dtype_to_tensor_dtype(np.dtype(dtype))
+    result = of if dtype.startswith("float") else TensorProto.FLOAT
     whole = helper.make_graph(
         made,
         "graph",
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, list(shape)) for name in inputs],
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, [None] * len(shape)) for name in outputs],
+        [helper.make_tensor_value_info(name, of, list(shape)) for name in inputs],
+        [helper.make_tensor_value_info(name, result, [None] * (rank or len(shape))) for name in outputs],
         [numpy_helper.from_array(array, name) for name, array in held.items()],
     )
     found = helper.make_model(whole, opset_imports=[helper.make_opsetid("", opset)], ir_version=8)

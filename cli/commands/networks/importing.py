@@ -104,10 +104,15 @@ def said_of(found: Found) -> list[str]:
         f"image {each.name}: {each.channels} channels in [{each.low:g}, {each.high:g}], for which bounds hold"
         for each in getattr(network, "sources", ())
     ]
+    lines += [
+        f"image {name} is {dtype}: the network computes in {dtype}, the model in float32"
+        for name, dtype in found.types.items()
+        if dtype in ("float16", "float64")
+    ]
     if found.moved:
         lines.append(
-            f"the network pads what it computes: {found.margin} pixels and more from the picture's edge the "
-            "model is the network, nearer to it the model is another function"
+            f"the network pads or crops what it computes: {found.margin} pixels and more from the image's "
+            "edge the model is the network, nearer to it the model is another function"
         )
     if found.rounded:
         lines.append(f"{found.rounded} weights are products of the network's, rounded to float32 once")

@@ -43,7 +43,7 @@ def _cast(reader: Reader, node: GraphNode) -> Field:
 def _conv(reader: Reader, node: GraphNode) -> Field:
     """Convolve with stride 1, any dilation, in groups."""
     x, weight = reader.field(node), reader.weight(node, 1)
-    bias = reader.weight(node, 2, np.zeros(len(weight)) if weight.ndim else None)
+    bias = reader.weight(node, 2, np.zeros(weight.shape[:1]))
     spatial = x.layout[2:] == (ROWS, COLUMNS) and x.layout[0] in ("", BATCH) and x.has_channels(1)
     if not spatial or weight.ndim != 4 or bias.shape != weight.shape[:1]:
         what = f"axes {x.shown}, weights {weight.shape}, constants {bias.shape}"

@@ -157,6 +157,25 @@ def test_of_a_denoised_and_a_noisy_image_the_noisy_one_is_read(tmp_path: Path) -
     assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
 
 
+@pytest.mark.parametrize(
+    ("space", "others", "noted"),
+    [
+        ("sRGB", {}, True),
+        ("ACEScg", {}, True),
+        ("Linear", {}, False),
+        ("lin_rec709", {}, False),
+        ("ACEScg", {"colorInteropID": "lin_ap1_scene"}, False),
+    ],
+)
+def test_a_color_space_of_openimageio_is_named(tmp_path: Path, space: str, others: dict, noted: bool) -> None:
+    """It is a hint of one library; where nothing else says what the colours are, it may be right."""
+    path, notes = tmp_path / "a.exr", []
+    header = {"type": OpenEXR.scanlineimage, "oiio:ColorSpace": space, **others}
+    OpenEXR.File(header, rgb(1, 2, 3)).write(str(path))
+    exr.read_frame(path, tell=notes.append)
+    assert (f"oiio:ColorSpace is {space}" in "".join(notes)) is noted
+
+
 def test_half_floats_are_widened(tmp_path: Path) -> None:
     """Each half is a float32."""
     path = write(tmp_path / "a.exr", {name: plane(0.1, np.float16) for name in "RGB"})

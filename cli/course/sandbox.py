@@ -5,6 +5,8 @@
 2. The process limits its computing time, memory, and the size and number of open files, and gives up the
    system calls that make processes, programs and sockets, or hold memory elsewhere [`confine`].
 3. It ends when its parent ends [`die_with_parent`].
+4. The process that grades limits its own memory: what it computes with an answer has the answer's size,
+   broadcast with other arrays [`limit_memory`].
 """
 
 from __future__ import annotations
@@ -28,6 +30,9 @@ MEGABYTE = 1 << 20
 
 BASE_MB = 256
 """Address space of Python, NumPy and this package, in megabytes: about 160 are used."""
+
+GRADER_MB = 1024
+"""Memory that grading may take, in megabytes, beyond that of Python and its packages: about 100 are used."""
 
 FOLDER = "/tmp"
 """The working folder inside Bubblewrap: in memory, and gone with the process."""
@@ -70,6 +75,14 @@ def bubblewrap() -> list[str]:
     for folder in sorted(set(folders)):
         command += ["--ro-bind-try", folder, folder]
     return [*command, "--dev-bind", os.devnull, os.devnull, "--remount-ro", "/", "--chdir", "/"]
+
+
+def limit_memory() -> None:
+    """Let this process take GRADER_MB more than it has; those that it starts may raise the limit."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = pages * resource.getpagesize() + GRADER_MB * MEGABYTE
+    resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
 
 
 def unavailable() -> str:

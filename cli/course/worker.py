@@ -12,12 +12,13 @@ from pathlib import Path
 
 from .grading import grade
 from .labs import lab_named
-from .sandbox import Limits, die_with_parent
+from .sandbox import Limits, die_with_parent, limit_memory
 
 
 def main() -> None:
     """Grade until there are no more lines."""
     die_with_parent()
+    limit_memory()
     for line in sys.stdin:
         name, folder, limits, trusted = json.loads(line)
         result = grade(lab_named(name), Path(folder), Limits(*limits), trusted=trusted)

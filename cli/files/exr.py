@@ -52,6 +52,12 @@ EXR_BYTES = 12
 COLORS = ("color", "albedo", "unshadowed", "seen_albedo", "seen_emission", "history")
 """Layers whose channels are mixtures of the file's primaries."""
 
+OIIO_SPACE = "oiio:ColorSpace"
+"""OpenImageIO's attribute for a colour space: a hint that other programs may leave as it was."""
+
+OIIO_REC_709 = ("linear", "scene_linear", "lin_srgb", "lin_rec709", "lin_rec709_scene")
+"""Its names of linear Rec. 709, lower case."""
+
 SQUARE = 1.0
 """Aspect ratio of the pixels that a denoiser assumes, and a PNG has."""
 
@@ -237,6 +243,9 @@ def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[s
     if spaces:
         yield f"colours are converted to Rec. 709 from the primaries {' and '.join(spaces)}"
     part = file.parts[next(iter(used))]
+    space = part.text(OIIO_SPACE)
+    if space and space.lower() not in OIIO_REC_709 and not set(primaries.STATED) & part.attributes.keys():
+        yield f"{OIIO_SPACE} is {space}, and is not used: colours are taken for linear Rec. 709"
     with refusing(f"{path}: attributes", "damaged", "they must be of OpenEXR's types", "export it again"):
         display = part.numbers("displayWindow", "<i4", part.window)
         (aspect,) = part.numbers("pixelAspectRatio", "<f4", (SQUARE,))

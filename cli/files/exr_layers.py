@@ -42,7 +42,7 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
 """The channels that hold each layer in the files that are written here."""
 
 ALIASES: Mapping[str, tuple[str, ...]] = {
-    "color": ("", "color", "rgb", "rgba", "beauty", "combined", "noisy image", "image"),
+    "color": ("", "color", "rgb", "rgba", "beauty", "noisy image", "combined", "image"),
     "albedo": ("albedo", "denoising albedo", "diffuse_albedo", "diffusealbedo"),
     "normal": ("normal", "normals", "n", "denoising normal", "sh_normal"),
     "depth": ("depth", "z", "denoising depth", ""),
@@ -51,7 +51,10 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "unshadowed": ("unshadowed",),
     **{name: (name,) for name in (*SEEN, *HISTORY, SUN)},
 }
-"""Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here."""
+"""Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here.
+
+Blender writes `Noisy Image` where its own denoiser has made `Combined`.
+"""
 
 COMPONENTS: Mapping[int, tuple[tuple[str, ...], ...]] = {
     3: (("r", "g", "b"), ("x", "y", "z")),

@@ -42,6 +42,9 @@ SPACES: Mapping[str, tuple[str, tuple[float, ...]]] = {
 NO_SPACE = ("", "unknown", "data")
 """Values of `colorInteropID` that name no colour space."""
 
+STATED = ("chromaticities", "colorInteropID", "acesImageContainerFlag")
+"""Attributes that state a file's primaries."""
+
 SAME_XY = 1e-3
 """Chromaticities that differ by no more are the same, as OpenEXR has it: programs round them to three
 digits or to five, and the colours differ by less than an 8-bit step."""

@@ -150,6 +150,32 @@ def test_the_best_alias_wins(tmp_path: Path) -> None:
     assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
 
 
+def test_of_a_denoised_and_a_noisy_image_the_noisy_one_is_read(tmp_path: Path) -> None:
+    """Blender writes both where its own denoiser runs: `Combined` is denoised then."""
+    names = {"ViewLayer.Combined.": (4, 5, 6), "ViewLayer.Noisy Image.": (1, 2, 3)}
+    path = write(tmp_path / "a.exr", {k: v for p, c in names.items() for k, v in rgb(*c, prefix=p).items()})
+    assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
+
+
+@pytest.mark.parametrize(
+    ("space", "others", "noted"),
+    [
+        ("sRGB", {}, True),
+        ("ACEScg", {}, True),
+        ("Linear", {}, False),
+        ("lin_rec709", {}, False),
+        ("ACEScg", {"colorInteropID": "lin_ap1_scene"}, False),
+    ],
+)
+def test_a_color_space_of_openimageio_is_named(tmp_path: Path, space: str, others: dict, noted: bool) -> None:
+    """It is a hint of one library; where nothing else says what the colours are, it may be right."""
+    path, notes = tmp_path / "a.exr", []
+    header = {"type": OpenEXR.scanlineimage, "oiio:ColorSpace": space, **others}
+    OpenEXR.File(header, rgb(1, 2, 3)).write(str(path))
+    exr.read_frame(path, tell=notes.append)
+    assert (f"oiio:ColorSpace is {space}" in "".join(notes)) is noted
+
+
 def test_half_floats_are_widened(tmp_path: Path) -> None:
     """Each half is a float32."""
     path = write(tmp_path / "a.exr", {name: plane(0.1, np.float16) for name in "RGB"})

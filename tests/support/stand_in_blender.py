@@ -41,7 +41,7 @@ def channels(asked):
     depth = plane(1.0, 9.0)
     depth[0, 0] = MISS
     found = {f"View.Combined.{name}": plane() for name in "RGBA"}
-    found |= {f"View.Noisy Image.{name}": plane() for name in "RGBA"}
+    found |= {f"View.Noisy Image.{name}": found[f"View.Combined.{name}"] for name in "RGBA"}
     found |= {f"View.Denoising Albedo.{name}": plane() for name in "RGB"}
     found |= {f"View.Denoising Normal.{name}": plane() for name in "XYZ"}
     found |= {f"View.Normal.{name}": plane(-0.5, 0.5) for name in "XYZ"}

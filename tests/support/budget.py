@@ -18,7 +18,7 @@ BUDGET = {
     "compiler/core": 3500,
     "compiler/importing": 1150,
     "compiler/languages": 2725,
-    "compiler/proof": 3100,
+    "compiler/proof": 3160,
     "compiler/reading": 4050,
     "compiler/schedules": 4650,
     "compiler/scenes": 3150,

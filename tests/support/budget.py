@@ -19,7 +19,7 @@ BUDGET = {
     "compiler/importing": 1150,
     "compiler/languages": 2725,
     "compiler/proof": 3160,
-    "compiler/reading": 4050,
+    "compiler/reading": 4900,
     "compiler/schedules": 4650,
     "compiler/scenes": 3150,
     "compiler/training": 1200,

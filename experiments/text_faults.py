@@ -3,11 +3,12 @@
     python experiments/text_faults.py
     python experiments/text_faults.py FOLDER... --count 500
 
-Without a folder these are kernels of a small network, one for each language and schedule that is read; a
+Without a folder these are kernels of a small network, for each language and kind of schedule that is read; a
 folder has any kernel with its manifest and certificate. A fault changes a digit of a constant, an integer by
-one, an operator or a name, or loses or repeats a statement. A table is printed, and each fault that the
-reader accepts. An array with more room changes nothing: such faults are counted by themselves. Status 1 if
-the reader accepts any other.
+one, an operator or a name, loses or repeats a statement, loses a line before the functions, or puts a word
+before another one that no kernel has there. `CLASSES` are faults of the language around the arithmetic, each
+of which some reader has accepted. A table is printed, and each fault that the reader accepts. An array with
+more room changes nothing: such faults are counted by themselves. Status 1 if the reader accepts any other.
 """
 
 from __future__ import annotations
@@ -25,18 +26,22 @@ from typing import Any, NamedTuple
 from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
-from wamnet.compiler.compile import compile_program
-from wamnet.compiler.core.lower import lower
+from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.proof.evidence import Refused, read
 from wamnet.compiler.reading.check import run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
 
-TILES = (("c", "tile8"), ("opencl", "tile8"))
-"""Targets and schedules of small kernels, in addition to the plain ones."""
+TILES = (
+    ("c", "tile8", "full"), ("opencl", "tile8", "full"), ("opencl", "group", "full"),
+    ("wgsl", "group4", "full"), ("c", "dot16", "whole8"), ("opencl", "dot16", "whole8"),
+    ("cuda", "groupdot", "whole8"),
+)  # fmt: skip
+"""Targets, schedules and variants of small kernels, in addition to the plain ones."""
 
 ROOM = re.compile(
     r" *(?:PRECISE )?(?:float|vector|union|var|wamnet_vector|uchar|uint8_t|sums|wamnet_sums)"
@@ -70,6 +75,82 @@ NOTHING = re.compile(r" \(?0\)?(?![\w.])")
 STATEMENT = re.compile(r"(?m)^ +(?!return|\(void\)|[}#])[^\n{}]*;$")
 
 
+FOREIGN = (
+    "static", "volatile", "register", "unsigned", "signed", "char", "short", "long", "double", "half",
+    "mediump", "lowp", "inout", "goto", "while", "discard", "asm", "typedef", "extern", "switch", "0x",
+    "1 +", "-", "!", "~", "*", "&", "(char)", "sizeof", "__attribute__((weak))", "\n#pragma x\n",
+    "\n#define y\n", "\\", "??/", '"/*"', "'", "`", "$", "@", "\r", "\v", "\u2028", "/*/*", "*/",
+)  # fmt: skip
+"""Words that no kernel has before most of its words: each changes what it says, or is an error."""
+
+C_LIKE = ("c", "opencl", "cuda", "metal", "opengl", "glsl-es", "glsl-vulkan")
+GLSL = ("opengl", "glsl-es", "glsl-vulkan")
+BUFFERS = ("c", "opencl", "cuda", "metal", "glsl-vulkan")
+FRAGMENTS = ("opengl", "glsl-es")
+CENTRE = "#define WINDOW_CENTRE 1"
+OTHER_CENTRE = "#undef WINDOW_CENTRE\n#define WINDOW_CENTRE 0\n#endif\n"
+TAP, COLUMN, ROW = "int tap = ", "int column = ", "int row = "
+
+CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
+    *((f"a branch on {name}", C_LIKE, CENTRE, f"{CENTRE}\n#ifndef {name}\n{OTHER_CENTRE}") for name in (
+        "__PCPP__", "__OPTIMIZE__", "GL_ES", "WAMNET_PORTABLE")),
+    ("another file", C_LIKE, CENTRE, f'{CENTRE}\n#include "other.h"'),
+    ("a macro of its own", C_LIKE, CENTRE, f"{CENTRE}\n#define true 0"),
+    ("a macro a second time", C_LIKE, CENTRE, f"{CENTRE}\n#define WINDOW_CENTRE 0"),
+    ("a pragma", C_LIKE, CENTRE, f'{CENTRE}\n#pragma GCC optimize("fast-math")'),
+    ("a directive that continues behind a comment", C_LIKE, CENTRE, f"{CENTRE} /*\n*/ - 1 //"),
+    ("lines that are joined in a comment", ("c", "opencl", "cuda"), TAP, "// why \\\n" + TAP),
+    ("a trigraph", ("c", "opencl"), TAP, "// why??/\n" + TAP),
+    ("a comment in a comment", ("wgsl",), "let tap", "/* /* */ let tap = 0; // */ */ let tap"),
+    ("another end of a line", ("wgsl",), "let tap", "// \v var tap = 0;\nlet tap"),
+    ("a variable that stays", ("c",), "float v1[6]", "static float v1[6]"),
+    ("a variable that is its own value", C_LIKE, "float value = ", "float value = value; value = "),
+    ("a row without a sign", ("opencl", "cuda", "metal", *GLSL), ROW, "uint row = "),
+    ("a column of a byte", ("opencl",), COLUMN, "uchar column = "),
+    ("a column of a byte", ("c",), COLUMN, "int8_t column = "),
+    ("a column by way of a byte", ("c",), "wamnet_clamp(x", "(int8_t)wamnet_clamp(x"),
+    ("a coordinate as a float", C_LIKE, TAP, "float tap = "),
+    ("an integer beyond 32 bits", BUFFERS, "row * width", "row * 70000 * 70000 / 70000 / 70000 * width"),
+    ("an index beyond 32 bits", C_LIKE, "dy - WINDOW_CENTRE", "dy - WINDOW_CENTRE + x * 900 - 900 * x"),
+    ("a literal beyond 32 bits", C_LIKE, "dy - WINDOW_CENTRE", "dy - WINDOW_CENTRE + 4294967296 * 0"),
+    ("a negative remainder", C_LIKE, "tap + c", "tap + c + -1 % 2 + 1"),
+    ("a literal without a sign", C_LIKE, "tap + c", "tap + 0u + c"),
+    ("a step in an expression", C_LIKE, "(tap + c)", "(tap++ + c)"),
+    ("an assignment in an expression", C_LIKE, "(tap + c)", "((tap = tap) + c)"),
+    ("a function for doubles", ("c",), "floorf(", "floor("),
+    ("a function for integers", ("c",), "fabsf(", "abs("),
+    ("an array beyond the stack", C_LIKE, "float v1[6];", "float v1[6]; float big[2000000000];"),
+    ("a component below 0", FRAGMENTS, "row), 0)[c]", "row), 0)[c - 1 + 1 - 1]"),
+    ("a channel that is not there", FRAGMENTS, "row), 0)[c]", "row), 0)[3]"),
+    ("the size of another level", FRAGMENTS, "textureSize(image_color, 0)", "textureSize(image_color, 1)"),
+    ("the middle of a pixel", FRAGMENTS, "int(gl_FragCoord.x)", "int(gl_FragCoord.x + gl_FragCoord.x) / 2"),
+    ("nothing to see", FRAGMENTS, "0.0, 1.0)", "0.0, 0.0)"),
+    ("a value out of an argument", GLSL, "void main()", "void set(out float a) { a = 1.0; }\nvoid main()"),
+    ("a function that is never called", ("c",), "static inline int", "void at() { }\nstatic inline int"),
+    ("a constructor", ("c",), "static inline int", "__attribute__((constructor)) static inline int"),
+    ("half the pixels of a corner", C_LIKE, "bool inside = ", "bool inside = !(x == 3 && y == 1) && "),
+    ("a pixel of a corner", C_LIKE, "bool inside = ", "bool inside = !(x < 1 && y < 1) && "),
+    ("a pixel near two borders", C_LIKE, "bool inside = ", "bool inside = !(x + 2 == width && y < 1) && "),
+    ("rows of one height", ("c",), "y < height;", "y < (height == 16 ? 1 : height);"),
+    ("every second row", ("c",), "y < height; ++y", "y < height; y += 2"),
+    ("no rows of large images", ("c",), "        for (int x = 0", "        if (y < 1000) for (int x = 0"),
+    ("no guard against fast-math", ("c",), "defined(__FAST_MATH__) || ", ""),
+    ("products that are fused", ("c",), "pop_options", "pop_options\n#pragma STDC FP_CONTRACT ON"),
+    ("options that end too early", ("c",), CENTRE, f"#pragma GCC pop_options\n{CENTRE}"),
+    *((f"no precision of {of}", ("glsl-es",), f"precision highp {of};", "") for of in ("int", "sampler2D")),
+    ("less precision", ("glsl-es",), "precision highp float", "precision mediump float"),
+    ("a product that is not precise", ("opengl", "glsl-vulkan"), "PRECISE float t6", "float t6"),
+    ("sums that are not precise", ("opengl", "glsl-vulkan"), "PRECISE float part1", "float part1"),
+    ("precise is nothing", ("glsl-vulkan",), "#define PRECISE precise", "#define PRECISE"),
+    ("another layout", ("glsl-vulkan",), "std430, binding = 3", "std140, binding = 3"),
+    ("groups of another size", ("glsl-vulkan",), "local_size_x = 8", "local_size_x = 4"),
+    ("groups of another size", ("wgsl",), "@workgroup_size(8, 8)", "@workgroup_size(1, 1)"),
+    ("another axis", ("opencl",), "get_global_id(1)", "get_global_id(-1)"),
+    ("another axis", ("cuda",), "blockIdx.y * blockDim.y", "blockIdx.y * blockDim.x"),
+    ("a constant of other bits", C_LIKE, "0.318309873f", "0.318309885f"),
+)  # fmt: skip
+"""What a fault is, in which languages' plain kernels, and what it puts instead of what."""
+
 Given = tuple[str, Any, Any, Any]
 """A kernel's text, certificate, manifest and weights."""
 
@@ -84,13 +165,18 @@ class Fault(NamedTuple):
 
 
 def faults(source: str) -> Iterator[Fault]:
-    """Yield all faults of a text, those of its comments and of its preprocessor left out.
+    """Yield all faults of a text, those of its comments left out.
 
-    Nor is it one to take a zero away where it was added.
+    Nor is it one to take a zero away where it was added, nor to keep a macro after the last function.
     """
-    start = source.index("{", source.index("*/"))
+    start, words = source.index("{", source.index("*/")), 0
+    for m in re.finditer(r"(?m)^(?!#undef|__kernel __attr)[^\s/*}][^\n]*\n", source[:start]):
+        yield Fault(m.start(), m.end(), "", "a line lost")
     for m in TOKEN.finditer(source, start):
         place = m.start(), m.end()
+        if m["number"] or m["name"] or m["operator"]:
+            words += 1
+            yield Fault(m.start(), m.start(), FOREIGN[words % len(FOREIGN)] + " ", "a foreign word")
         if m["number"]:
             yield from (Fault(*place, new, kind) for new, kind in numbers(m["number"]))
         elif m["name"] in NAMES:
@@ -131,9 +217,9 @@ def small(folder: Path) -> Iterator[Path]:
     """Write kernels of a small network: plain in every language that is read, and in tiles; yield folders."""
     network = siren.init((3**2 * 6, 6, 5, 3), 1.0, 3.0, seed=5)
     model = Model(network, ("color", "normal"), Window(3, "clamp"), Normalization())
-    for target, schedule in [*((target, "plain") for target in LANGUAGES), *TILES]:
+    for target, schedule, variant in [*((target, "plain", "full") for target in LANGUAGES), *TILES]:
         made = folder / f"{target}-{schedule}"
-        write(compile_program(lower(model), target, schedule=schedule), made)
+        write(compile_plan(plan_model(model, target, "ieee", schedule, variant)), made)
         yield made
 
 

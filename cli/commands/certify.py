@@ -9,7 +9,6 @@ import typer
 
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
-from ..common.packages import need
 from ..common.terminal import say, table
 
 EXAMPLES = """Examples:
@@ -22,7 +21,16 @@ wamnet certify kernel-c --source denoise-mine.h"""
 """Shown below the help of `wamnet certify`."""
 
 STATUS_REFUSED = 1
-"""Exit status when a step of a certificate does not hold; others end in 2, as bad files do."""
+"""Exit status when a step of a certificate does not hold, or a source computes another program."""
+
+STATUS_UNCHECKED = 3
+"""Exit status when the certificate holds and nothing is known of the source; bad files exit with 2."""
+
+ASSUMED = (
+    "assumed: compiler and device keep to the language's standard and IEEE 754's float32, rounded to "
+    "nearest; the host calls the kernel as the manifest says, with finite values in the stated ranges"
+)
+"""What a verified source rests on."""
 
 
 def certify(
@@ -37,23 +45,29 @@ def certify(
     source: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Read this text in place of the kernel's own: one that was changed by hand."
+            metavar="FILE",
+            help="Check this source instead of the kernel's own: one that was changed by hand.",
         ),
     ] = None,
     text: Annotated[
-        bool, typer.Option(help="Read the kernel's text too: does it compute the certified program?")
+        bool, typer.Option(help="Check the kernel's source too: does it compute the certified program?")
     ] = True,
 ) -> None:
-    """Check the proof of a kernel's error bound, step by step, and that its text computes what was proven.
+    """Check the proof of a kernel's error bound, step by step, and that its source computes what was proven.
 
-    The checker derives every number again, from the weights and the program, and shows what each layer adds.
-    A reader then runs the text on unknowns, for pixels of pictures of any size, and compares every sum and
-    every operation with the program's. Both share no code with the compiler. Status 0: all steps hold; 1: one
-    does not, which is named; 2: the file is not a certificate.
+    The checker derives every value again, from the weights and the program, and shows what each layer adds.
+    The source checker then runs the source on unknowns, for pixels of images of any size, and compares every
+    sum and every operation with the program's. Both share no code with the compiler. It assumes that compiler
+    and device keep to the language's standard and to IEEE 754's float32, rounded to nearest, and that the
+    host calls the kernel as the manifest says, with finite values in the stated ranges. Exit status 0: all
+    steps hold, and the source computes the program; 1: one does not, which is named; 2: the file is not a
+    certificate; 3: the source has not been checked, and the reason is printed.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import check
-    from ...compiler.proof.evidence import INTEGERS, Refused
+    from ...compiler.proof.evidence import Refused
+    from ...compiler.reading.check import check_text
+    from ...compiler.reading.lanes import Unread
 
     path = file / CERTIFICATE_NAME if file.is_dir() else file
     if not path.is_file():
@@ -68,32 +82,30 @@ def certify(
             )
         read_file(source, "kernel", "name a text in the kernel's language")
     try:
-        held = check(path)
-        if held["schema"] == INTEGERS:
-            table(*sums_table(held))
-            say("holds: no operation rounds; every number is the reference's, for all images of integers")
-        else:
-            table(*layers_table(held))
-            bound = max(held["bound"]["output"])
-            say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
+        show(check(path))
         if text:
-            say(text_of(path, source))
+            done = check_text(path, source)
+            say(f"text: computes that program: {done['sums']} sums, at {done['lanes']} places")
+            say(ASSUMED)
     except Refused as step:
         say(f"refused: {step}")
         raise typer.Exit(STATUS_REFUSED) from None
-
-
-def text_of(path: Path, source: Path | None = None) -> str:
-    """Say what the reader found of the text beside a certificate, or of `source`; `Refused` if wrong."""
-    from ...compiler.reading.check import check_text
-    from ...compiler.reading.lanes import Unread
-
-    need("pcpp", "to read the texts of kernels", "cli")
-    try:
-        found = check_text(path, source)
     except Unread as error:
-        return f"text: not checked: this reader does not know {error}"
-    return f"text: computes that program: {found['sums']} sums, at {found['lanes']} places that stand for all"
+        say(f"text: not checked: this reader does not know {error}")
+        raise typer.Exit(STATUS_UNCHECKED) from None
+
+
+def show(held: Any) -> None:
+    """Print what a certificate proves, and its table."""
+    from ...compiler.proof.evidence import INTEGERS
+
+    if held["schema"] == INTEGERS:
+        table(*sums_table(held))
+        say("holds: no operation rounds; every number is the reference's, for all images of integers")
+        return
+    table(*layers_table(held))
+    bound = max(held["bound"]["output"])
+    say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
 
 
 def sums_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:

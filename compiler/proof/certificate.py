@@ -321,6 +321,8 @@ def _about(
         "program_digest": manifest["program"],
         "files": dict(manifest["files"]),
         "profile": manifest["profile"]["name"],
+        "entry_point": manifest["entry_point"],
+        "centre": manifest["window"]["centre"],
         "program": ir.text(program),
         "parameters": _places(program, schedule, emitted),
     }

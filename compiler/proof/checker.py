@@ -9,7 +9,7 @@
 4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.
 
-It shares no code with what wrote the certificate except the promises of sines. Formulas: spec/certificate.md.
+It shares no code with what wrote the certificate. Formulas: spec/certificate.md.
 """
 
 from __future__ import annotations
@@ -23,20 +23,13 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import refusing
-from ..core.profiles import CUDA_SINE, EXACT_SINE, OPENCL_SINE, emitted_sine
-from ..core.sine import POLYNOMIALS
 from .evidence import INTEGERS, NODE, Refused, read, same
 from .integer_checker import check_integers
+from .sine_checker import PROMISES
 from .spectra_checker import Tables
 
 U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 """float32's rounding and smallest normal number; a factor of more than float64 can be off in what follows."""
-
-OWN_SINES = (EXACT_SINE, OPENCL_SINE, CUDA_SINE)
-"""Sines of profile exact, and of languages that promise enough for a proof."""
-
-PROMISES = {promise.text: promise for promise in (*map(emitted_sine, POLYNOMIALS), *OWN_SINES)}
-"""What is known of sines, by the name that a certificate gives."""
 
 
 def check(path: Path) -> dict[str, Any]:

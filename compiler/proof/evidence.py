@@ -41,6 +41,10 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
         same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
     same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
+    if "entry_point" not in held:
+        raise Refused("it has no entry point: an earlier version wrote it, so compile the model again")
+    same("entry point", held["entry_point"], manifest["entry_point"])
+    same("centre of the window", held["centre"], manifest["window"]["centre"])
     raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
     arrays = {}
     for name, place in held["parameters"].items():

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import words
-from .field import Number, blended, choice, expression, hashed, literal
+from .field import Number, blended, choice, expression, hashed
 from .lanes import Wrong, chosen, clamped
 from .memory import Pointer, Texel, Weights
+from .syntax import Type
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -21,7 +22,7 @@ def extreme(name: str, sign: int) -> Callable[..., Any]:
 
     def of_two(machine: Machine, a: Any, b: Any) -> Any:
         if isinstance(a, Number) or isinstance(b, Number):
-            return expression(name, *machine.both(a, b), commutes=True)
+            return expression(name, *machine.alike(a, b), commutes=True)
         return clamped(a, b, sign)
 
     return of_two
@@ -38,7 +39,7 @@ def clamp(machine: Machine, value: Any, low: Any, high: Any) -> Any:
 def select(machine: Machine, no: Any, yes: Any, where: Any) -> Any:
     """Return WGSL's choice."""
     if isinstance(where, Number):
-        return choice(where, *machine.both(yes, no))
+        return choice(where, *machine.alike(yes, no))
     return choose(machine, where, yes, no)
 
 
@@ -47,7 +48,7 @@ def choose(machine: Machine, where: Any, a: Any, b: Any) -> Any:
     if isinstance(where, bool):
         return a if where else b
     if isinstance(a, Number) or isinstance(b, Number):
-        return blended(*machine.both(a, b), where)
+        return blended(*machine.alike(a, b), where)
     if isinstance(a, (bool, np.ndarray)):
         return np.where(where, a, b)
     if a is None or b is None:
@@ -61,14 +62,8 @@ def of_one(name: str) -> Callable[..., Any]:
 
 
 def conversion(kind: str) -> Callable[..., Any]:
-    """Return a conversion to a kind of number; coordinates stay as they are."""
-
-    def convert(machine: Machine, a: Any) -> Any:
-        if isinstance(a, Number):
-            return machine.cast(a, kind)
-        return literal(a, kind) if kind == "float32" and isinstance(a, int) else a
-
-    return convert
+    """Return a conversion to a kind of number."""
+    return lambda machine, a: machine.converted(a, Type(kind))
 
 
 def as_int(machine: Machine, a: Number) -> Number:
@@ -97,13 +92,20 @@ def bits(name: str, a: Number, b: Number) -> Number:
 
 def fetch(machine: Machine, image: Any, place: Any, level: Any) -> Any:
     """Return a texel: of an image, or of the weights."""
-    if level != 0:
+    if type(level) is not int or level != 0:
         raise Wrong(f"it reads level {level} of a texture")
     if not isinstance(image, Pointer):
         return Texel(image, *place)
     if not 0 <= place[0] < Weights.TEXELS:
         raise Wrong(f"the weights have no column {place[0]}")
     return (image.memory.load(place[1] * Weights.TEXELS + place[0], 1, machine),)
+
+
+def size_of(machine: Machine, image: Any, level: Any) -> Any:
+    """Return how many pixels a texture has."""
+    if type(level) is not int or level != 0:
+        raise Wrong(f"it takes the size of level {level} of a texture")
+    return image.size
 
 
 def several(machine: Machine, *given: Any) -> Any:
@@ -115,8 +117,7 @@ KINDS = {"int": "int32", "uint": "uint32", "float": "float32"}
 """Kinds of numbers by the names of types."""
 
 BUILTINS: dict[str, Callable[..., Any]] = {
-    "clamp": clamp, "select": select, "texelFetch": fetch,
-    "textureSize": lambda machine, image, level: image.size,
+    "clamp": clamp, "select": select, "texelFetch": fetch, "textureSize": size_of,
     **dict.fromkeys(("min", "fmin", "fminf"), MINIMUM), **dict.fromkeys(("max", "fmax", "fmaxf"), MAXIMUM),
     **dict.fromkeys(("floor", "floorf"), of_one("floor")),
     **dict.fromkeys(("fabs", "fabsf", "abs"), of_one("absolute")),
@@ -124,8 +125,7 @@ BUILTINS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(("uint", "u32", "convert_uint"), conversion("uint32")),
     **dict.fromkeys(("float", "f32", "convert_float"), conversion("float32")),
     "ivec2": several, **dict.fromkeys(("vec4", "float4"), words.vector("float32")),
-    **dict.fromkeys(("ivec4", "make_int4"), words.vector("int32")), "uvec4": words.vector("uint32"),
-    **{f"convert_{name}{n}": conversion(kind) for name, kind in KINDS.items() for n in (4, 8, 16)},
+    **dict.fromkeys(("ivec4", "make_int4"), words.vector("int32")),
     **{f"as_int{n}": words.seen("int32", as_int) for n in ("", 4, 8, 16)},
     "as_uint": words.seen("uint32", as_int),
     **{f"as_float{n}": words.seen("float32", as_float) for n in ("", 4, 8, 16)},
@@ -137,4 +137,4 @@ BUILTINS: dict[str, Callable[..., Any]] = {
     "_mm512_loadu_si512": words.sixteen, "_mm512_storeu_ps": words.store_sixteen,
     "_mm512_set1_epi32": lambda machine, a: a, "_mm512_cvtepi32_ps": conversion("float32"),
 }  # fmt: skip
-"""By name: called with the machine and the arguments."""
+"""By name: called with the machine and the arguments. Which of these a language has is its own [`calls`]."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +13,20 @@ from ...refimpl.reading import read_file
 from ..proof.evidence import Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
-from .field import add_up_lanes, fold_lanes
+from .field import add_up_lanes, equal, fold_lanes, literal
+from .frame import check_frame, cleaned
+from .frames import TRUE
 from .groups import FLAGS, Group, group_lanes, tile_lanes
-from .lanes import Place, Unread, Wrong, lanes_for
-from .languages import LANGUAGES, Language, Stopped, is_read, parsed
+from .lanes import Place, Raw, Unread, Wrong, axis_of, lanes_for
+from .languages import LANGUAGES, Language, is_read, parsed
+from .limits import limited
 from .machine import Machine
 from .memory import Image, Memory, Pointer, Result
 from .spectra import Tiles
-from .syntax import Text, Variable
+from .syntax import Text, Type, Variable
 from .words import Stored, pointed
 
-LANES_SEED = 20261123
-"""Which borders meet in a lane; every run draws other unknowns [field.py]."""
-
-
-MEANINGLESS = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
+MEANINGLESS = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, AssertionError)
 """What Python raises where a text does with its values what no text of a kernel does."""
 
 
@@ -45,7 +44,7 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
         kind = f"schedule {manifest['schedule']['name']}, profile {manifest['profile']['name']}"
         raise Unread(f"texts of target {manifest['target']} with {kind}")
     text = read_file(source or path.parent / sources[0], "kernel", "name a text in the kernel's language")
-    return run_text(text.decode(errors="replace"), held, manifest, weights)
+    return limited(run_text, text.decode(errors="replace"), held, manifest, weights)  # type: ignore[no-any-return]
 
 
 def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
@@ -53,21 +52,21 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     language, schedule = LANGUAGES[manifest["target"]], manifest["schedule"]
     pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
+    seed = secrets.randbits(31)
     try:
         tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
         if tiles:
-            lanes = tile_lanes((pixels, rows), window, beyond=not language.within, seed=LANES_SEED)
-            fold_lanes((lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3]))
+            lanes = tile_lanes((pixels, rows), window, not language.within, seed)
         elif group:
-            lanes = group_lanes((group[0], group[1]), pixels, window, LANES_SEED)
-            add_up_lanes(lanes.count)
+            lanes = group_lanes((group[0], group[1]), pixels, window, seed)
         else:
-            reach = max(centre, window - centre) + 1
-            caps = (reach + pixels - 1, reach)
-            lanes = lanes_for(caps, pixels, beyond=not language.within, seed=LANES_SEED)
-            add_up_lanes(None)
+            reach = max(centre, window - centre)
+            lanes = lanes_for((reach + pixels - 1, reach), pixels, not language.within, seed)
+        counts = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
+        fold_lanes(counts) if tiles else add_up_lanes(np.ones(lanes.count, dtype=bool) if group else counts)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles)
-        texts = different(source, language)
+        lanes.channels = max(int(manifest["output"]["channels"]), *(int(n) for _, n in claim.images))
+        texts = different(source, language, manifest, held["profile"] == "exact")
         for text in texts:
             claim.found.clear()
             lanes.active = np.ones(lanes.count, dtype=bool)
@@ -76,6 +75,8 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
                 check_host(text, language.host, manifest["entry_point"], claim)
     except Wrong as error:
         raise Refused(f"text: {error}") from error
+    except RecursionError as error:
+        raise Unread("expressions, or blocks, so deep in each other") from error
     except MEANINGLESS as error:
         raise Refused(f"text: it has no meaning to this reader ({error})") from error
     finally:
@@ -83,19 +84,15 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count, "compilers": len(texts)}
 
 
-def different(source: str, language: Language) -> list[Text]:
-    """Return what a text is for a language's compilers, each once; those that stop at an error left out."""
+def different(source: str, language: Language, manifest: Any, exact: bool) -> list[Text]:
+    """Return what a text is for a language's compilers, each once."""
+    source, target = cleaned(source), manifest["target"]
+    check_frame(source, target, exact, any(manifest["bound"]["output"]))
     found: list[Text] = []
-    for macros in language.compilers:
-        try:
-            text = parsed(source, language, macros)
-        except Stopped as error:
-            stopped = error
-            continue
+    for true in TRUE.get(target, ((),)):
+        text = parsed(source, language, true)
         if text not in found:
             found.append(text)
-    if not found:
-        raise stopped
     return found
 
 
@@ -114,20 +111,23 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
     if group:
         known, calls = {**group.brings(), **FLAGS}, group.calls()
     else:
-        known, calls = items(claim)
+        known, calls = items(claim, language.fragment)
     names = {v.name: sized(given[v.name], v) for v, _ in text.outside if v.name in given}
     names |= {name: known[name] for name in language.brings if name in known}
     span_of = claim.ranges.of if claim.stated else None
     machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group, span_of)
+    machine.aligned = language.aligned
     if group and text.group and [machine.value(n) for n in text.group][:2] != size:
         raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
-    entry = manifest["entry_point"] if manifest["entry_point"] in text.functions else "main"
+    entry = manifest["entry_point"]
     takes = text.functions[entry].takes
     check_interface(text, [v.name for v in takes if v.role not in known], claim)
     machine.call(entry, [known[v.role] if v.role in known else sized(given[v.name], v) for v in takes])
     if language.fragment:
         for channel in range(channels):
             result.hold(0, channel, target.load(channel, 1, machine), machine.running)
+        if channels < 4 and not equal(target.load(3, 1, machine).known, literal(1.0, "float32").known):
+            raise Wrong("the fourth number of its result is not 1")
     result.complete()
 
 
@@ -181,22 +181,27 @@ def sized(value: Any, variable: Variable) -> Any:
 
 
 def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
-    """Refuse a text whose loops do not call the kernel once for each work item, with what they are given."""
-    takes = [v.name for v in text.functions[host].takes]
-    n, m = claim.pixels, claim.rows
-    for width, height in ((1, 1), (n, 2 * m), (n + 1, m), (3 * n - 1, 2 * m + 1)):
-        given: dict[str, Any] = {name: Pointer(Memory(name, 0), 0) for name in takes}
-        given |= {"width": width, "height": height}
-        calls: list[tuple[Any, ...]] = []
-        rest = replace(text, functions={k: v for k, v in text.functions.items() if k != kernel}, outside=[])
-        note = {kernel: lambda machine, *values, calls=calls: calls.append(values)}
-        Machine(rest, claim.lanes, {}, {**BUILTINS, **note}, claim.added).call(host, list(given.values()))
-        places = [(x, y) for y in range(0, height, m) for x in range(0, width, n)]
-        if calls != [(*given.values(), x, y) for x, y in places]:
+    """Refuse a host that is not two loops, over rows and columns, and a call with what it is given."""
+    machine, tree = Machine(text, claim.lanes, {}, BUILTINS, claim.added), text.functions[host].body
+    for name, end, size in (("y", "height", claim.rows), ("x", "width", claim.pixels)):
+        ((form, start, below, step, inner),) = tree[1]
+        own = ("name", name)
+        right = (form, start[:2], start[2]) == (
+            "for",
+            ("declare", Variable(name, Type("int32"))),
+            ("number", "0"),
+        )
+        right &= below == ("binary", "<", own, ("name", end))
+        by = 1 if step == ("step", "++", own) else machine.value(step[3])
+        if not right or by != size or step[1:3] not in (("++", own), ("+", own)):
             raise Wrong(f"{host} does not call {kernel} once for each work item")
+        tree = inner
+    takes = [("name", v.name) for v in text.functions[host].takes]
+    if tree != ("block", [("do", ("call", ("name", kernel), [*takes, ("name", "x"), ("name", "y")]))]):
+        raise Wrong(f"{host} does not call {kernel} once for each work item")
 
 
-def items(claim: Claim) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+def items(claim: Claim, fragment: bool) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """Return the names, and functions, by which languages call a work item's place.
 
     CUDA's blocks have 8 by 4 threads.
@@ -207,12 +212,12 @@ def items(claim: Claim) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     y = Place(lanes, y.values // claim.rows, y.form / claim.rows)
     inside, block = {}, {}
     for name, place, n in (("x", x, 8), ("y", y, 4)):
-        inside[name] = lanes.constant(place.values % n)
-        block[name] = Place(lanes, place.values // n, place.form / n)
-    pixel = {"x": x, "y": y}
+        inside[name] = Raw(lanes.constant(place.values % n))
+        block[name] = Raw(Place(lanes, place.values // n, place.form / n))
+    pixel = {"x": Raw(x, not fragment), "y": Raw(y, not fragment)}
     whole = ("gl_FragCoord", "gl_GlobalInvocationID", "global_invocation_id", "thread_position_in_grid")
     names = {
-        **dict.fromkeys(whole, pixel),
-        "threadIdx": inside, "blockIdx": block, "blockDim": {"x": 8, "y": 4},
+        **dict.fromkeys(whole, pixel), "threadIdx": inside, "blockIdx": block,
+        "blockDim": {"x": Raw(lanes.constant(8)), "y": Raw(lanes.constant(4))},
     }  # fmt: skip
-    return names, {"get_global_id": lambda machine, axis: (x, y)[axis]}
+    return names, {"get_global_id": lambda machine, axis: axis_of((pixel["x"], pixel["y"]), axis)}

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.sine import exact_sine, sine
 from ..proof.evidence import INTEGERS, NODE, places
-from . import field, words
+from ..proof.sine_checker import sine
+from . import words
 from .field import (
     Number,
     P,
@@ -33,7 +33,7 @@ from .field import (
     product,
     total,
 )
-from .lanes import Lanes, Mask, Unread
+from .lanes import Lanes, Unread
 from .memory import Weights
 from .spectra import Tiles
 
@@ -91,8 +91,8 @@ class Claim:
         self.stated = words.stated(held)
         self.ranges = words.Ranges(held, self.stated)
         self.weights: Any = words.Stored(raw) if self.stated else self._memory(raw)
-        self.tables: list[tuple[NDArray[np.uint32], str, str]] = []
-        self.first: dict[int, tuple[int, int]] = {}
+        self.tables: list[tuple[str, str]] = []
+        self.first: dict[int, int] = {}
         self.found: set[int] = set()
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
@@ -109,8 +109,8 @@ class Claim:
         promise = (held.get("sine") or {}).get("text", "")
         degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)(, .*)?", promise)
         if held["profile"] == "exact":
-            return exact_sine
-        return (lambda x: sine(x, int(degree[1]))) if degree else None
+            return partial(sine, degree=11, exact=True)
+        return partial(sine, degree=int(degree[1])) if degree else None
 
     # ---- inputs --------------------------------------------------------------------------------------------
 
@@ -148,14 +148,11 @@ class Claim:
         return Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
 
     def _input(self, at: int) -> Number:
-        """Return the window (2, lanes, n) of a pixel of each lane: tap by tap, all images' channels.
+        """Return the window (2, 1, n) of a pixel of each lane: tap by tap, all images' channels.
 
-        Where sums are added up over lanes, so are the numbers of the window: nothing but sums reads them.
+        It is added up over lanes: nothing but sums reads it.
         """
-        if field.FACTORS:
-            return Number(np.stack([tap.term for tap in self._taps(at)], axis=-1))
-        taps = list(self._taps(at))
-        return Number(np.stack([t.value for t in taps], axis=-1), np.stack([t.known for t in taps], axis=-1))
+        return Number(np.stack([tap.term for tap in self._taps(at)], axis=-1))
 
     def _taps(self, at: int) -> Iterator[Number]:
         """Yield the numbers of a pixel's window in every lane."""
@@ -260,14 +257,8 @@ class Claim:
         return self._number(whole)
 
     def _number(self, value: Words) -> Number:
-        """Return the number of the program that a sum is: it is known by the sum's value.
-
-        Of values added up over lanes each lane has an unknown of its own.
-        """
-        if not field.FACTORS:
-            return Number(value, hashed("found", *value))
-        lane = np.arange(len(field.FACTORS["lanes"])).reshape((-1,) + (1,) * (value.ndim - 2))
-        return Number(None, hashed("found", *value, lane))
+        """Return the number of the program that a sum is, in all lanes: it is known by the sum's value."""
+        return Number(None, hashed("found", *value))
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
@@ -282,56 +273,36 @@ class Claim:
         ]
 
     def _note(self, value: Words, kind: str, name: str) -> None:
-        """Keep sums (2, lanes, n), to be found by the first lane's pairs of numbers."""
-        for j, word in enumerate(_word(value).tolist()):
-            self.first.setdefault(word, (len(self.tables), j))
-        self.tables.append((value.astype(np.uint32), kind, name))
+        """Keep sums (2, 1, n), to be found by their pairs of numbers."""
+        for word in _word(value).tolist():
+            self.first.setdefault(word, len(self.tables))
+        self.tables.append((kind, name))
 
     # ---- what a text has found -----------------------------------------------------------------------------
 
-    def added(self, number: Number, running: Mask) -> Number:
+    def added(self, number: Number) -> Number:
         """Return a sum of a text: a number of the program, or a part, if it is one; else as it is."""
-        if number.shape is not None or (number.value.shape[1] == 1 and not field.FACTORS):
+        if number.shape is not None:
             return number
-        words = _word(number.value % P)
-        if words.ndim == 0:
-            hit = self.first.get(int(words))
-            if hit is None or not self._is(number.value, hit, running):
-                return number
-            return self._found(number.value, hit[0], np.ones(1, dtype=bool)[0])
-        hits = [self.first.get(word) for word in words.tolist()]
-        if not any(hits):
+        value = number.value % P
+        words = _word(value)
+        hits = [self.first.get(word) for word in words.ravel().tolist()]
+        if not any(hit is not None for hit in hits):
             return number
-        good = [h is not None and self._is(number.value[..., k], h, running) for k, h in enumerate(hits)]
-        if not any(good):
-            return number
-        table = next(h[0] for h, ok in zip(hits, good, strict=True) if h and ok)
-        return self._found(number.value, table, np.array(good))
-
-    def _is(self, value: Words, hit: tuple[int, int], running: Mask) -> bool:
-        (table, j), value = hit, value % P
-        wanted = self.tables[table][0][..., j]
-        if field.FACTORS:
-            return np.array_equal(value, wanted)
-        return bool(running.all() and np.array_equal(value, wanted)) or np.array_equal(
-            value[:, running], wanted[:, running]
-        )
-
-    def _found(self, value: Words, table: int, good: Any) -> Number:
+        good = np.array([hit is not None for hit in hits]).reshape(words.shape)
+        table = next(hit for hit in hits if hit is not None)
         self.found.add(table)
-        value = value % P
-        if self.tables[table][1] == "part":
+        if self.tables[table][0] == "part":
             return Number(np.where(good, renamed(value), value))
-        found = self._number(value)
-        return Number(found.given, np.where(good, found.known, hashed("sum", *value)))
+        return Number(None, np.where(good, self._number(value).known, hashed("sum", *value)))
 
     def missing(self) -> str | None:
         """Return the first sum of the program that a text has not made."""
-        return next((name for k, (_, _, name) in enumerate(self.tables) if k not in self.found), None)
+        return next((name for k, (_, name) in enumerate(self.tables) if k not in self.found), None)
 
 
 def _word(value: Words) -> Words:
-    """Return both numbers (2, lanes, ...) of the first lane as one: of many sums two share a first one."""
+    """Return both numbers of sums (2, 1, ...) as one."""
     word: Words = value[0, 0] << np.uint64(32) | value[1, 0]
     return word
 

@@ -8,8 +8,9 @@ which adds and takes away what cancels is another one. Neither depends on the or
 Whatever is not such a sum has a `shape`: a hash of its operation and its operands' shapes, the order of two
 operands of a sum or a product apart. Its two field elements are drawn from that hash.
 
-Where every lane runs every statement, sums are not kept for each lane but added up over all lanes, each times
-a random factor [`add_up_lanes`]: sums that differ in any lane then differ, but with a probability of 1 / P.
+Sums are not kept for each lane but added up over all lanes, each times a random factor [`add_up_lanes`]: sums
+that differ in any lane then differ, but with a probability of 1 / P. One that is a sum of the program is a
+number without lanes from there on: it is the same function of each lane's own pixels.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ class Number:
     @cached_property
     def term(self) -> Words:
         """What goes into a sum: the value, added up over lanes where sums are."""
-        if self.shape is None or not FACTORS:
+        if self.shape is None:
             return self.value
         if self.source:
             vector, k = self.source
@@ -97,25 +98,25 @@ class Number:
 
 
 FACTORS: dict[str, Words] = {}
-"""The factors (lanes,) of "lanes", and their "sum", where sums are added up over them; else empty."""
+"""The factors (lanes,) of "lanes", 0 of those that do not count, and their "sum"."""
 
 
 FOLDED: dict[str, NDArray[np.bool_]] = {}
 """The "lanes" (lanes,) that count, where the numbers of all of them are kept as one; else empty."""
 
 
-def add_up_lanes(count: int | None) -> None:
-    """Add up sums over so many lanes from now on; None for a sum of its own in each lane."""
+def add_up_lanes(count: NDArray[np.bool_] | None) -> None:
+    """Add up sums over the lanes that count from now on; None after a source has been run."""
     FACTORS.clear()
     FOLDED.clear()
     if count is not None:
-        FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(count)) % P
+        FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(len(count))) % P * count
         FACTORS["sum"] = FACTORS["lanes"].sum() % P
 
 
 def fold_lanes(count: NDArray[np.bool_]) -> None:
     """Keep what all lanes that count have in an array's element as one number from now on [`folded`]."""
-    add_up_lanes(1)
+    add_up_lanes(np.ones(1, dtype=bool))
     FOLDED["lanes"] = count
 
 
@@ -288,7 +289,7 @@ def equal(a: Words, b: Words) -> bool:
 
 def blended(new: Number, old: Number | None, active: NDArray[np.bool_]) -> Number:
     """Return `new` where lanes are active, and what was there before elsewhere."""
-    if FACTORS and (new.shape is None or (old is not None and old.shape is None)):
+    if new.shape is None or (old is not None and old.shape is None):
         raise Unread("sums that some items of a group make and others do not")
     if old is None:
         where = active if new.held is None else active & new.held
@@ -327,6 +328,8 @@ def part_of(value: Any, k: int | None) -> Any:
     """Return one number of a vector; anything else is itself."""
     if k is None or wide(value) == 1:
         return value
+    if "parts" in value.made:
+        return value.made["parts"][k]
     shape = None if value.shape is None else value.shape[..., k]
     given = None if value.given is None else value.given[..., k]
     ends = value.span
@@ -344,11 +347,19 @@ def repeated(number: Number, width: int) -> Number:
 
 
 def stacked(parts: list[Number]) -> Number:
-    """Return a vector of numbers, and of vectors' numbers.
+    """Return a vector of numbers, and of vectors' numbers, which keeps the former."""
+    found = _stacked(parts)
+    if all(wide(part) == 1 for part in parts):
+        found.made["parts"] = parts  # type: ignore[assignment]
+    return found
+
+
+def _stacked(parts: list[Number]) -> Number:
+    """Return a vector of numbers.
 
     Where sums are added up over lanes and one part is done, the others are: sums that nothing adds to.
     """
-    if FACTORS and any(part.shape is not None and part.given is None for part in parts):
+    if any(part.shape is not None and part.given is None for part in parts):
         parts = [leaf(part.known) if part.shape is None else part for part in parts]
     shape, done = None, all(part.shape is not None for part in parts)
     span = _spans(parts) if all(part.span for part in parts) else None

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .field import Number, Span, hull, part_of, stacked
-from .lanes import FAR, Lanes, Place, Unread, Wrong, plus, words
+from .lanes import FAR, Lanes, Place, Raw, Unread, Wrong, axis_of, plus, words
 from .words import apart, joined
 
 if TYPE_CHECKING:
@@ -26,8 +26,7 @@ LOCAL_FENCE = 1
 """What a barrier's flags must have: that it orders the memory of a group."""
 
 FLAGS = {
-    "CLK_LOCAL_MEM_FENCE": 1, "CLK_GLOBAL_MEM_FENCE": 2, "mem_flags::mem_none": 0,
-    "mem_flags::mem_device": 2, "mem_flags::mem_threadgroup": 1, "mem_flags::mem_texture": 4,
+    "CLK_LOCAL_MEM_FENCE": 1, "mem_flags::mem_threadgroup": 1,
 }  # fmt: skip
 """Flags of barriers by name."""
 
@@ -40,7 +39,7 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
     reach, or far. So for rows, with the columns far from all borders. Last are groups at both axes' borders.
     """
     steps = group[0] * pixels, group[1]
-    known, caps = _cases(steps, window, seed)
+    known, caps = _cases(steps, window, seed, every=False)
     y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
     count = len(x) * len(known[0])
     return Lanes(
@@ -54,7 +53,7 @@ def tile_lanes(steps: tuple[int, int], window: int, beyond: bool, seed: int) -> 
 
     The cases are those of groups of as many pixels [`group_lanes`].
     """
-    known, caps = _cases(steps, window, seed)
+    known, caps = _cases(steps, window, seed, every=True)
     if beyond:
         x, y = steps
         more = [
@@ -67,8 +66,14 @@ def tile_lanes(steps: tuple[int, int], window: int, beyond: bool, seed: int) -> 
     return Lanes(known, caps, np.ones(len(known[0]), dtype=bool), steps=steps)
 
 
-def _cases(steps: tuple[int, int], window: int, seed: int) -> tuple[NDArray[np.int64], tuple[int, int]]:
-    """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes."""
+def _cases(
+    steps: tuple[int, int], window: int, seed: int, every: bool
+) -> tuple[NDArray[np.int64], tuple[int, int]]:
+    """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
+
+    Near two borders are `every` pair of distances, or for each distance one of the other axis, and a whole
+    group, whose items have every pair of their own.
+    """
     random, caps = words(seed), (steps[0] + window, steps[1] + window)
 
     def drawn(case: tuple[int | None, int | None], step: int) -> tuple[int, int]:
@@ -78,9 +83,17 @@ def _cases(steps: tuple[int, int], window: int, seed: int) -> tuple[NDArray[np.i
 
     across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
     cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
-    for a, b, c, d in itertools.product((None, 0), (False, True), (None, 0), (False, True)):
-        near = [1 + next(random) % (cap + 1) if at else None for at, cap in zip((b, d), caps, strict=True)]
-        cases.append(((a, near[0]), (c, near[1])))
+    near = [range(1, cap + 2) for cap in caps]
+    pairs = [*itertools.product(*near)]
+    if not every:
+        pairs = [(n, near[1][next(random) % len(near[1])]) for n in near[0]]
+        pairs += [(near[0][next(random) % len(near[0])], n) for n in near[1]]
+        pairs = [steps] * 4 + pairs
+    for n, (b, d) in enumerate(pairs):
+        k = n if n < 4 else next(random)
+        cases.append(((0 if k % 2 else None, b), (0 if k // 2 % 2 else None, d)))
+    for a, c in itertools.product((None, 0), repeat=2):
+        cases += [((a, None), (c, None)), ((a, None), (c, steps[1])), ((a, steps[0]), (c, None))]
     return np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T, caps
 
 
@@ -141,6 +154,8 @@ class Shared:
     def _store(self, offset: Any, value: Any, machine: Machine) -> None:
         if not isinstance(value, Number) or value.shape is None or value.kind != self.kind:
             raise Unread(f"anything but numbers of one kind, or sums, in {self.name}")
+        if value.shape.shape[0] == 1 and value.literal is None:
+            raise Unread(f"numbers behind a sum in {self.name}")
         machine.written(value, self.name)
         value = self._apart(value)
         running = machine.running
@@ -197,8 +212,8 @@ class Group:
         inside, group = {}, {}
         for k, name in enumerate("xy"):
             first = lanes.place(2 * k)
-            inside[name] = lanes.constant(lanes.inside[k])
-            group[name] = Place(lanes, first.values // lanes.steps[k], first.form / lanes.steps[k])
+            inside[name] = Raw(lanes.constant(lanes.inside[k]))
+            group[name] = Raw(Place(lanes, first.values // lanes.steps[k], first.form / lanes.steps[k]))
         return {
             **dict.fromkeys(("threadIdx", "gl_LocalInvocationID", "local_invocation_id"), inside),
             **dict.fromkeys(("blockIdx", "gl_WorkGroupID", "workgroup_id"), group),
@@ -212,6 +227,6 @@ class Group:
         barriers = ("barrier", "workgroupBarrier", "__syncthreads", "threadgroup_barrier")
         return {
             **dict.fromkeys(barriers, self.wait),
-            "get_local_id": lambda machine, axis: inside[axis],
-            "get_group_id": lambda machine, axis: group[axis],
+            "get_local_id": lambda machine, axis: axis_of(inside, axis),
+            "get_group_id": lambda machine, axis: axis_of(group, axis),
         }

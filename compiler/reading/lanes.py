@@ -2,16 +2,17 @@
 
 A text may compare a coordinate with a border, or an extent with a constant, as long as the difference is a
 small constant. Which comparisons hold then depends on how far a pixel is from the borders, up to that
-constant: there is a lane for every such case of a row and of a column, each with the other axis far from all
-borders and again at random. Elsewhere coordinates are drawn, so that an index is the same polynomial of them
-or differs [Schwartz and Zippel, as in field.py].
+constant: there is a lane for every such case of a row with every one of a column. Elsewhere coordinates are
+drawn, so that an index is the same polynomial of them or differs [Schwartz and Zippel, as in field.py]. All
+integers are of 32 bits, and no larger than an index may be.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...refimpl.rng import pcg4d
 
 Mask = NDArray[np.bool_]
 
-FAR = 5000
+FAR = 1000
 """Coordinates that stand for all that are far from a border lie between one and two times this."""
 
 
@@ -39,7 +40,8 @@ class Lanes:
 
     No constant beyond `caps`, of a row and of a column, may be compared with them. Of work groups `known` has
     the first pixel's x and y, multiples of `steps`, and `inside` (2, lanes) are the items' places in their
-    group. `mask` (lanes,) are those that a branch runs in.
+    group. `mask` (lanes,) are those that a branch runs in. `channels`: the most of an image, so that no index
+    is larger [`most`].
     """
 
     known: NDArray[np.int64]
@@ -48,6 +50,13 @@ class Lanes:
     inside: NDArray[np.int64] | None = None
     steps: tuple[int, int] | None = None
     mask: Mask | None = None
+    channels: int = 1
+
+    @cached_property
+    def most(self) -> NDArray[np.int64]:
+        """The largest integer (lanes,) that a kernel needs: an index, with a border, or of its own memory."""
+        _, width, _, height = self.known + np.array(sum(self.caps) + 1)
+        return np.asarray(2**17 + self.channels * width * height)
 
     @property
     def running(self) -> Mask:
@@ -123,6 +132,21 @@ class Place:
         return found.values
 
 
+@dataclass(frozen=True)
+class Raw:
+    """A coordinate as a language brings it, no int yet: `counts` if it may be added and multiplied so."""
+
+    place: Place
+    counts: bool = True
+
+
+def axis_of(pair: Sequence[Raw], axis: Any) -> Raw:
+    """Return the coordinate of an axis."""
+    if type(axis) is not int or axis not in (0, 1):
+        raise Wrong(f"axis {axis} of a work item")
+    return pair[axis]
+
+
 def plus(a: Any, b: Any, sign: int = 1) -> Any:
     """Return a + b or a - b of integers."""
     if isinstance(a, Place):
@@ -160,9 +184,9 @@ def words(seed: int) -> Iterator[int]:
 
 
 def lanes_for(caps: tuple[int, int], step: int, beyond: bool, seed: int) -> Lanes:
-    """Return lanes of all cases: x a multiple of `step`, constants up to `caps`; `beyond` the picture too.
+    """Return lanes of all cases: x a multiple of `step`, constants up to `caps`; `beyond` the image too.
 
-    The first is far from all borders. An axis has the cases of its own cap: no comparison is of both axes.
+    The first is far from all borders. Each case of a row meets each of a column.
     """
     random = words(seed)
 
@@ -174,11 +198,9 @@ def lanes_for(caps: tuple[int, int], step: int, beyond: bool, seed: int) -> Lane
         at = (FAR + next(random) % FAR) // step * step if before is None else before
         return at, at + (FAR + next(random) % FAR if behind is None else behind)
 
-    across, down, far = pairs(caps[0], step), pairs(caps[1], 1), (None, None)
-    cases = [(far, far), *((p, far) for p in across), *((far, p) for p in down)]
-    cases += [(p, down[next(random) % len(down)]) for p in across]
-    cases += [(across[next(random) % len(across)], p) for p in down]
+    cases = itertools.product(pairs(caps[0], step), pairs(caps[1], 1))
     found = [(*drawn(p, step), *drawn(q, 1)) for p, q in cases]
+    found.insert(0, (*drawn((None, None), step), *drawn((None, None), 1)))
     if beyond:  # work items right of a picture, and below it
         found += [(step * n, step * n - k, 5, 9) for n, k in ((1, 0), (2, step), (700, 1))]
         found += [(0, 9, 7, 7), (0, 9, 4000, 3999)]

@@ -1,86 +1,99 @@
-"""The languages that are read: their parsers, their compilers' macros, and names of their own."""
+"""The languages that are read: their parsers, and names of their own."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .lanes import Unread
+from .frame import preprocessed
 from .syntax import Parser, Text
 from .wgsl_syntax import WgslParser
 
 
 @dataclass(frozen=True)
 class Language:
-    """How texts of a target are read.
+    """How sources of a target are read.
 
-    `compilers` are sets of macros between which a text may make a difference: each is checked. `within`: the
-    host calls the kernel for pixels of the picture only. `fragment`: one pixel's result is a variable.
-    `brings`: names that the text does not declare. `host`: a function of the text that calls the kernel for
-    every work item. `doubles`: a constant without a suffix is one. `of_floats`, `of_integers`: what the names
-    of other schedules than plain begin with that are read, of networks of floats and of integers.
+    `calls`: the functions and types' names that kernels call. `within`: the host calls the kernel for pixels
+    of the image only. `fragment`: one pixel's result is a variable. `brings`: names that the source does not
+    declare. `host`: a function of the source that calls the kernel for every work item. `doubles`: a constant
+    without a suffix is one. `aligned`: a vector is at a multiple of its size. `precise`: what rounds is
+    declared so. `of_floats`, `of_integers`: what the names of other schedules than plain begin with that are
+    read, of networks of floats and of integers.
     """
 
+    calls: str
     parser: type[Parser] = Parser
-    preprocessed: bool = True
-    compilers: tuple[Mapping[str, str], ...] = ({},)
     within: bool = False
     fragment: bool = False
     brings: tuple[str, ...] = ()
     host: str = ""
     doubles: bool = False
+    aligned: bool = True
+    precise: bool = False
     of_floats: tuple[str, ...] = ()
     of_integers: tuple[str, ...] = ()
 
 
-AVX512 = dict.fromkeys(("__AVX512F__", "__AVX512BW__", "__AVX512VNNI__"), "1")
-"""What compilers define for the largest processors that texts ask for."""
-
-CLANG = {
-    "__has_builtin(name)": "1", "__builtin_elementwise_floor": "floor",
-    "__builtin_convertvector(a, kind)": "((kind)(a))", **AVX512,
-    "__opencl_c_integer_dot_product_input_4x8bit_packed": "1",
-}  # fmt: skip
-"""A compiler of OpenCL C with all that texts ask for; its own functions by what they mean."""
+GLSL = "abs clamp float floor int max min uint "
+"""Functions of all versions of GLSL."""
 
 LANGUAGES: Mapping[str, Language] = {
     "opencl": Language(
-        compilers=({}, CLANG),
+        "as_float4 as_float8 as_float16 as_int as_int4 as_int8 as_int16 as_uint barrier clamp convert_float "
+        "convert_int convert_uint dot_acc_sat_4x8packed_ss_int fabs floor fmax fmin get_global_id "
+        "get_group_id get_local_id max min __builtin_ia32_vpdpbusd512",
         doubles=True,
-        brings=("CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"),
+        brings=("CLK_LOCAL_MEM_FENCE",),
         of_floats=("tile", "vector", "group", "fft"),
         of_integers=("tile", "vector", "group", "dot"),
     ),
     "c": Language(
-        compilers=(
-            {"FLT_EVAL_METHOD": "0"},
-            {"FLT_EVAL_METHOD": "0", "__GNUC__": "12", "__AVX__": "1", **AVX512},
-        ),
+        "fabsf floorf memcpy _mm512_cvtepi32_ps _mm512_dpbusd_epi32 _mm512_loadu_si512 "
+        "_mm512_set1_epi32 _mm512_storeu_ps",
         within=True,
         host="wamnet_image",
         doubles=True,
+        aligned=False,
         of_floats=("tile", "fft"),
         of_integers=("tile", "dot"),
     ),
     "opengl": Language(
-        compilers=({"GL_ARB_gpu_shader5": "1"},), within=True, fragment=True, brings=("gl_FragCoord",)
+        GLSL + "ivec2 texelFetch textureSize vec4",
+        within=True,
+        fragment=True,
+        precise=True,
+        brings=("gl_FragCoord",),
     ),
-    "glsl-es": Language(within=True, fragment=True, brings=("gl_FragCoord",)),
+    "glsl-es": Language(
+        GLSL + "ivec2 texelFetch textureSize vec4",
+        within=True,
+        fragment=True,
+        precise=True,
+        brings=("gl_FragCoord",),
+    ),
     "glsl-vulkan": Language(
-        compilers=({}, {"GL_EXT_integer_dot_product": "1"}),
+        GLSL + "barrier dotPacked4x8EXT intBitsToFloat ivec4 vec4",
+        precise=True,
         brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"),
         of_floats=("group",),
         of_integers=("group",),
     ),
-    "wgsl": Language(WgslParser, preprocessed=False, of_floats=("group",), of_integers=("group",)),
+    "wgsl": Language(
+        "abs bitcast clamp dot4I8Packed f32 floor i32 max min pack4xI8 select u32 vec4 workgroupBarrier",
+        WgslParser,
+        of_floats=("group",),
+        of_integers=("group",),
+    ),
     "metal": Language(
-        brings=tuple(f"mem_flags::mem_{a}" for a in ("none", "device", "threadgroup")),
+        "clamp fabs float4 floor int max min threadgroup_barrier",
+        brings=("mem_flags::mem_threadgroup",),
         of_floats=("group",),
         of_integers=("group",),
     ),
     "cuda": Language(
+        "__dp4a __int_as_float __syncthreads fabsf floorf fmaxf fminf make_int4 max min",
         doubles=True,
         brings=("threadIdx", "blockIdx", "blockDim"),
         of_floats=("group",),
@@ -88,11 +101,6 @@ LANGUAGES: Mapping[str, Language] = {
     ),
 }
 """By a manifest's target."""
-
-
-class Stopped(Unread):
-    """A text that is an error for a compiler: it computes nothing there."""
-
 
 READ_PROFILES = ("ieee", "exact")
 """The profiles whose sines are read, of every degree."""
@@ -108,35 +116,8 @@ def is_read(manifest: Mapping[str, Any]) -> bool:
     return bool(schedule == "plain" or schedule.startswith(begins))
 
 
-def parsed(source: str, language: Language, macros: Mapping[str, str]) -> Text:
-    """Return a text, parsed."""
-    parser = language.parser(preprocessed(source, macros) if language.preprocessed else source)
-    parser.doubles = language.doubles
+def parsed(source: str, language: Language, true: Sequence[str]) -> Text:
+    """Return a source, cleaned, as a compiler reads it for which these conditions hold."""
+    parser = language.parser(*preprocessed(source, true), {*language.calls.split(), *language.brings})
+    parser.doubles, parser.precise = language.doubles, language.precise
     return parser.parse()
-
-
-def preprocessed(source: str, macros: Mapping[str, str]) -> str:
-    """Return a text with its macros replaced and its branches chosen; other directives are left out."""
-    import pcpp
-
-    class Reader(pcpp.Preprocessor):  # type: ignore[misc]
-        def on_include_not_found(self, *given: Any) -> Any:
-            raise pcpp.OutputDirective(pcpp.Action.IgnoreAndRemove)
-
-        def on_directive_handle(self, directive: Any, *given: Any) -> Any:
-            if directive.value in ("pragma", "version", "extension"):
-                raise pcpp.OutputDirective(pcpp.Action.IgnoreAndRemove)
-            return super().on_directive_handle(directive, *given)
-
-        def on_directive_unknown(self, directive: Any, *given: Any) -> Any:
-            kind = Stopped if directive.value == "error" else Unread
-            raise kind(f"a compiler for which line {directive.lineno} is #{directive.value}")
-
-    reader = Reader()
-    reader.line_directive = None
-    for name, value in macros.items():
-        reader.define(f"{name} {value}")
-    reader.parse(source)
-    written = io.StringIO()
-    reader.write(written)
-    return written.getvalue()

@@ -1,8 +1,8 @@
 """A machine that runs the text of a kernel on the numbers of field.py, in all lanes at once.
 
-Integers are Python's, or `Place`s where lanes differ [lanes.py]. Loops run as often as they say. Reading what
-was not written, reading or writing beyond an array or a picture, and branching on a number of the picture are
-refused; so is what the machine does not know.
+Integers are Python's within 32 bits, or `Place`s where lanes differ [lanes.py]; only int32 holds a
+coordinate. Loops run as often as they say. Reading what was not written, reading or writing beyond an array
+or an image, and branching on a number of the image are rejected; so is what the machine does not know.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from .field import (
     wide,
 )
 from .groups import Group
-from .lanes import Lanes, Mask, Place, Unread, Wrong, plus, times
+from .kinds import Kinds
+from .lanes import Lanes, Mask, Place, Raw, Unread, Wrong, plus, times
 from .memory import Every, Memory, Pointer
 from .syntax import Text, Tree, Type, Variable
 
@@ -45,18 +46,22 @@ COMPARES: dict[str, Callable[[Any], Any]] = {
 MOST_TURNS = 2**16
 """Most turns of a loop: no kernel comes near, and one that does not end is refused."""
 
-BITS: dict[str, tuple[str, Callable[[int, int], int]]] = {
-    "&": ("bitwise_and", int.__and__), "|": ("bitwise_or", int.__or__), "^": ("bitwise_xor", int.__xor__),
-    ">>": ("right_shift", int.__rshift__), "<<": ("left_shift", int.__lshift__),
-}  # fmt: skip
-"""Operators of bits: a program's name of each, and what it makes of Python's integers."""
+MOST_CALLS = 8
+"""Most functions that call each other: no kernel comes near, and no function calls itself."""
 
+BITS = {
+    "&": "bitwise_and", "|": "bitwise_or", "^": "bitwise_xor", ">>": "right_shift", "<<": "left_shift",
+}  # fmt: skip
+"""Operators of bits, as a program calls them."""
+
+MOST_NUMBERS = 2**20
+"""Most numbers of an array: no kernel comes near, and more would not fit the stack of a thread."""
 
 MASK = ""
 """Where a frame keeps the lanes that declare its variables, which no other lane sees: no name is empty."""
 
 
-class Machine:
+class Machine(Kinds):
     """Runs one text: `call(name, arguments)`; `outside` are the names that the text does not declare."""
 
     def __init__(
@@ -65,17 +70,18 @@ class Machine:
         lanes: Lanes,
         outside: dict[str, Any],
         builtins: dict[str, Callable[..., Any]],
-        added: Callable[[Number, Mask], Number],
+        added: Callable[[Number], Number],
         group: Group | None = None,
         span_of: Callable[[Number, Mask], Span | None] | None = None,
     ) -> None:
         self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
-        self.group, self.span_of = group, span_of
+        self.group, self.span_of, self.aligned = group, span_of, False
         names = [(name.split("_", 2), name) for name in dir(self) if name.startswith(("_run_", "_value_"))]
         self.statements, self.forms = (
             {form: getattr(self, name) for (_, group, form), name in names if group == kind}
             for kind in ("run", "value")
         )
+        self.operators = {name[8:] for name in text.functions if name.startswith("operator")}
         self.constants: dict[str, Any] = {}
         self.loops: dict[int, together.Loop | None] = {}
         self.mask = None
@@ -100,13 +106,17 @@ class Machine:
 
     def _declare(self, variable: Variable, value: Tree | None) -> None:
         type_, given = variable.type, None if value is None else self.value(value, variable.type)
+        count = len(given) if isinstance(given, list) else wide(given)
+        if not variable.sizes and type_.kind != "auto" and count not in (1, type_.width):
+            raise Wrong(f"{variable.name} is given {count} numbers for {type_.width}")
         if variable.sizes:
-            sizes = tuple(int(self.value(size)) for size in variable.sizes)
+            sizes = tuple(self.value(size) for size in variable.sizes)
+            if not all(type(size) is int and 0 < size <= MOST_NUMBERS for size in sizes):
+                raise Wrong(f"{variable.name} is an array of {sizes}")
             memory = self._memory(variable, int(np.prod(sizes)) * type_.width)
-            held = Pointer(memory, 0, type_.width, sizes)
-            for k, one in enumerate(given or []):
-                memory.store(k * type_.width, type_.width, one, self)
-            given = held
+            if given is not None:
+                raise Unread("an array with a value")
+            given = Pointer(memory, 0, type_.width, sizes)
         elif type_.width > 1 and not type_.pointer and not (isinstance(given, list) and not numbers(given)):
             memory = Memory(variable.name, type_.width, self.mask, type_.kind)
             if given is not None:
@@ -117,6 +127,8 @@ class Machine:
 
     def _memory(self, variable: Variable, size: int) -> Any:
         """Return an array of a text: each lane's, or its group's."""
+        if size > MOST_NUMBERS:
+            raise Wrong(f"{variable.name} is an array of {size} numbers: at most {MOST_NUMBERS}")
         if not variable.shared:
             return Memory(variable.name, size, self.mask, variable.type.kind)
         if self.group is None:
@@ -150,8 +162,11 @@ class Machine:
     def call(self, name: str, given: list[Any]) -> Any:
         """Run a function of the text, and return its value."""
         function = self.text.functions[name]
-        frame = {v.name: value for v, value in zip(function.takes, given, strict=True)}
-        frame[MASK] = self.mask
+        frame: dict[str, Any] = {MASK: self.mask}
+        for v, value in zip(function.takes, given, strict=True):
+            frame |= {v.name: value, f"type of {v.name}": v.type}
+        if len(self.returned) > MOST_CALLS:
+            raise Wrong(f"{name}() calls itself")
         outer = self.base, self.entered, self.lanes.active
         self.base, self.entered = len(self.frames), self.mask
         self.frames.append(frame)
@@ -263,59 +278,23 @@ class Machine:
         self.frames.pop()
 
     def _truth(self, value: Any) -> Any:
-        if isinstance(value, (bool, int)):
-            return bool(value)
-        if isinstance(value, np.ndarray):
+        if isinstance(value, (bool, np.ndarray)):
             return value
-        raise Wrong("it branches on a number of the picture")
+        raise Wrong("it branches on a number of the image, or on an integer")
 
     # ---- expressions ---------------------------------------------------------------------------------------
 
     def value(self, tree: Tree, type_: Type | None = None) -> Any:
         """Return the value of an expression, as a type if one is given."""
         found = self.forms[tree[0]](*tree[1:])
-        if isinstance(found, Pointer) and found.sizes == ():
+        if type(found) is Pointer and found.sizes == ():
             found = found.load(self)
         return found if type_ is None else self.converted(found, type_)
-
-    def converted(self, value: Any, type_: Type) -> Any:
-        """Return what a variable of a type holds of a value."""
-        if isinstance(value, list):
-            return [self.converted(one, type_) for one in value]
-        if (
-            type_.pointer
-            or not isinstance(value, (int, Number))
-            or type_.kind == "bool"
-            or isinstance(value, bool)
-        ):
-            return value
-        if isinstance(value, int) and (
-            type_.kind == "float32" or (type_.width > 3 and type_.kind in words.LIMITS)
-        ):
-            return literal(value, type_.kind)
-        if isinstance(value, Number) and value.kind != type_.kind and value.kind != "bool":
-            return self.cast(value, type_.kind)
-        return value
-
-    def cast(self, value: Number, kind: str) -> Number:
-        """Return a number as one of another kind."""
-        if value.kind != kind and (found := words.cast(value, kind, self)) is not None:
-            return found
-        if kind not in ("float32", "int32", "uint32") or value.kind == kind:
-            return value
-        return (
-            expression("convert", value, kind=kind) if value.literal is None else literal(value.literal, kind)
-        )
 
     def _value_number(self, text: str) -> Any:
         if text not in self.constants:
             self.constants[text] = self._constant(text)
         return self.constants[text]
-
-    def _constant(self, text: str) -> Any:
-        if text.startswith(("0x", "0X")) or not any(c in text for c in ".eEf"):
-            return int(text.rstrip("uUi"), 0)
-        return literal(float(text.rstrip("fF")), "float32")
 
     def _value_name(self, name: str) -> Any:
         if name in ("true", "false"):
@@ -349,9 +328,24 @@ class Machine:
         at, found = self.value(index), self.forms[array[0]](*array[1:])
         if isinstance(found, Pointer) and found.sizes:
             return found.at(at)
+        return self._component(found, at)
+
+    def _component(self, found: Any, at: Any) -> Any:
+        """Return one number of a vector."""
+        if hasattr(found, "component"):
+            return found.component(at, self)
+        count = (
+            found.width
+            if isinstance(found, Pointer)
+            else len(found)
+            if isinstance(found, (list, tuple))
+            else wide(found)
+        )
+        if type(at) is not int or not 0 <= at < count or (count == 1 and not isinstance(found, tuple)):
+            raise Wrong(f"component {at} of {count}")
         if isinstance(found, Pointer):
             return Pointer(found.memory, plus(found.offset, at), 1, ())
-        return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
+        return found[at] if isinstance(found, (list, tuple)) else part_of(found, at)
 
     def _value_of(self, whole: Tree, member: str) -> Any:
         found = self.forms[whole[0]](*whole[1:])
@@ -367,9 +361,7 @@ class Machine:
         at = words.component(member)
         if at is None:
             raise Unread(f"member {member}")
-        if isinstance(found, (tuple, list)):
-            return found[at]
-        return found.component(at, self) if hasattr(found, "component") else part_of(found, at)
+        return self._component(found, at)
 
     def _value_unary(self, op: str, tree: Tree) -> Any:
         if op == "&":
@@ -387,12 +379,10 @@ class Machine:
             if isinstance(found, Number):
                 known = found.literal is not None
                 return literal(-found.literal, found.kind) if known else expression("negative", found)  # type: ignore[operator]
-            return times(found, -1)
+            return self.whole(times(found, -1))
         if op == "!":
             found = self._truth(found)
             return not found if isinstance(found, bool) else ~found
-        if op == "+":
-            return found
         raise Unread(f"operator {op}")
 
     def _value_sizeof(self, tree: Tree) -> int:
@@ -401,10 +391,11 @@ class Machine:
 
     def _value_binary(self, op: str, left: Tree, right: Tree) -> Any:
         a = self.value(left)
-        if op in ("&&", "||"):
+        if op == "&&" or op == "||":
+            a = self._truth(a)
             if isinstance(a, bool) and a == (op == "||"):
                 return a
-            b = self.value(right)
+            b = self._truth(self.value(right))
             if isinstance(a, bool):
                 return b
             return a & b if op == "&&" else a | b
@@ -412,15 +403,25 @@ class Machine:
 
     def operate(self, op: str, a: Any, b: Any) -> Any:
         """Return what an operator makes of two values."""
-        if f"operator{op}" in self.text.functions and wide(a) > 1:
+        if type(a) is int and type(b) is int:
+            return self.whole(self._operate_integers(op, a, b))
+        if type(a) is Number and type(b) is Number and not self.operators:
+            return self._operate_numbers(op, a, b)
+        if op in self.operators and wide(a) > 1:
             return self._call_operator(op, a, b)
         if isinstance(a, list) or isinstance(b, list):
             a, b = (stacked(one) if numbers(one) else one for one in (a, b))
         if isinstance(a, Number) or isinstance(b, Number):
-            return self._operate_numbers(op, *self.both(a, b))
+            return self._operate_numbers(op, a, b)
         if isinstance(a, Pointer):
+            if len(a.sizes) != 1 or op not in "+-" or not isinstance(b, (int, Place)):
+                raise Unread(f"operator {op} of an address")
             return Pointer(a.memory, plus(a.offset, times(b, a.width), -1 if op == "-" else 1), a.width)
-        return self._operate_integers(op, a, b)
+        if isinstance(a, Raw) and isinstance(b, Raw) and op in "+*" and a.counts:
+            return Raw(self.whole(plus(a.place, b.place) if op == "+" else times(a.place, b.place)))
+        if not all(isinstance(one, (int, Place)) and not isinstance(one, bool) for one in (a, b)):
+            raise Unread(f"operator {op} of other values than integers and numbers")
+        return self.whole(self._operate_integers(op, a, b))
 
     def _operate_integers(self, op: str, a: Any, b: Any) -> Any:
         if op in COMPARES:
@@ -433,17 +434,17 @@ class Machine:
             return plus(a, b, 1 if op == "+" else -1)
         if op == "*":
             return times(a, b)
-        if op in "/%" and isinstance(a, Place) and isinstance(b, int) and b > 0 and not a.form.any():
-            if (a.values < 0)[self.running].any():
-                raise Wrong("it divides a negative integer")
-            return self.lanes.constant(a.values // b if op == "/" else a.values % b)
-        if isinstance(a, Place) or isinstance(b, Place):
+        if op not in "/%" or not isinstance(b, int):
             raise Unread(f"operator {op} of coordinates")
-        if op in "/%" and b:
-            return int(a / b) if op == "/" else a - b * int(a / b)
-        if op in BITS:
-            return BITS[op][1](a, b)
-        raise Unread(f"operator {op}")
+        if b <= 0 or (isinstance(a, int) and a < 0):
+            raise Wrong("it divides a negative integer, or by one")
+        if isinstance(a, int):
+            return a // b if op == "/" else a % b
+        if a.form.any():
+            raise Unread(f"operator {op} of coordinates")
+        if (a.values < 0)[self.running].any():
+            raise Wrong("it divides a negative integer, or by one")
+        return self.lanes.constant(a.values // b if op == "/" else a.values % b)
 
     def _call_operator(self, op: str, a: Any, b: Any) -> Any:
         """Return what a text's own operator makes of two values."""
@@ -453,22 +454,15 @@ class Machine:
             raise Wrong(f"its operator {op} is of other vectors")
         return self.call(f"operator{op}", [a, b])
 
-    def both(self, a: Any, b: Any) -> tuple[Number, Number]:
-        """Return two numbers of one kind: an integer of the text becomes one of the other's."""
-        if isinstance(a, Number) and isinstance(b, Number):
-            return a, b
-        if not isinstance(a, (int, Number)) or not isinstance(b, (int, Number)):
-            raise Wrong("it mixes coordinates and numbers of the picture")
-        kind = next(n.kind for n in (a, b) if isinstance(n, Number))
-        kind = "int32" if kind in ("int8", "uint8") else kind
-        one, other = (n if isinstance(n, Number) else literal(n, kind) for n in (a, b))
-        return one, other
-
-    def _operate_numbers(self, op: str, a: Number, b: Number) -> Number:
+    def _operate_numbers(self, op: str, a: Any, b: Any) -> Number:
+        shift = op in ("<<", ">>")
+        a, b = self.both(a, b) if shift else self.alike(a, b)
+        if shift and (b.literal is None or not 0 <= b.literal < 32):
+            raise Unread("a shift by anything but a constant below 32")
         if (whole := words.operate(op, a, b)) is not None:
             return whole
         if op == "+":
-            return self.added(total(a, b), self.running)
+            return self.added(total(a, b))
         if op == "-":
             return difference(a, b)
         if op == "*":
@@ -482,7 +476,7 @@ class Machine:
             compared = None if "=" in op else (a, b)
             return Number(found.value, found.shape, "bool", compared=compared)
         if op in BITS:
-            return bits(BITS[op][0], a, b)
+            return bits(BITS[op], a, b)
         raise Unread(f"operator {op} of numbers")
 
     def _value_choice(self, condition: Tree, then: Tree, otherwise: Tree) -> Any:
@@ -492,9 +486,9 @@ class Machine:
         if isinstance(found, bool):
             return self.value(then if found else otherwise)
         a, b = self.value(then), self.value(otherwise)
-        if isinstance(found, Number):
-            return choice(found, *self.both(a, b))
-        return choose(self, found, a, b)
+        if isinstance(a, Number) or isinstance(b, Number):
+            a, b = self.alike(a, b)
+        return choice(found, a, b) if isinstance(found, Number) else choose(self, found, a, b)
 
     def _value_assign(self, op: str, target: Tree, value: Tree) -> Any:
         place = self.forms[target[0]](*target[1:]) if target[0] != "name" else None
@@ -508,15 +502,13 @@ class Machine:
                 return self._assign(frame, target[1], op, new)
         if not isinstance(place, Pointer) or place.sizes:
             raise Wrong("it assigns to what cannot be written")
-        if f"operator{op}=" in self.text.functions and place.width > 1:
+        if f"{op}=" in self.operators and place.width > 1:
             return self._call_operator(f"{op}=", place, new)
         if op:
             new = self.operate(op, place.load(self), new)
-        kind = getattr(place.memory, "kind", "")
-        if kind and isinstance(new, Number):
-            new = self.converted(new, Type(kind))
-        if isinstance(new, int) and not isinstance(new, bool):
-            new = literal(new, kind or "float32")
+        kind = getattr(place.memory, "kind", "") or "float32"
+        new = self.converted(new, Type(kind, place.width))
+        new = literal(new, kind) if type(new) is int else new
         place.store(new, self)
         return new
 
@@ -525,8 +517,12 @@ class Machine:
         held = frame[name]
         if op:
             new = self.operate(op, self.written(held, name), new)
-        if isinstance(held, Number) and isinstance(new, (int, Number)):
-            new = self.converted(new, Type(held.kind))
+        type_ = frame[f"type of {name}"]
+        if type_.kind == "auto":
+            type_ = Type(held.kind if isinstance(held, Number) else "int32")
+        if type_.pointer and op not in ("+", "-"):
+            raise Unread("an address that is assigned")
+        new = self.converted(new, type_)
         if self.mask is not None and self.mask is not frame.get(MASK):
             new = (
                 blended(new, held, self.mask)
@@ -544,12 +540,14 @@ class Machine:
         if type_.kind == "void":
             return None
         if type_.pointer:
-            return words.pointed(found, type_)
+            return words.pointed(found, type_, self.aligned)
         if isinstance(found, list):
+            if found != [0] and len(found) != type_.width:
+                raise Wrong(f"{len(found)} numbers for {type_.width}")
             found = self.converted(found, type_)
             return found[0] if len(found) == 1 else stacked(found)
-        if type_.kind == "int32" and isinstance(found, Place):
-            return found
+        if wide(found) not in (1, type_.width):
+            raise Wrong(f"{wide(found)} numbers for {type_.width}")
         return self.converted(found, type_)
 
 

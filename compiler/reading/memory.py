@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
-from .lanes import Mask, Place, Wrong, plus, times
+from .lanes import Mask, Place, Unread, Wrong, plus, times
 
 if TYPE_CHECKING:
     from .claim import Claim
@@ -88,6 +88,8 @@ class Memory:
 
     def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
         """Write `width` numbers, in the lanes that run."""
+        if not isinstance(value, Number):
+            raise Unread(f"anything but numbers in {self.name}")
         offset, mask = self._checked(offset, width), machine.mask
         if mask is self.mask:
             mask = None
@@ -158,7 +160,9 @@ class Texel:
     row: Any
 
     def component(self, c: int, machine: Machine) -> Number:
-        """Return a channel; the pixel must be within the picture."""
+        """Return a channel; the pixel must be within the image."""
+        if type(c) is not int or not 0 <= c < self.image.channels:
+            raise Wrong(f"image {self.image.name} has no channel {c}")
         for at, size in zip((self.column, self.row), self.image.size, strict=True):
             values = at.values if isinstance(at, Place) else np.full(size.lanes.count, at)
             if (((values < 0) | (values >= size.values)) & machine.running).any():

@@ -1,12 +1,14 @@
 """A parser of the languages that kernels are written in: C and its children; wgsl_syntax.py adds WGSL.
 
-A tree is made of tuples whose first item names the form. What the grammar below does not know is refused, so
-that no construct passes unread. Qualifiers that change no value are dropped; those of memory are kept.
+A tree is made of tuples whose first item names the form. The grammar is that of the compiler's kernels:
+anything else is rejected, so that no construct passes unread. An expression has no effect but by functions
+that it calls, and a name is declared once in a block, and is not a function's. What is outside of functions
+has been compared with a closed list already [frame.py].
 
     expression   ("number", text), ("name", n), ("call", callee, [arguments]), ("at", a, index),
                  ("of", a, member), ("unary", op, a), ("binary", op, a, b), ("choice", c, a, b),
-                 ("assign", op, target, value), ("step", op, target), ("cast", type, a), ("list", [values]),
-                 ("sizeof", a)
+                 ("cast", type, a), ("list", [values]), ("sizeof", a)
+    effect       ("assign", op, target, value), ("step", op, target), ("call", ...)
     statement    ("declare", Variable, value or None), ("declarations", [...]), ("union", name, [Variable]),
                  ("do", expression), ("for", start, condition, step, body), ("if", c, then, otherwise),
                  ("return", value or None), ("block", [statements])
@@ -15,60 +17,32 @@ that no construct passes unread. Qualifiers that change no value are dropped; th
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
+from .frame import Macros
 from .lanes import Unread
+from .tokens import tokens
 
 Tree = tuple[Any, ...]
 
-TOKEN = re.compile(
-    r"\s+|(?P<number>0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][+-]?\d+)?[fFuUhi]?)"
-    r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
-    r"|(?P<sign>->|\+\+|--|<<=|>>=|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^~!<>=?:;,.(){}\[\]@])"
-)
-"""Numbers, names, texts and signs."""
+OUTSIDE = {
+    "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
+    "device", "constant", "readonly", "uniform", "in", "out", "__device__", "__global__", "buffer",
+}  # fmt: skip
+"""Qualifiers that change no value: outside of functions frame.py has compared them."""
 
-IGNORED = {
-    *[
-        "const",
-        "static",
-        "inline",
-        "restrict",
-        "__restrict__",
-        "__restrict",
-        "volatile",
-        "extern",
-        "precise",
-        "highp",
-        "in",
-        "flat",
-        "noexcept",
-    ],
-    *[
-        "__kernel",
-        "kernel",
-        "__global",
-        "device",
-        "constant",
-        "__constant",
-        "__private",
-        "private",
-        "readonly",
-        "writeonly",
-        "uniform",
-    ],
-    *["__device__", "__global__", "__forceinline__", "buffer", "out", "smooth", "global", "shared_read"],
-}
-"""Qualifiers that change no value."""
+INSIDE = {"const", "__global", "device", "precise"}
+"""Qualifiers of what a function declares."""
 
-SHARED = {"__local", "local", "threadgroup", "__shared__", "shared"}
+SHARED = {"__local", "threadgroup", "__shared__", "shared"}
 """Qualifiers of memory that the work items of a group share."""
 
 SCALARS = {
     "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
-    "int8_t": "int8", "uint8_t": "uint8", "char": "int8", "uchar": "uint8",
-    "int32_t": "int32", "uint32_t": "uint32", "i32": "int32", "u32": "uint32", "sampler2D": "image",
+    "int8_t": "int8", "uint8_t": "uint8", "uchar": "uint8", "int32_t": "int32", "uint32_t": "uint32",
+    "i32": "int32", "u32": "uint32", "sampler2D": "image",
 }  # fmt: skip
 """Names of types of one number."""
 
@@ -125,40 +99,25 @@ class Text:
     vectors: set[str] = field(default_factory=set)
 
 
-def tokens(text: str) -> list[tuple[str, str, int]]:
-    """Return (kind, text, line) of every token; comments and lines of a preprocessor are blanks."""
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", lambda m: re.sub(r"[^\n]", " ", m[0]), text, flags=re.S)
-    text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
-    text = re.sub(r"\bunsigned int\b", "uint", text)
-    found, at = [], 0
-    while at < len(text):
-        m = TOKEN.match(text, at)
-        if not m:
-            raise Unread(f"line {text.count(chr(10), 0, at) + 1}: {text[at]!r}")
-        if m.lastgroup:
-            found.append((m.lastgroup, m[0], text.count("\n", 0, at) + 1))
-        at = m.end()
-    return found
-
-
 class Parser:
     """Reads one text: `parse()`."""
 
-    def __init__(self, text: str) -> None:
-        self.tokens, self.at, self.text = [*tokens(text), ("end", "", 0)], 0, Text()
-        self._role, self._binding, self.doubles = "", -1, False
+    def __init__(self, text: str, macros: Macros | None = None, calls: Collection[str] = ()) -> None:
+        self.tokens, self.at, self.text = [*tokens(text, macros), ("end", "", 0)], 0, Text()
+        self._role, self._binding, self.doubles, self.precise = "", -1, False, False
+        self.calls, self.scopes, self._inside, self._unset, self._precise = (
+            calls,
+            [set[str]()],
+            False,
+            "",
+            False,
+        )
         self.types = {name: Type(kind) for name, kind in SCALARS.items()}
-        for base, kind in (
-            ("float", "float32"),
-            ("int", "int32"),
-            ("uint", "uint32"),
-            ("char", "int8"),
-            ("uchar", "uint8"),
-        ):
-            self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4, 8, 16)}
+        for base in ("float", "int", "uint", "uchar"):
+            self.types |= {f"{base}{n}": Type(SCALARS[base], n) for n in (2, 4, 8, 16)}
         self.types["__m512i"] = Type("int32", 16)
-        for base, kind in (("vec", "float32"), ("ivec", "int32"), ("uvec", "uint32")):
-            self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 3, 4)}
+        for base, kind in (("vec", "float32"), ("ivec", "int32")):
+            self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 4)}
 
     # ---- tokens --------------------------------------------------------------------------------------------
 
@@ -208,10 +167,7 @@ class Parser:
         elif self._now == "extern" and self._ahead().startswith('"'):
             self.at += 2
         elif self._now == "precision":
-            self._take()
-            self._take("highp")
-            self._take()
-            self._take(";")
+            self.at += 4
         elif self._now == "typedef":
             self._typedef()
         elif self._now == "struct" and (self._ahead(2) == "{" or self._ahead() == "__align__"):
@@ -268,11 +224,18 @@ class Parser:
         found = []
         while not self._has("}"):
             _, type_ = self._qualified()
-            found.append(self._variable(type_))
+            found.append(self._variable(type_, of=True))
             while self._has(","):
-                found.append(self._variable(type_))
+                found.append(self._variable(type_, of=True))
             self._take(";")
         return found
+
+    def _declared(self, name: str) -> str:
+        """Note the name of a variable, which no type or function has, nor another one of its block."""
+        if name in self.types or name in self.calls or name in self.text.functions or name in self.scopes[-1]:
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: another {name}")
+        self.scopes[-1].add(name)
+        return name
 
     def _qualifiers(self) -> bool:
         """Skip qualifiers; return whether the variable is shared."""
@@ -281,6 +244,8 @@ class Parser:
             if self._now in SHARED:
                 shared = True
                 self._take()
+            elif self._inside and self._now not in INSIDE:
+                return shared
             elif self._now in ("layout", "__attribute__"):
                 self._take()
                 self._group_size()
@@ -292,8 +257,8 @@ class Parser:
                 if self._role == "buffer":
                     self._binding = int(self._ahead(4))
                 self._skip_brackets("[", "]")
-            elif self._now in IGNORED:
-                self._take()
+            elif self._now in OUTSIDE:
+                self._precise |= self._take() == "precise"
             else:
                 return shared
 
@@ -306,14 +271,12 @@ class Parser:
         if "reqd_work_group_size" in words:
             self.at = words["reqd_work_group_size"] + 2
             self.text.group = self._values(")")
-        if "origin_upper_left" in words or "pixel_center_integer" in words:
-            raise Unread(f"line {self.tokens[first][2]}: a layout of gl_FragCoord")
         if "binding" in words:
             self._binding = int(self.tokens[words["binding"] + 2][1])
         for axis in "xyz":
             if f"local_size_{axis}" in words:
                 self.at = words[f"local_size_{axis}"] + 2
-                self.text.group = [*self.text.group, self._choice()]
+                self.text.group = [*self.text.group, self._expression()]
         self.at = end
 
     def _qualified(self) -> tuple[bool, Type]:
@@ -331,9 +294,7 @@ class Parser:
     def _is_type(self) -> bool:
         """Return whether a type begins here."""
         kind, text, _ = self.tokens[self.at]
-        return kind == "name" and (
-            text in self.types or text in IGNORED or text in SHARED or text in ("struct", "union")
-        )
+        return kind == "name" and (text in self.types or text in INSIDE or text in SHARED or text == "union")
 
     def _type(self) -> Type:
         name = self._take()
@@ -341,9 +302,11 @@ class Parser:
             raise Unread(f"line {self.tokens[self.at - 1][2]}: type {name!r}")
         return self.types[name]
 
-    def _variable(self, type_: Type, shared: bool = False) -> Variable:
-        """Read the name and the sizes of an array."""
+    def _variable(self, type_: Type, shared: bool = False, of: bool = False) -> Variable:
+        """Read the name, `of` a member or a variable, and the sizes of an array."""
         found = Variable(self._take(), type_, shared=shared)
+        if not of:
+            self._declared(found.name)
         while self._now == "[" and self._ahead() != "[":
             self._take()
             found.sizes.append(None if self._now == "]" else self._expression())
@@ -361,7 +324,7 @@ class Parser:
             self._take()
             binding, members = self._binding, self._members()
             self.text.outside += [(member, None) for member in members]
-            self.text.bindings |= {member.name: binding for member in members}
+            self.text.bindings |= {self._declared(member.name): binding for member in members}
             if self._now != ";":
                 self._take()
             self._take(";")
@@ -374,24 +337,36 @@ class Parser:
             self.at -= 1
             self._variables(type_, shared or also, self.text.outside)
             return
+        self.scopes.append(set())
         takes = self._parameters()
-        self._qualifiers()
-        if not self._has(";"):
-            if name in self.text.functions:
-                raise Unread(f"two functions {name}()")
-            self.text.functions[name] = Function(name, takes, self._block(), type_)
+        if self._has(";"):
+            self.scopes.pop()
+            self.scopes[0].add(name)
+        else:
+            self._function(name, takes, type_)
+
+    def _function(self, name: str, takes: list[Variable], type_: Type) -> None:
+        """Read the statements of a function."""
+        if name in self.text.functions or name in self.calls:
+            raise Unread(f"two functions {name}()")
+        self._inside = True
+        self.text.functions[name] = Function(name, takes, self._block(), type_)
+        self._inside = False
+        self.scopes.pop()
+        self.scopes[0].add(name)
 
     def _parameters(self) -> list[Variable]:
         self._take("(")
-        found = []
+        found: list[Variable] = []
         while not self._has(")"):
+            if found:
+                self._take(",")
             shared, type_ = self._qualified()
             if type_.kind == "void" and self._now == ")":
                 continue
             found.append(self._variable(type_, shared))
             if found[-1].role == "buffer":
                 self.text.bindings[found[-1].name] = self._binding
-            self._has(",")
         return found
 
     def _variables(self, type_: Type, shared: bool, into: list[tuple[Variable, Any]]) -> None:
@@ -400,28 +375,34 @@ class Parser:
             own = Type(type_.kind, type_.width, pointer=True) if self._has("*") else type_
             self._qualifiers()
             found = self._variable(own, shared)
+            self._unset = found.name
             into.append((found, self._value() if self._has("=") else None))
+            self._unset = ""
+            if self.precise and self._inside and not self._precise:
+                self._check_precise(*into[-1])
             if not self._has(","):
                 break
         self._take(";")
 
+    def _check_precise(self, variable: Variable, value: Any) -> None:
+        """Reject a number that is rounded, or a part of a sum, of which the language may change the order."""
+        part = variable.sizes and not re.fullmatch(r"v\d+", variable.name)
+        if variable.type == Type("float32") and (part or (value is not None and rounds(value))):
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: {variable.name} is not declared precise")
+
     def _value(self) -> Tree:
         """Read the value of a declaration: an expression, or a list in braces."""
-        if not self._has("{"):
-            return self._expression()
-        found = []
-        while not self._has("}"):
-            found.append(self._value())
-            self._has(",")
-        return ("list", found)
+        return ("list", self._values("}")) if self._has("{") else self._expression()
 
     # ---- statements ----------------------------------------------------------------------------------------
 
     def _block(self) -> Tree:
         self._take("{")
+        self.scopes.append(set())
         found = []
         while not self._has("}"):
             found.append(self._statement())
+        self.scopes.pop()
         return ("block", found)
 
     def _statement(self) -> Tree:
@@ -429,18 +410,28 @@ class Parser:
             return self._block()
         if self._has(";"):
             return ("block", [])
-        if self._now == "_Pragma":
-            self._take()
-            self._skip_brackets("(", ")")
-            return self._statement()
         if self._now in ("for", "if", "return"):
             found: Tree = getattr(self, f"_read_{self._take()}")()
             return found
         if self._declares():
             return self._declare()
-        done = self._expression()
+        done = self._effect()
         self._take(";")
         return ("do", done)
+
+    def _effect(self) -> Tree:
+        """Read an assignment, a step, or a call."""
+        if self._now in ("++", "--"):
+            return ("step", self._take(), self._unary())
+        target = self._unary()
+        if self._now in ("++", "--"):
+            return ("step", self._take(), target)
+        if self._now in ("=", "+=", "-=", "*=", "/=", "|=", "&=", "^="):
+            op = self._take()
+            return ("assign", op[:-1], target, self._expression())
+        if target[0] != "call" and target[:2] != ("cast", Type("void")):
+            raise Unread(f"line {self.tokens[self.at][2]}: a statement without an effect")
+        return target
 
     def _declares(self) -> bool:
         """Return whether a declaration begins here: a type and a name behind it, not a cast or a call."""
@@ -449,6 +440,7 @@ class Parser:
     def _declare(self) -> Tree:
         if self._now == "union":
             return self._union()
+        self._precise = False
         shared, type_ = self._qualified()
         found: list[tuple[Variable, Any]] = []
         self._variables(type_, shared, found)
@@ -459,25 +451,33 @@ class Parser:
         """Read a union of arrays, which are the same numbers."""
         self._take("union")
         members = self._members()
-        name = self._take()
+        name = self._declared(self._take())
         self._take(";")
         return ("union", name, members)
 
     def _read_for(self) -> Tree:
         self._take("(")
+        self.scopes.append(set())
         start = self._statement()
         condition = self._expression()
         self._take(";")
-        step = self._expression()
+        step = self._effect()
         self._take(")")
-        return ("for", start, condition, step, self._statement())
+        found = ("for", start, condition, step, self._statement())
+        self.scopes.pop()
+        return found
 
     def _read_if(self) -> Tree:
         self._take("(")
         condition = self._expression()
         self._take(")")
-        then = self._statement()
-        return ("if", condition, then, self._statement() if self._has("else") else ("block", []))
+        then = self._branch()
+        return ("if", condition, then, self._branch() if self._has("else") else ("block", []))
+
+    def _branch(self) -> Tree:
+        if self._declares():
+            raise Unread(f"line {self.tokens[self.at][2]}: a declaration that is a branch")
+        return self._statement()
 
     def _read_return(self) -> Tree:
         value = None if self._now == ";" else self._expression()
@@ -487,13 +487,6 @@ class Parser:
     # ---- expressions ---------------------------------------------------------------------------------------
 
     def _expression(self) -> Tree:
-        target = self._choice()
-        if self._now in ("=", "+=", "-=", "*=", "/=", "|=", "&=", "^=", "<<=", ">>="):
-            op = self._take()
-            return ("assign", op[:-1], target, self._value() if self._now == "{" else self._expression())
-        return target
-
-    def _choice(self) -> Tree:
         condition = self._binary(0)
         if not self._has("?"):
             return condition
@@ -511,12 +504,9 @@ class Parser:
         return found
 
     def _unary(self) -> Tree:
-        if self._now in ("-", "+", "!", "~", "&", "*"):
+        if self._now in ("-", "!", "&", "*"):
             op = self._take()
             return ("unary", op, self._unary())
-        if self._now in ("++", "--"):
-            op = self._take()
-            return ("step", op, self._unary())
         if self._has("sizeof"):
             return ("sizeof", self._unary())
         cast = self._cast()
@@ -545,8 +535,9 @@ class Parser:
     def _values(self, closing: str) -> list[Tree]:
         found: list[Tree] = []
         while not self._has(closing):
+            if found:
+                self._take(",")
             found.append(self._expression())
-            self._has(",")
         return found
 
     def _primary(self) -> Tree:
@@ -557,7 +548,11 @@ class Parser:
             return ("number", self._take())
         if kind == "name":
             name = self._take()
-            return ("name", f"{name}::{self._take()}" if self._has("::") else name)
+            name = f"{name}::{self._take()}" if self._has("::") else name
+            shown = name in ("true", "false") or name in self.calls or any(name in s for s in self.scopes)
+            if not shown or name == self._unset:
+                raise Unread(f"line {line}: {name} is not declared")
+            return ("name", name)
         if text == "(":
             self._take()
             found = self._expression()
@@ -574,8 +569,6 @@ class Parser:
                 self._take("]")
             elif self._has(".") or self._has("->"):
                 found = ("of", found, self._take())
-            elif self._now in ("++", "--"):
-                found = ("step", self._take(), found)
             else:
                 return found
 
@@ -588,3 +581,13 @@ def constant(tree: Tree) -> int:
         a, b = constant(tree[2]), constant(tree[3])
         return {"+": a + b, "-": a - b, "*": a * b, "/": a // b if b else 0}[tree[1]]
     raise Unread(f"the size of a type: {tree!r}")
+
+
+def rounds(tree: Tree) -> bool:
+    """Return whether an expression is a sum, a product, or a function of numbers."""
+    form, *given = tree
+    if form == "choice":
+        return any(map(rounds, given[1:]))
+    if form in ("binary", "call"):
+        return given[0] in ("+", "-", "*", "/") or given[0] in [("name", n) for n in ("min", "max", "floor")]
+    return form in ("unary", "cast") and rounds(given[1])

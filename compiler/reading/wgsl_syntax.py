@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .lanes import Unread
-from .syntax import SCALARS, Function, Parser, Tree, Type, Variable, constant
+from .syntax import SCALARS, Parser, Tree, Type, Variable, constant
 
 MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
 """Functions that make vectors of four, by the kind of number."""
@@ -24,24 +24,21 @@ class WgslParser(Parser):
             name = self._take()
             self.text.structs[name] = self._members_of("{", "}")
             self._has(";")
-        elif word in ("var", "const", "override"):
+        elif word in ("var", "const"):
             self.at -= 1
             self.text.outside.append(self._declare()[1:])
             if binding >= 0:
                 self.text.bindings[self.text.outside[-1][0].name] = binding
-        elif word == "alias":
-            name = self._take()
-            self._take("=")
-            self.types[name] = self._type()
-            self._take(";")
-        elif word in ("requires", "enable", "diagnostic"):
-            while not self._has(";"):
-                self._take()
+        elif word == "requires":
+            self.at += 2
         elif word == "fn":
             name = self._take()
+            self.scopes.append(set())
             takes = self._members_of("(", ")")
+            for variable in takes:
+                self._declared(variable.name)
             type_ = self._type() if self._has("->") else Type("void")
-            self.text.functions[name] = Function(name, takes, self._block(), type_)
+            self._function(name, takes, type_)
         elif word != ";":
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {word!r}")
 
@@ -94,14 +91,7 @@ class WgslParser(Parser):
 
     def _type(self) -> Type:
         name = self._take()
-        if name == "ptr":
-            self._take("<")
-            self._take()
-            self._take(",")
-            found = self._sized([])
-            self._close()
-            return Type(found.kind, found.width, pointer=True)
-        if name[:3] == "vec" and name[3:4].isdigit() and self._has("<"):
+        if name in ("vec3", "vec4") and self._has("<"):
             inner = self._type()
             self._close()
             return Type(inner.kind, int(name[3]))
@@ -125,11 +115,13 @@ class WgslParser(Parser):
     def _declare(self) -> Tree:
         self._take()
         shared = False
-        if self._has("<"):
+        if not self._inside and self._has("<"):
             while not self._has(">"):
                 shared |= self._take() == "workgroup"
-        variable = self._typed(self._take(), shared)
+        variable = self._typed(self._declared(self._take()), shared)
+        self._unset = variable.name
         value = self._expression() if self._has("=") else None
+        self._unset = ""
         self._take(";")
         return ("declare", variable, value)
 

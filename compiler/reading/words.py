@@ -30,7 +30,7 @@ from ..proof.evidence import INTEGERS
 from ..proof.integer_checker import check_integers
 from .field import Number, P, Span, expression, hashed, leaf, literal, part_of, stacked, wide
 from .lanes import Unread, Wrong
-from .memory import Pointer
+from .memory import Pointer, Weights
 from .syntax import Type
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def _float(value: Number, machine: Machine) -> Number:
     if not within(value.span, (-EXACT, EXACT)):
         raise Wrong(f"a sum may be beyond {EXACT}, where float32 does not hold all integers")
     if value.shape is None:
-        return machine.added(Number(value.value, None), machine.running)
+        return machine.added(Number(value.value, None))
     return expression("convert", value, kind="float32")
 
 
@@ -358,9 +358,14 @@ class Stored:
         raise Wrong("the weights are written")
 
 
-def pointed(found: Pointer, type_: Type) -> Pointer:
-    """Return a place of a memory, as one of numbers of another type."""
+def pointed(found: Pointer, type_: Type, aligned: bool = False) -> Pointer:
+    """Return a place of a memory, as one of numbers of another type; `aligned`: a vector at its multiples."""
     kind = getattr(found.memory, "kind", "")
+    own = type_.kind == "uint8" or (
+        isinstance(found.memory, (Stored, Weights)) and found.offset % type_.width == 0
+    )
+    if aligned and type_.width > 1 and not own:
+        raise Wrong(f"a vector of {type_.width} numbers at another place than a multiple of them")
     if isinstance(found.memory, Stored) and size_of(type_.kind) == size_of(kind):
         return Pointer(found.memory.seen_as(type_.kind), found.offset, type_.width)
     if kind not in ("", type_.kind):
@@ -482,11 +487,10 @@ class Ranges:
         if number.shape is None or number.shape.ndim > 1:
             return None
         held, span = self.first.get(int(number.shape[0]), (None, None))
-        if held is None or not np.array_equal(
-            np.broadcast_to(number.shape, held.shape)[running], held[running]
-        ):
+        if held is None:
             return None
-        return span
+        same = np.broadcast_to(number.shape == held, running.shape)
+        return span if same[running].all() else None
 
     def images(self, text: str) -> dict[str, Span]:
         """Return the spans of the images' numbers by name, where a program's text is one of these."""

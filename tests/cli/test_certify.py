@@ -38,14 +38,40 @@ def test_a_text_that_was_changed_is_read(wamnet, kernel, tmp_path):
     assert wamnet("certify", kernel, "--source", mine).status == 0
 
 
-def test_a_schedule_that_is_not_read_is_said(wamnet, samples, tmp_path):
-    made = wamnet(
-        "compile", samples / "model.safetensors", "--target", "opencl", "--schedule", "vector16", "-o", "v"
-    )
-    assert made.status == 0
-    outcome = wamnet("certify", tmp_path / "v")
-    assert outcome.status == 0
-    assert "text: " in outcome.out.splitlines()[-1]
+def test_a_schedule_that_is_not_read_is_said(wamnet, samples):
+    """A certificate that holds is not enough for status 0, unless the source is left out."""
+    path = samples / "model.safetensors"
+    assert wamnet("compile", path, "--target", "glsl", "--schedule", "inlined", "-o", "v").status == 0
+    outcome = wamnet("certify", "v")
+    assert outcome.status == 3
+    assert "text: not checked: " in outcome.out.splitlines()[-1]
+    assert wamnet("certify", "v", "--no-text").status == 0
+
+
+@pytest.mark.parametrize("line", ['#include "/etc/passwd"', "#include </dev/zero>", "#ifdef __OPTIMIZE__"])
+def test_a_source_with_another_directive_is_not_checked(wamnet, kernel, tmp_path, line):
+    """No file that a source names is opened."""
+    (tmp_path / "mine.cl").write_text(f"{line}\n{(kernel / 'denoise.cl').read_text()}")
+    outcome = wamnet("certify", kernel, "--source", "mine.cl")
+    assert outcome.status == 3
+    assert "root" not in outcome.out
+
+
+@pytest.mark.parametrize("key", ["entry_point", "centre"])
+def test_entry_point_and_centre_are_bound(wamnet, kernel, key):
+    """CER-5: a manifest with another one is refused, and so is a certificate without one."""
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    changed = {"entry_point": "main", "window": {**manifest["window"], "centre": 0}}
+    place = "entry_point" if key == "entry_point" else "window"
+    path.write_text(json.dumps({**manifest, place: changed[place]}))
+    assert "refused: " in wamnet("certify", kernel).out
+    certificate = kernel / "denoise.certificate.json"
+    stated = json.loads(certificate.read_text())
+    del stated[key]
+    path.write_text(json.dumps(manifest))
+    certificate.write_text(json.dumps(stated))
+    assert wamnet("certify", kernel).status != 0
 
 
 def test_a_text_that_is_not_there_is_a_bad_file(refused, kernel):

@@ -56,8 +56,10 @@ LOOP = "for (int i = 0; i < 4; ++i) {{ {} }}"
     ],
 )
 def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, read):
-    text = Parser(f"void f() {{ {LOOP.format(body)} }}").parse()
-    (loop,) = text.functions["f"].body[1]
+    text = Parser(
+        f"void g(float *x, float *y, float b) {{ {LOOP.format(body)} }}", {}, {"f", "fmaxf"}
+    ).parse()
+    (loop,) = text.functions["g"].body[1]
     assert (together.read_loop(*loop[1:]) is not None) == read
 
 
@@ -77,7 +79,7 @@ def test_loops_of_arrays_that_overlap_are_run_turn_by_turn(body, turns, monkeypa
     monkeypatch.setattr(Machine, "_run_turns", lambda *given: (at_once.append(given[2]), run(*given)))
     try:
         field.fold_lanes(np.ones(lanes.count, dtype=bool))
-        machine = Machine(text, lanes, {}, BUILTINS, lambda number, running: number)
+        machine = Machine(text, lanes, {}, BUILTINS, lambda number: number)
         if "(float4)(1.0f); LOOP { x" in body:
             with pytest.raises(Wrong, match="4 numbers for 1"):
                 machine.call("f", [])

@@ -15,7 +15,6 @@ from wamnet.compiler.reading.lanes import Unread
 from wamnet.kernels.export.shelf import random_model
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
 
 CERTIFIED = [
     *(("whole", way) for way in ("opencl tile16", "opencl plain", "opencl fft32", "c fft32")),

@@ -1,10 +1,7 @@
 """Experiments about what is proven: the table of kernels, and faults that are planted in texts."""
 
 import certified
-import pytest
 import text_faults
-
-pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
 
 
 def test_a_kernel_is_a_row(capsys, monkeypatch):

@@ -26,7 +26,7 @@ PEERS = {
 
 ALLOWED = {
     "refimpl": {"numpy"},
-    "compiler": {"numpy", "safetensors", "pcpp", "onnx", "google"},
+    "compiler": {"numpy", "safetensors", "onnx", "google"},
     "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", "PIL", *PEERS},
     "spec": {"numpy"},
     "cli": {

@@ -18,8 +18,6 @@ from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 
-pytest.importorskip("pcpp", reason="the preprocessor of texts is missing: pip install 'wamnet[cli]'")
-
 WAYS = [
     (row.name, where, schedule)
     for row in TARGETS.values()

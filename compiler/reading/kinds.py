@@ -1,0 +1,115 @@
+"""Kinds of values in a source: what a constant is, and what becomes of a value that is of another kind.
+
+Nothing is converted that no kernel converts: a coordinate is an int32, a truth is a bool, and no operator is
+of two kinds. Integers are of 32 bits, and no larger than an index may be.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from . import words
+from .field import ZERO, Number, expression, literal
+from .lanes import Lanes, Place, Raw, Unread, Wrong
+from .memory import Pointer
+from .syntax import Type
+
+PROMOTED = {"int8": "int32", "uint8": "int32"}
+"""Kinds of integers that operators take for larger ones."""
+
+
+class Kinds:
+    """What a machine knows of kinds [machine.py]."""
+
+    lanes: Lanes
+
+    def converted(self, value: Any, type_: Type) -> Any:
+        """Return what a variable of a type holds of a value."""
+        kind = type_.kind
+        plain = (isinstance(value, Number) and value.kind == kind) or (type(value) is int and kind == "int32")
+        if plain and not type_.pointer and (kind != "int32" or type_.width <= 2):
+            return value
+        if isinstance(value, list):
+            return [self.converted(one, type_) for one in value]
+        address = isinstance(value, Pointer) and value.sizes != ()
+        if type_.pointer != address and kind != "auto" and not type_.reference:
+            raise Unread(f"an address, or none, as {kind}")
+        if isinstance(value, (Pointer, dict)) or value is None or kind == "auto":
+            return value
+        if isinstance(value, Number):
+            return (
+                value
+                if "bool" in (kind, value.kind) and self._is_truth(value, kind, type_.width)
+                else self.cast(value, kind)
+            )
+        if kind == "bool" or (isinstance(value, np.ndarray) and not isinstance(value, Place)):
+            if kind != "bool" or not isinstance(value, (bool, np.ndarray)):
+                raise Unread(f"a truth, or an integer, as {kind}")
+            return value
+        if kind == "int32" and type_.width <= 2:
+            return value.place if isinstance(value, Raw) else int(value) if isinstance(value, bool) else value
+        limits = words.LIMITS.get(kind, (-words.EXACT, words.EXACT))
+        if type(value) is not int or not limits[0] <= value <= limits[1]:
+            raise Unread(f"a coordinate, or {value!r}, as {kind}")
+        return literal(value, kind)
+
+    def _is_truth(self, value: Number, kind: str, width: int) -> bool:
+        """Refuse a truth as a number, and a number as a truth; vectors of truths are vectors of integers."""
+        if width == 1 and (kind == "bool") != (value.kind in ("bool", ZERO)):
+            raise Unread(f"{value.kind} as {kind}")
+        return True
+
+    def cast(self, value: Number, kind: str) -> Number:
+        """Return a number as one of another kind."""
+        if value.kind != kind and (found := words.cast(value, kind, self)) is not None:
+            return found
+        if kind not in ("float32", "int32", "uint32") or value.kind == kind:
+            return value
+        return (
+            expression("convert", value, kind=kind) if value.literal is None else literal(value.literal, kind)
+        )
+
+    def _constant(self, text: str) -> Any:
+        if text[:2] in ("0x", "0X") or not any(c in text for c in ".eEfF"):
+            value = int(text.rstrip("uU"), 0)
+            if value >= 2**31 and (text[-1] not in "uU" or value >= 2**32):
+                raise Wrong(f"{text} is no integer of 32 bits")
+            return literal(value, "uint32") if text[-1] in "uU" else value
+        exact, value = Fraction(text.rstrip("fF")), np.float32(text.rstrip("fF"))
+        if not np.isfinite(value) or 4 * abs(exact - Fraction(float(value))) > Fraction(
+            float(np.spacing(abs(value)))
+        ):
+            raise Unread(f"{text}, which is no number that float32 holds")
+        return literal(float(value), "float32")
+
+    def whole(self, value: Any) -> Any:
+        """Return an integer, or a truth: `Wrong` for one that may not fit 32 bits."""
+        if type(value) is int:
+            if not -(2**31) <= value < 2**31:
+                raise Wrong(f"{value} is no integer of 32 bits")
+        elif isinstance(value, Place) and (np.abs(value.values) > self.lanes.most)[self.running].any():
+            raise Wrong("an integer is larger than an index of an image")
+        return value
+
+    def both(self, a: Any, b: Any) -> tuple[Number, Number]:
+        """Return two numbers of one kind: an integer of the text becomes one of the other's."""
+        if isinstance(a, Number) and isinstance(b, Number):
+            return a, b
+        if any(isinstance(n, bool) or not isinstance(n, (int, Number)) for n in (a, b)):
+            raise Wrong("it mixes coordinates, or truths, and numbers of the image")
+        kind = next(n.kind for n in (a, b) if isinstance(n, Number))
+        kind = "int32" if kind in ("int8", "uint8") else kind
+        one, other = (n if isinstance(n, Number) else literal(n, kind) for n in (a, b))
+        return one, other
+
+    def alike(self, a: Any, b: Any) -> tuple[Number, Number]:
+        """Return two numbers of one kind; `Unread` of two kinds."""
+        if type(a) is Number and type(b) is Number and a.kind == b.kind:
+            return a, b
+        one, other = self.both(a, b)
+        if PROMOTED.get(one.kind, one.kind) != PROMOTED.get(other.kind, other.kind):
+            raise Unread(f"numbers of {one.kind} and {other.kind}")
+        return one, other

@@ -1,0 +1,59 @@
+"""A check within limits: a source may make its reader work for ever, or fill the memory."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..proof.evidence import Refused
+from .lanes import Unread
+
+SECONDS = 60
+"""Most seconds of computing time."""
+
+BYTES = 2**30
+"""Most memory, in addition to what the process has."""
+
+
+def limited(check: Callable[..., Any], *given: Any) -> Any:
+    """Return what a function returns in a process of its own; `Unread` if that takes too much.
+
+    Where there is no fork, as on Windows, there are no limits either.
+    """
+    if "fork" not in multiprocessing.get_all_start_methods():
+        return check(*given)
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_answer, args=(there, check, given))
+    process.start()
+    there.close()
+    try:
+        answer = here.recv()
+    except EOFError:
+        answer = Unread(f"a source that takes more than {SECONDS} s of computing time, or {BYTES >> 20} MB")
+    process.join()
+    if isinstance(answer, Exception):
+        raise answer
+    return answer
+
+
+def _answer(to: Any, check: Callable[..., Any], given: Any) -> None:
+    """Send what a function returns, or why it refuses."""
+    import resource
+
+    with suppress(OSError):  # where the system does not report what the process has, that is not limited
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        most = pages * resource.getpagesize() + BYTES
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+    try:
+        answer: Any = check(*given)
+    except (Refused, Unread) as error:
+        answer = error
+    except MemoryError:
+        return
+    to.send(answer)

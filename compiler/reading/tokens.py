@@ -1,0 +1,73 @@
+"""The words of a source without its comments and directives, macros replaced: `tokens`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from .frame import Macros
+from .lanes import Unread
+
+Token = tuple[str, str, int]
+"""Its kind, its text, and its line."""
+
+TOKEN = re.compile(
+    r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][+-]?\d+)?[fFuU]?)(?![\w.]))"
+    r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
+    r"|(?P<sign>->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^!<>=?:;,.(){}\[\]@])"
+)
+"""Numbers, names, texts and signs."""
+
+MOST_TOKENS = 2**20
+"""Most tokens of a source: no kernel comes near."""
+
+
+def tokens(text: str, macros: Macros | None = None) -> list[Token]:
+    """Return (kind, text, line) of every token of a source without comments, macros replaced."""
+    text = re.sub(r"\bunsigned int\b", "uint", text)
+    found, at, line = [], 0, 1
+    while at < len(text):
+        m = TOKEN.match(text, at)
+        if not m:
+            raise Unread(f"line {line}: {text[at : at + 20]!r}")
+        if m.lastgroup:
+            found.append((m.lastgroup, m[0], line))
+        line += m[0].count("\n")
+        at = m.end()
+    own = {name: (takes, tokens(body)) for name, (takes, body) in (macros or {}).items()}
+    found = [*_expanded(found, own)]
+    if len(found) > MOST_TOKENS:
+        raise Unread(f"{len(found)} tokens: at most {MOST_TOKENS} are read")
+    return found
+
+
+def _expanded(given: list[Token], macros: Mapping[str, Any]) -> Iterator[Token]:
+    """Yield tokens, macros replaced: each by what it is, and by that once."""
+    at = 0
+    while at < len(given):
+        kind, text, line = given[at]
+        at += 1
+        if kind != "name" or text not in macros:
+            yield given[at - 1]
+            continue
+        takes, body = macros[text]
+        parts: list[list[Token]] = [[]]
+        if takes is not None:
+            if at == len(given) or given[at][1] != "(":
+                raise Unread(f"line {line}: {text} without its arguments")
+            depth = 1
+            while depth and (at := at + 1) < len(given):
+                sign = given[at][1]
+                depth += (sign in "([{") - (sign in ")]}")
+                if sign == "," and depth == 1:
+                    parts.append([])
+                elif depth:
+                    parts[-1].append(given[at])
+            at += 1
+            if depth or len(parts) != len(takes):
+                raise Unread(f"line {line}: arguments of {text}")
+        values = dict(zip(takes or (), parts, strict=False))
+        rest = {name: macro for name, macro in macros.items() if name != text}
+        done = [one for token in body for one in values.get(token[1], [(token[0], token[1], line)])]
+        yield from _expanded(done, rest)

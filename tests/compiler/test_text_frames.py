@@ -1,0 +1,91 @@
+"""The language around a kernel's arithmetic: what no source may have is rejected, by class (spec/text.md)."""
+
+import functools
+
+import pytest
+import text_faults
+from texts import kernel, parts
+
+from wamnet.compiler.core import sine
+from wamnet.compiler.proof.evidence import Refused
+from wamnet.compiler.reading import frame
+from wamnet.compiler.reading.check import check_text, run_text
+from wamnet.compiler.reading.frames import FRAMES
+from wamnet.compiler.reading.lanes import Unread
+from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.reading.limits import limited
+
+CASES = [(what, target, old, new) for what, targets, old, new in text_faults.CLASSES for target in targets]
+"""Every class of faults, in every language that it is one of."""
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """Return a function of the parts of a target's plain kernel."""
+    folder = tmp_path_factory.mktemp("plain")
+    return functools.cache(lambda target: parts(kernel(folder / target, target)))
+
+
+@pytest.mark.parametrize(("what", "target", "old", "new"), CASES, ids=[f"{t}: {w}" for w, t, *_ in CASES])
+def test_faults_of_the_language_are_rejected(plain, what, target, old, new):
+    """TXT-1, TXT-5, TXT-8: each was accepted by an earlier source check, or is of the same class."""
+    source, *others = plain(target)
+    assert old in source
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(source.replace(old, new, 1), *others)
+
+
+@pytest.mark.parametrize("target", sorted(LANGUAGES))
+def test_a_foreign_word_is_rejected_anywhere(plain, target):
+    """The mirror of the classes above: no other word is before a word of a kernel."""
+    source, *others = plain(target)
+    kinds = ("a foreign word", "a line lost")
+    every = [fault for fault in text_faults.faults(source) if fault.kind in kinds]
+    for fault in every[:: len(every) // 45]:
+        with pytest.raises((Refused, Unread), match=r"\S"):
+            run_text(source[: fault.start] + fault.new + source[fault.end :], *others)
+
+
+@pytest.mark.parametrize("target", sorted(LANGUAGES))
+def test_a_frame_accepts_itself_without_repetition(target):
+    """Every pattern of a closed list is one that some item of the list has, and no other pattern has it."""
+    items = list(frame.items(frame.cleaned(FRAMES[target]), target == "wgsl"))
+    assert len(items) == len(set(items)) == len({pattern for pattern, _ in frame.allowed(target)})
+
+
+def test_a_wrong_sine_of_the_compiler_is_found(monkeypatch, tmp_path):
+    """TXT-4: the checkers have a sine of their own."""
+    right = sine.POLYNOMIALS[11]
+    wrong = tuple(c * (1.01 if k == 1 else 1.0) for k, c in enumerate(right.coefficients))
+    polynomials = {**sine.POLYNOMIALS, 11: sine.Polynomial(wrong, 0.0, right.error, right.cosine_error)}
+    monkeypatch.setattr(sine, "POLYNOMIALS", polynomials)
+    path = kernel(tmp_path, "c")
+    with pytest.raises(Refused, match="never made"):
+        check_text(path)
+
+
+@pytest.mark.parametrize(
+    "new",
+    [
+        f"    int q = {'(' * 100_000}1{')' * 100_000};\n    for",
+        "    " + "{" * 50_000 + "}" * 50_000 + "\n    for",
+        "    wamnet_image(image_color, image_normal, weights, result, width, height);\n    for",
+    ],
+)
+def test_deep_sources_are_not_checked(plain, new):
+    source, *others = plain("c")
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(source.replace("    for", new, 1), *others)
+
+
+def test_a_source_that_never_ends_is_not_checked(plain, monkeypatch):
+    monkeypatch.setattr("wamnet.compiler.reading.limits.SECONDS", 1)
+    source, *others = plain("c")
+    loops = "".join(f"for (int q{k} = 0; q{k} < 3000; ++q{k}) {{ " for k in range(3)) + "}" * 3
+    with pytest.raises(Unread, match="more than 1 s"):
+        limited(run_text, source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1), *others)
+
+
+def test_a_source_that_fills_the_memory_is_not_checked():
+    with pytest.raises(Unread, match="1024 MB"):
+        limited(bytearray, 2**31)

@@ -119,12 +119,12 @@ def overlapped(
     work: Callable[[Loaded], Result],
     write: Callable[[Item, Result], None],
     advance: Callable[[float], None],
-) -> list[tuple[Item, WamnetError]]:
+) -> list[tuple[Item, Exception]]:
     """Read, work on and write each item; return those that failed, and why.
 
     Only the work is done in the caller's thread.
     """
-    failed: list[tuple[Item, WamnetError]] = []
+    failed: list[tuple[Item, Exception]] = []
     reading: deque[tuple[Item, Future[Loaded]]] = deque()
     writing: deque[tuple[Item, Future[None]]] = deque()
 
@@ -134,7 +134,7 @@ def overlapped(
             item, written = writing.popleft()
             try:
                 written.result()
-            except WamnetError as error:
+            except (WamnetError, OSError) as error:
                 failed.append((item, error))
             advance(1)
 
@@ -148,7 +148,7 @@ def overlapped(
             item, loaded = reading.popleft()
             try:
                 result = work(loaded.result())
-            except WamnetError as error:
+            except (WamnetError, OSError) as error:
                 failed.append((item, error))
                 advance(1)
             else:

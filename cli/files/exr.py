@@ -181,9 +181,14 @@ def read_frame(
 
 
 def read_origin(path: Path) -> str | None:
-    """Return the text that names the origin of a frame, or None."""
+    """Return the text that names the origin of a frame; None if the file is damaged, "" without a text."""
     with suppress(InputError):
-        return max(part.text(INFO_PREFIX + ORIGIN) for part in read_headers(path).parts)
+        file = read_headers(path)
+        origin = max(part.text(INFO_PREFIX + ORIGIN) for part in file.parts)
+        # A file that is cut short has all of its header.
+        if origin:
+            _load(file)
+        return origin
     return None
 
 

@@ -24,7 +24,7 @@ from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRIT
 from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
 from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from . import osmesa
+from . import llvmpipe, osmesa
 from .executor import Denoiser, Executor, Kernel, Memory, Size, is_denoiser
 from .registry import CONTEXT_VARIABLE
 
@@ -59,9 +59,6 @@ HOW_TO_GET = {
 }
 """What to do when a kind of context cannot be had, in Debian's words."""
 
-
-SOFTWARE = "llvmpipe"
-"""What the renderer's name holds if it is Mesa's, on a processor."""
 
 SOFTWARE_SCHEDULE = "inlined"
 """Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
@@ -118,7 +115,7 @@ class OpenGLExecutor(Executor):
         # current, and do nothing when it is asked to change.
         with self._context:
             self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
-        if SOFTWARE in self.device:
+        if llvmpipe.NAME in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
             name, least = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
             self.schedule_reason = f"built-in choice for software, {name} from {least} pixels on"
@@ -145,6 +142,7 @@ class OpenGLExecutor(Executor):
             weights = None
             if is_denoiser(kernel):
                 self._check_promise(kernel)
+                self._check_loops(kernel)
                 if "group" in kernel.manifest["schedule"]:
                     return self._compile_compute(kernel)
                 weights = self._weights(kernel)
@@ -160,6 +158,16 @@ class OpenGLExecutor(Executor):
             raise CompileError(
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
                 "native, which then promises nothing, or executor opencl or numpy"
+            )
+
+    def _check_loops(self, artifact: Denoiser) -> None:
+        """Refuse loops that Mesa's software renderer ends too early."""
+        count = llvmpipe.iterations(artifact.source) if llvmpipe.NAME in self.device else 0
+        if count > llvmpipe.MOST_ITERATIONS:
+            raise CompileError(
+                f"{self.device}: the kernel's loops take {count} iterations, and from about "
+                f"{llvmpipe.MOST_ITERATIONS} on this renderer ends loops early, without an error; "
+                "use executor c, opencl or numpy, or a variant with fewer products"
             )
 
     def _discard(self, prepared: _Prepared) -> None:

@@ -22,6 +22,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels import denoise_on, open_executor
+from wamnet.kernels.devices import llvmpipe
 from wamnet.kernels.devices.images import black
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
@@ -84,6 +85,33 @@ def test_the_paper_s_network(denoiser, kit):
     random = np.random.default_rng(5)
     images = {name: random.uniform(-1, 1, (13, 17, 3)).astype(np.float32) for name in ("color", "normal")}
     assert kit.excess(denoiser, program, images) <= 1
+
+
+@pytest.mark.parametrize(("hidden", "runs"), [([64], False), ([48, 48], True)])
+def test_mesa_s_loops_are_complete_or_refused(executor_named, kit, hidden, runs):
+    """llvmpipe ends loops after 65535 iterations in all: sums over five images have more with 64 neurons."""
+    executor = executor_named("opengl-egl")
+    channels = dict.fromkeys("abcde", 3)
+    program = kit.denoiser(kit.network([960, *hidden, 3], (3.0, 3.0)), channels, 8, "clamp")
+    random = np.random.default_rng(7)
+    images = {name: random.uniform(-1, 1, (3, 4, 3)).astype(np.float32) for name in channels}
+    artifact = compile_program(program, executor.name)
+    if not runs and llvmpipe.NAME in executor.device:
+        with pytest.raises(
+            CompileError, match=r"loops take 69\d+ iterations.*use executor c, opencl or numpy"
+        ):
+            executor.build(artifact)
+    else:
+        assert kit.excess(executor, program, images, artifact) <= 1
+
+
+def test_iterations_of_loops():
+    """What is unrolled counts as nothing, another loop once more than its body."""
+    inner = "for (int j = 0; j < {} ; ++j) {{\n x;\n}}\n".replace(" ;", ";").format
+    outer = "#define SIZE 5\nfor (int i = 0; i < SIZE; ++i) {{\n{}}}\n".format
+    assert llvmpipe.iterations(outer(inner(32))) == 0
+    assert llvmpipe.iterations(outer(inner(33))) == 5 * 34 + 6
+    assert llvmpipe.iterations("void main()\n{\n" + inner(40) + inner(50) + "}\n") == 41 + 51
 
 
 def test_target_s_own_sine_on_opencl(executor_named, kit):

@@ -24,7 +24,7 @@ BUDGET = {
     "compiler/scenes": 3150,
     "compiler/training": 1200,
     "kernels": 620,
-    "kernels/devices": 2735,
+    "kernels/devices": 2800,
     "kernels/run": 3475,
     "kernels/judge": 1475,
     "kernels/bench": 4850,

@@ -45,7 +45,9 @@ def check(path: Path) -> dict[str, Any]:
         promise: Any = PROMISES.get(held["sine"]["text"])
         if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
             raise Refused("sine: nobody promises it")
-        same("sine", manifest["sine"]["text"], promise.text)
+        stated = manifest["sine"]
+        same("sine", [stated["text"], stated["domain"]], [promise.text, held["sine"]["domain"]])
+        _at_least("manifest: error of the sine", [stated["error"]], [promise.error], exact=True)
         _at_least("sine: error_bound", [held["sine"]["error_bound"]], [promise.error], exact=True)
         same("layers", len(held["layers"]), len(layers))
         matrices, own, tables, joint = [], [], None, {}

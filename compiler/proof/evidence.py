@@ -58,8 +58,36 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     digest = hashlib.sha256(text.encode() + pieces).hexdigest()
     same("digest of the program in the certificate", held["program_digest"], digest)
     same("digest of the program in the manifest", manifest["program"], digest)
+    check_manifest(manifest, text, len(raw))
     same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
     return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
+
+
+def check_manifest(manifest: Any, text: str, count: int) -> None:
+    """Refuse a manifest by which a host calls the kernel of another program.
+
+    Window, images in their order, ranges and output are the program's, and what counts is an integer.
+    Formula: CER-5.
+    """
+    same("manifest: schema", manifest["schema"], "wamnet-artifact-1")
+    window, output, schedule = (manifest[key] for key in ("window", "output", "schedule"))
+    given = manifest["images"]
+    counted = [window["size"], window["centre"], output["channels"], *(image["channels"] for image in given)]
+    counted += [manifest["weights"]["count"], *schedule.get("group", ())]
+    counted += [schedule.get(key, 1) for key in ("pixels", "rows")]
+    same("manifest: sizes are integers above -1", all(type(n) is int and n >= 0 for n in counted), True)
+    names = [manifest["target"], manifest["entry_point"], schedule["name"]]
+    same("manifest: target, entry point and schedule are texts", all(isinstance(n, str) for n in names), True)
+    (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
+    size = window["size"]
+    same("manifest: window", [size, size, window["border"]], [int(taps[0]), int(taps[1]), taps[2]])
+    images = re.findall(r"(?m)^  image (\w+): (\d+)( whole)? in \[(\S+), (\S+)\]$", text)
+    wanted = [[name, int(n), bool(w), float(low), float(high)] for name, n, w, low, high in images]
+    stated = [[i["name"], i["channels"], i.get("whole", False), i["low"], i["high"]] for i in given]
+    same("manifest: images", stated, wanted)
+    same("program: ranges of images", all(low <= high for *_, low, high in wanted), True)
+    same("manifest: output", [output["name"]], re.findall(r"(?m)^  output (\w+) = %\d+$", text))
+    same("manifest: numbers of weights.bin", manifest["weights"]["count"], count)
 
 
 def places(name: str, place: Any, most: int) -> Any:

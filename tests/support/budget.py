@@ -18,7 +18,7 @@ BUDGET = {
     "compiler/core": 3500,
     "compiler/importing": 1560,
     "compiler/languages": 2725,
-    "compiler/proof": 3160,
+    "compiler/proof": 3190,
     "compiler/reading": 4900,
     "compiler/schedules": 4650,
     "compiler/scenes": 3150,

@@ -99,7 +99,6 @@ def sequence_rows(folder: Path, size: int, count: int, rounds: int) -> list[str]
         "wamnet denoise, C": command("c"),
         "wamnet denoise, OpenCL": command("opencl"),
         "Open Image Denoise, fast": library("fast"),
-        "Open Image Denoise, high": library("high"),
     }
     runs: dict[str, list[tuple[float, int]]] = {name: [] for name in programs}
     for _ in range(rounds):

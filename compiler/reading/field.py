@@ -81,8 +81,8 @@ class Number:
 
     @cached_property
     def term(self) -> Words:
-        """What goes into a sum: the value, added up over lanes where sums are."""
-        if self.shape is None:
+        """What goes into a sum: the value, added up over lanes while a source is run."""
+        if self.shape is None or not FACTORS:
             return self.value
         if self.source:
             vector, k = self.source

@@ -64,11 +64,11 @@ def cleaned(source: str) -> str:
             raise Unread("a directive that continues behind a comment")
         return m[0] if m[0][0] == '"' else " " + "\n" * m[0].count("\n")
 
-    found = COMMENT.sub(blank, source)
+    blanked = COMMENT.sub(blank, source)
     for sign in ("/*", "*/"):
-        if sign in found:
-            raise Unread(f"line {found.count(chr(10), 0, found.index(sign)) + 1}: {sign!r}")
-    return found
+        if sign in blanked:
+            raise Unread(f"line {blanked.count(chr(10), 0, blanked.index(sign)) + 1}: {sign!r}")
+    return blanked
 
 
 def normal(text: str) -> str:
@@ -130,7 +130,7 @@ def allowed(target: str) -> list[tuple[re.Pattern[str], bool]]:
     """Return patterns of the items of a target's list, and whether there may be several of each."""
     images = IMAGES.get(target, "IMAGE")
     vector = {"opencl": "vector", "cuda": "wamnet_vector", "metal": "float4"}.get(target, "vec4")
-    found = []
+    patterns = []
     for item in items(cleaned(FRAMES[target]), target == "wgsl"):
         words = [
             f"{images}(?: , {images})*" if word == "IMAGES" else HOLES.get(word, re.escape(word))
@@ -138,8 +138,8 @@ def allowed(target: str) -> list[tuple[re.Pattern[str], bool]]:
         ]
         pattern = "".join(words).replace("VECTOR v", vector + " v")
         pattern = re.sub(r"\b(?:IMAGE|INT)\b", lambda m: HOLES[m[0]], pattern)
-        found.append((re.compile(pattern), bool(REPEATED.search(item))))
-    return found
+        patterns.append((re.compile(pattern), bool(REPEATED.search(item))))
+    return patterns
 
 
 def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
@@ -178,8 +178,8 @@ def preprocessed(source: str, true: Sequence[str]) -> tuple[str, Macros]:
             continue
         word, _, rest = normal(line).removeprefix("# ").removeprefix("#").partition(" ")
         if word in ("if", "ifdef", "ifndef"):
-            known = rest in holds or rest in macros
-            branches.append([known != (word == "ifndef"), known != (word == "ifndef")])
+            holding = rest in holds or rest in macros
+            branches.append([holding != (word == "ifndef"), holding != (word == "ifndef")])
         elif word in ("elif", "else"):
             branches[-1] = [not branches[-1][1] and (word == "else" or rest in holds), True]
         elif word == "endif":

@@ -372,11 +372,11 @@ extern "C" __global__ void %cuda-kernel%
 def _put_together() -> dict[str, str]:
     """Return the lists by name, their pieces in place."""
     parts = re.split(r"(?m)^== (\S+) ==\n", LISTS)[1:]
-    found = dict(zip(parts[::2], parts[1::2], strict=True))
-    for name in found:
-        while re.search(r"%[a-z-]+%", found[name]):
-            found[name] = re.sub(r"%([a-z-]+)%", lambda m: found[m[1]], found[name])
-    return found
+    lists = dict(zip(parts[::2], parts[1::2], strict=True))
+    for name in lists:
+        while re.search(r"%[a-z-]+%", lists[name]):
+            lists[name] = re.sub(r"%([a-z-]+)%", lambda m: lists[m[1]], lists[name])
+    return lists
 
 
 FRAMES: Mapping[str, str] = _put_together()

@@ -64,8 +64,8 @@ class Kinds:
 
     def cast(self, value: Number, kind: str) -> Number:
         """Return a number as one of another kind."""
-        if value.kind != kind and (found := words.cast(value, kind, self)) is not None:
-            return found
+        if value.kind != kind and (other := words.cast(value, kind, self)) is not None:  # type: ignore[arg-type]  # type: ignore[arg-type]
+            return other
         if kind not in ("float32", "int32", "uint32") or value.kind == kind:
             return value
         return (
@@ -78,19 +78,19 @@ class Kinds:
             if value >= 2**31 and (text[-1] not in "uU" or value >= 2**32):
                 raise Wrong(f"{text} is no integer of 32 bits")
             return literal(value, "uint32") if text[-1] in "uU" else value
-        exact, value = Fraction(text.rstrip("fF")), np.float32(text.rstrip("fF"))
-        if not np.isfinite(value) or 4 * abs(exact - Fraction(float(value))) > Fraction(
-            float(np.spacing(abs(value)))
+        exact, nearest = Fraction(text.rstrip("fF")), np.float32(text.rstrip("fF"))
+        if not np.isfinite(nearest) or 4 * abs(exact - Fraction(float(nearest))) > Fraction(
+            float(np.spacing(abs(nearest)))
         ):
             raise Unread(f"{text}, which is no number that float32 holds")
-        return literal(float(value), "float32")
+        return literal(float(nearest), "float32")
 
     def whole(self, value: Any) -> Any:
         """Return an integer, or a truth: `Wrong` for one that may not fit 32 bits."""
         if type(value) is int:
             if not -(2**31) <= value < 2**31:
                 raise Wrong(f"{value} is no integer of 32 bits")
-        elif isinstance(value, Place) and (np.abs(value.values) > self.lanes.most)[self.running].any():
+        elif isinstance(value, Place) and (np.abs(value.values) > self.lanes.most)[self.lanes.running].any():
             raise Wrong("an integer is larger than an index of an image")
         return value
 

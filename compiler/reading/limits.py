@@ -18,16 +18,16 @@ BYTES = 2**30
 """Most memory, in addition to what the process has."""
 
 
-def limited(check: Callable[..., Any], *given: Any) -> Any:
+def limited(check: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a function returns in a process of its own; `Unread` if that takes too much.
 
     Where there is no fork, as on Windows, there are no limits either.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
-        return check(*given)
+        return check(*arguments)
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_answer, args=(there, check, given))
+    process = context.Process(target=_answer, args=(there, check, arguments))
     process.start()
     there.close()
     try:
@@ -40,8 +40,8 @@ def limited(check: Callable[..., Any], *given: Any) -> Any:
     return answer
 
 
-def _answer(to: Any, check: Callable[..., Any], given: Any) -> None:
-    """Send what a function returns, or why it refuses."""
+def _answer(to: Any, check: Callable[..., Any], arguments: Any) -> None:
+    """Send what a function returns, or why it rejects."""
     import resource
 
     with suppress(OSError):  # where the system does not report what the process has, that is not limited
@@ -51,7 +51,7 @@ def _answer(to: Any, check: Callable[..., Any], given: Any) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
     try:
-        answer: Any = check(*given)
+        answer: Any = check(*arguments)
     except (Refused, Unread) as error:
         answer = error
     except MemoryError:

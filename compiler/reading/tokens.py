@@ -26,44 +26,44 @@ MOST_TOKENS = 2**20
 def tokens(text: str, macros: Macros | None = None) -> list[Token]:
     """Return (kind, text, line) of every token of a source without comments, macros replaced."""
     text = re.sub(r"\bunsigned int\b", "uint", text)
-    found, at, line = [], 0, 1
+    result, at, line = [], 0, 1
     while at < len(text):
         m = TOKEN.match(text, at)
         if not m:
             raise Unread(f"line {line}: {text[at : at + 20]!r}")
         if m.lastgroup:
-            found.append((m.lastgroup, m[0], line))
+            result.append((m.lastgroup, m[0], line))
         line += m[0].count("\n")
         at = m.end()
     own = {name: (takes, tokens(body)) for name, (takes, body) in (macros or {}).items()}
-    found = [*_expanded(found, own)]
-    if len(found) > MOST_TOKENS:
-        raise Unread(f"{len(found)} tokens: at most {MOST_TOKENS} are read")
-    return found
+    result = [*_expanded(result, own)]
+    if len(result) > MOST_TOKENS:
+        raise Unread(f"{len(result)} tokens: at most {MOST_TOKENS} are read")
+    return result
 
 
-def _expanded(given: list[Token], macros: Mapping[str, Any]) -> Iterator[Token]:
+def _expanded(sequence: list[Token], macros: Mapping[str, Any]) -> Iterator[Token]:
     """Yield tokens, macros replaced: each by what it is, and by that once."""
     at = 0
-    while at < len(given):
-        kind, text, line = given[at]
+    while at < len(sequence):
+        kind, text, line = sequence[at]
         at += 1
         if kind != "name" or text not in macros:
-            yield given[at - 1]
+            yield sequence[at - 1]
             continue
         takes, body = macros[text]
         parts: list[list[Token]] = [[]]
         if takes is not None:
-            if at == len(given) or given[at][1] != "(":
+            if at == len(sequence) or sequence[at][1] != "(":
                 raise Unread(f"line {line}: {text} without its arguments")
             depth = 1
-            while depth and (at := at + 1) < len(given):
-                sign = given[at][1]
+            while depth and (at := at + 1) < len(sequence):
+                sign = sequence[at][1]
                 depth += (sign in "([{") - (sign in ")]}")
                 if sign == "," and depth == 1:
                     parts.append([])
                 elif depth:
-                    parts[-1].append(given[at])
+                    parts[-1].append(sequence[at])
             at += 1
             if depth or len(parts) != len(takes):
                 raise Unread(f"line {line}: arguments of {text}")

@@ -35,8 +35,8 @@ BUDGET = {
     "cli": 320,
     "cli/commands": 6265,
     "cli/common": 1350,
-    "cli/course": 6125,
-    "cli/files": 2160,
+    "cli/course": 6150,
+    "cli/files": 2200,
     "cli/reports": 1450,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""

@@ -147,6 +147,12 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("groups of another size", ("wgsl",), "@workgroup_size(8, 8)", "@workgroup_size(1, 1)"),
     ("another axis", ("opencl",), "get_global_id(1)", "get_global_id(-1)"),
     ("another axis", ("cuda",), "blockIdx.y * blockDim.y", "blockIdx.y * blockDim.x"),
+    ("a result in another order", ("opengl",), "result[i] = ", "result.bgra[i] = "),
+    ("a member that is none", ("opengl",), "result[i] = ", "result.other[i] = "),
+    ("a version that is not first", ("opengl",), "#version", "#define WINDOW_SIZE 3\n#version"),
+    ("a version behind a comment", ("glsl-es",), "#version", "/* */\n#version"),
+    ("a precision behind what it is for", ("glsl-es",), "precision highp sampler2D;",
+     "uniform sampler2D image_other;\nprecision highp sampler2D;"),
     ("a constant of other bits", C_LIKE, "0.318309873f", "0.318309885f"),
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""

@@ -160,6 +160,11 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
         seen |= {at, item}
         if (FIRST.search(item) and k > functions[0]) or (LAST.search(item) and k < functions[-1]):
             raise Unread(f"{item[:100]!r} at another place")
+        behind = [one for one in own[:k] if one.startswith(("uniform", "layout"))]
+        if (item.startswith("# version") and k) or (item.startswith("precision") and behind):
+            raise Unread(f"{item[:100]!r} behind {own[k - 1][:100]!r}")
+    if target == "glsl-es" and not source.startswith("#version"):
+        raise Unread("a source that does not begin with its version")
     needs = NEEDS.get(target, {})
     for words in needs.get("all", ()) + needs.get("floats", ()) * floats + needs.get("exact", ()) * exact:
         if not any(words in item for item in own):

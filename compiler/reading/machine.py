@@ -351,14 +351,15 @@ class Machine(Kinds):
         found = self.forms[whole[0]](*whole[1:])
         if isinstance(found, dict):
             return found[member]
-        if isinstance(found, Pointer) and found.sizes in ((), (None,)) and words.component(member) is None:
+        at = words.component(member)
+        own = any(member == v.name for members in self.text.structs.values() for v in members)
+        if isinstance(found, Pointer) and found.sizes in ((), (None,)) and at is None and own:
             vector = member in self.text.vectors
             return Pointer(
                 found.memory, found.offset, *((found.width, ()) if vector else (1, (found.width,)))
             )
         if isinstance(found, Pointer):
             found = found.load(self)
-        at = words.component(member)
         if at is None:
             raise Unread(f"member {member}")
         return self._component(found, at)

@@ -63,7 +63,7 @@ def of_one(name: str) -> Callable[..., Any]:
 
 def conversion(kind: str) -> Callable[..., Any]:
     """Return a conversion to a kind of number."""
-    return lambda machine, a: machine.converted(a, Type(kind))
+    return lambda machine, a: machine.converted(a, Type(kind), stated=True)
 
 
 def as_int(machine: Machine, a: Number) -> Number:

@@ -116,7 +116,7 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
     names |= {name: known[name] for name in language.brings if name in known}
     span_of = claim.ranges.of if claim.stated else None
     machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group, span_of)
-    machine.aligned = language.aligned
+    machine.aligned, machine.mixes = language.aligned, language.mixes
     if group and text.group and [machine.value(n) for n in text.group][:2] != size:
         raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
     entry = manifest["entry_point"]

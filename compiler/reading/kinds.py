@@ -25,9 +25,10 @@ class Kinds:
     """What a machine knows of kinds [machine.py]."""
 
     lanes: Lanes
+    mixes: int
 
-    def converted(self, value: Any, type_: Type) -> Any:
-        """Return what a variable of a type holds of a value."""
+    def converted(self, value: Any, type_: Type, stated: bool = False) -> Any:
+        """Return what a variable of a type holds of a value; `stated`: a conversion is written."""
         kind = type_.kind
         plain = (isinstance(value, Number) and value.kind == kind) or (type(value) is int and kind == "int32")
         if plain and not type_.pointer and (kind != "int32" or type_.width <= 2):
@@ -49,6 +50,8 @@ class Kinds:
             if kind != "bool" or not isinstance(value, (bool, np.ndarray)):
                 raise Unread(f"a truth, or an integer, as {kind}")
             return value
+        if not stated and self.mixes < (2 if isinstance(value, Raw) else kind in ("float32", "uint32")):
+            raise Unread(f"an integer as {kind} without a conversion")
         if kind == "int32" and type_.width <= 2:
             return value.place if isinstance(value, Raw) else int(value) if isinstance(value, bool) else value
         limits = words.LIMITS.get(kind, (-words.EXACT, words.EXACT))
@@ -101,6 +104,8 @@ class Kinds:
         if any(isinstance(n, bool) or not isinstance(n, (int, Number)) for n in (a, b)):
             raise Wrong("it mixes coordinates, or truths, and numbers of the image")
         kind = next(n.kind for n in (a, b) if isinstance(n, Number))
+        if not self.mixes and kind in ("float32", "uint32"):
+            raise Unread(f"an integer and a number of {kind}")
         kind = "int32" if kind in ("int8", "uint8") else kind
         one, other = (n if isinstance(n, Number) else literal(n, kind) for n in (a, b))
         return one, other

@@ -10,16 +10,50 @@ from .frame import preprocessed
 from .syntax import Parser, Text
 from .wgsl_syntax import WgslParser
 
+RESERVED = (
+    "active alignas alignof and asm atomic_uint attribute auto bitand bitor bool break buffer case cast "
+    "catch centroid char class coherent common complex concept const const_cast constant constexpr "
+    "continue decltype default delete device discard do double dvec2 dvec3 dvec4 else enum explicit "
+    "export extern external false filter fixed flat float for friend global goto half highp hvec2 hvec3 "
+    "hvec4 if inline inout input int interface invariant isampler2D kernel layout local long lowp mat2 "
+    "mat3 mat4 mediump mutable namespace new noexcept noinline noperspective not operator or out output "
+    "partition patch precise precision private protected public quad readonly read_only register restrict "
+    "return sample sampler sampler2D sampler3D samplerCube shared short signed sizeof smooth static "
+    "struct subroutine superp switch template this thread threadgroup throw true try typedef typeid "
+    "typename typeof uint ulong union uniform unsigned using ushort usampler2D varying vec2 vec3 vec4 "
+    "vertex virtual void volatile while write_only writeonly xor"
+)
+"""Words that no name is in some of C and its children."""
+
+RESERVED_IN_WGSL = (
+    "NULL Self abstract active alias alignas alignof as asm asm_fragment async attribute auto await "
+    "become break case cast catch class co_await co_return co_yield coherent column_major common compile "
+    "compile_fragment concept const const_assert const_cast consteval constexpr constinit continue "
+    "continuing crate debugger decltype default delete demote demote_to_helper diagnostic discard do "
+    "dynamic_cast else enable enum explicit export extends extern external fallthrough false filter final "
+    "finally fn for friend from fxgroup get goto groupshared highp if impl implements import inline "
+    "instanceof interface layout let loop lowp macro macro_rules match mediump meta mod module move mut "
+    "mutable namespace new nil noexcept noinline nointerpolation non_coherent noncoherent noperspective "
+    "null nullptr of operator override package packoffset partition pass patch pixelfragment precise "
+    "precision premerge priv protected pub public readonly ref regardless register reinterpret_cast "
+    "require requires resource restrict return self set shared sizeof smooth snorm static static_assert "
+    "static_cast std struct subroutine super switch target template this thread_local throw trait true "
+    "try type typedef typeid typename typeof union unless unorm unsafe unsized use using var varying "
+    "virtual volatile wgsl where while with writeonly yield"
+)
+"""Words that no name is in WGSL (16.1, 16.2)."""
+
 
 @dataclass(frozen=True)
 class Language:
     """How sources of a target are read.
 
-    `calls`: the functions and types' names that kernels call. `within`: the host calls the kernel for pixels
-    of the image only. `fragment`: one pixel's result is a variable. `brings`: names that the source does not
-    declare. `host`: a function of the source that calls the kernel for every work item. `doubles`: a constant
-    without a suffix is one. `aligned`: a vector is at a multiple of its size. `precise`: what rounds is
-    declared so. `of_floats`, `of_integers`: what the names of other schedules than plain begin with that are
+    `calls`: the functions and types' names that kernels call. `within`: the host calls the kernel for
+    pixels of the image only. `fragment`: one pixel's result is a variable. `brings`: names that the source
+    does not declare. `host`: a function of the source that calls the kernel for every work item. `doubles`:
+    a constant without a suffix is one. `aligned`: a vector is at a multiple of its size. `precise`: what
+    rounds is declared so. `mixes`: 2 if kinds of numbers become others without a word, 1 if integers become
+    floats. `of_floats`, `of_integers`: what the names of other schedules than plain begin with that are
     read, of networks of floats and of integers.
     """
 
@@ -31,6 +65,8 @@ class Language:
     host: str = ""
     doubles: bool = False
     aligned: bool = True
+    mixes: int = 2
+    reserved: str = RESERVED
     precise: bool = False
     of_floats: tuple[str, ...] = ()
     of_integers: tuple[str, ...] = ()
@@ -65,6 +101,7 @@ LANGUAGES: Mapping[str, Language] = {
         fragment=True,
         precise=True,
         brings=("gl_FragCoord",),
+        mixes=1,
     ),
     "glsl-es": Language(
         GLSL + "ivec2 texelFetch textureSize vec4",
@@ -72,6 +109,7 @@ LANGUAGES: Mapping[str, Language] = {
         fragment=True,
         precise=True,
         brings=("gl_FragCoord",),
+        mixes=0,
     ),
     "glsl-vulkan": Language(
         GLSL + "barrier dotPacked4x8EXT intBitsToFloat ivec4 vec4",
@@ -79,12 +117,15 @@ LANGUAGES: Mapping[str, Language] = {
         brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"),
         of_floats=("group",),
         of_integers=("group",),
+        mixes=1,
     ),
     "wgsl": Language(
         "abs bitcast clamp dot4I8Packed f32 floor i32 max min pack4xI8 select u32 vec4 workgroupBarrier",
         WgslParser,
         of_floats=("group",),
         of_integers=("group",),
+        mixes=0,
+        reserved=RESERVED_IN_WGSL,
     ),
     "metal": Language(
         "clamp fabs float4 floor int max min threadgroup_barrier",
@@ -120,4 +161,5 @@ def parsed(source: str, language: Language, true: Sequence[str]) -> Text:
     """Return a source, cleaned, as a compiler reads it for which these conditions hold."""
     parser = language.parser(*preprocessed(source, true), {*language.calls.split(), *language.brings})
     parser.doubles, parser.precise = language.doubles, language.precise
+    parser.reserved = frozenset(language.reserved.split())
     return parser.parse()

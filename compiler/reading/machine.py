@@ -75,7 +75,7 @@ class Machine(Kinds):
         span_of: Callable[[Number, Mask], Span | None] | None = None,
     ) -> None:
         self.text, self.lanes, self.builtins, self.added = text, lanes, builtins, added
-        self.group, self.span_of, self.aligned = group, span_of, False
+        self.group, self.span_of, self.aligned, self.mixes = group, span_of, False, 2
         names = [(name.split("_", 2), name) for name in dir(self) if name.startswith(("_run_", "_value_"))]
         self.statements, self.forms = (
             {form: getattr(self, name) for (_, group, form), name in names if group == kind}

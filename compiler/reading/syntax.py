@@ -105,6 +105,7 @@ class Parser:
     def __init__(self, text: str, macros: Macros | None = None, calls: Collection[str] = ()) -> None:
         self.tokens, self.at, self.text = [*tokens(text, macros), ("end", "", 0)], 0, Text()
         self._role, self._binding, self.doubles, self.precise = "", -1, False, False
+        self._fixed, self.reserved = False, frozenset[str]()
         self.calls, self.scopes, self._inside, self._unset, self._precise = (
             calls,
             [set[str]()],
@@ -230,12 +231,27 @@ class Parser:
             self._take(";")
         return found
 
-    def _declared(self, name: str) -> str:
-        """Note the name of a variable, which no type or function has, nor another one of its block."""
+    def _declared(self, name: str, fixed: bool = False) -> str:
+        """Note the name of a variable, which no type or function has, nor another one of its block.
+
+        A `fixed` one is not assigned to: this is noted by a name with a blank.
+        """
+        if name in self.reserved or "__" in name or name.startswith("gl_") or not name.strip("_"):
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: {name}, which is reserved")
         if name in self.types or name in self.calls or name in self.text.functions or name in self.scopes[-1]:
             raise Unread(f"line {self.tokens[self.at - 1][2]}: another {name}")
-        self.scopes[-1].add(name)
+        self.scopes[-1] |= {name, f"{name} is fixed"} if fixed else {name}
         return name
+
+    def _writes(self, target: Tree) -> Tree:
+        """Return what is written, which no declaration forbids."""
+        inner = target
+        while inner[0] in ("at", "of"):
+            inner = inner[1]
+        scope: set[str] = next((s for s in reversed(self.scopes) if inner[1] in s), set())
+        if f"{inner[1]} is fixed" in scope:
+            raise Unread(f"line {self.tokens[self.at][2]}: {inner[1]}, a constant, is written")
+        return target
 
     def _qualifiers(self) -> bool:
         """Skip qualifiers; return whether the variable is shared."""
@@ -258,7 +274,9 @@ class Parser:
                     self._binding = int(self._ahead(4))
                 self._skip_brackets("[", "]")
             elif self._now in OUTSIDE:
-                self._precise |= self._take() == "precise"
+                word = self._take()
+                self._precise |= word == "precise"
+                self._fixed |= word == "const"
             else:
                 return shared
 
@@ -306,7 +324,7 @@ class Parser:
         """Read the name, `of` a member or a variable, and the sizes of an array."""
         found = Variable(self._take(), type_, shared=shared)
         if not of:
-            self._declared(found.name)
+            self._declared(found.name, self._fixed and not type_.pointer)
         while self._now == "[" and self._ahead() != "[":
             self._take()
             found.sizes.append(None if self._now == "]" else self._expression())
@@ -361,6 +379,7 @@ class Parser:
         while not self._has(")"):
             if found:
                 self._take(",")
+            self._fixed = False
             shared, type_ = self._qualified()
             if type_.kind == "void" and self._now == ")":
                 continue
@@ -422,13 +441,13 @@ class Parser:
     def _effect(self) -> Tree:
         """Read an assignment, a step, or a call."""
         if self._now in ("++", "--"):
-            return ("step", self._take(), self._unary())
+            return ("step", self._take(), self._writes(self._unary()))
         target = self._unary()
         if self._now in ("++", "--"):
-            return ("step", self._take(), target)
+            return ("step", self._take(), self._writes(target))
         if self._now in ("=", "+=", "-=", "*=", "/=", "|=", "&=", "^="):
             op = self._take()
-            return ("assign", op[:-1], target, self._expression())
+            return ("assign", op[:-1], self._writes(target), self._expression())
         if target[0] != "call" and target[:2] != ("cast", Type("void")):
             raise Unread(f"line {self.tokens[self.at][2]}: a statement without an effect")
         return target
@@ -440,7 +459,7 @@ class Parser:
     def _declare(self) -> Tree:
         if self._now == "union":
             return self._union()
-        self._precise = False
+        self._precise = self._fixed = False
         shared, type_ = self._qualified()
         found: list[tuple[Variable, Any]] = []
         self._variables(type_, shared, found)

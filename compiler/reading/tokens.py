@@ -13,7 +13,7 @@ Token = tuple[str, str, int]
 """Its kind, its text, and its line."""
 
 TOKEN = re.compile(
-    r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][+-]?\d+)?[fFuU]?)(?![\w.]))"
+    r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+(?=[eE]))(?:[eE][+-]?\d+)?[fF]?|(?!0\d)\d+[uU]?)(?![\w.]))"
     r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
     r"|(?P<sign>->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^!<>=?:;,.(){}\[\]@])"
 )

@@ -10,12 +10,19 @@ from .syntax import SCALARS, Parser, Tree, Type, Variable, constant
 MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
 """Functions that make vectors of four, by the kind of number."""
 
+ARITHMETIC, RELATIONS = {"+", "-", "*", "/", "%"}, {"==", "!=", "<", ">", "<=", ">="}
+"""Operators of WGSL that may stand in an operand of some others without brackets."""
+
 SEEN = {"float32": "as_float", "int32": "as_int", "uint32": "as_uint"}
 """Functions that take bits for another kind's, by that kind."""
 
 
 class WgslParser(Parser):
     """Reads one text of WGSL."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._brackets: set[int] = set()
 
     def _outside(self) -> None:
         binding = self._attributes()
@@ -36,7 +43,7 @@ class WgslParser(Parser):
             self.scopes.append(set())
             takes = self._members_of("(", ")")
             for variable in takes:
-                self._declared(variable.name)
+                self._declared(variable.name, fixed=True)
             type_ = self._type() if self._has("->") else Type("void")
             self._function(name, takes, type_)
         elif word != ";":
@@ -101,6 +108,45 @@ class WgslParser(Parser):
             return Type(name)
         raise Unread(f"line {self.tokens[self.at - 1][2]}: type {name!r}")
 
+    def _expression(self) -> Tree:
+        return self._binary(0)
+
+    def _binary(self, level: int) -> Tree:
+        """Read an expression; operators that bind in no stated order need brackets."""
+        found = super()._binary(level)
+        if found[0] == "binary":
+            for n, operand in enumerate(found[2:]):
+                if operand[0] == "binary" and id(operand) not in self._brackets:
+                    own = {found[1]} if n == 0 and found[1] in ("&&", "||", "&", "|", "^") else set[str]()
+                    least = RELATIONS | ARITHMETIC if found[1] in ("&&", "||") else ARITHMETIC
+                    shifts = {"<<", ">>"} if found[1] in RELATIONS | {"&&", "||"} else set[str]()
+                    inner = own if found[1] in ("&", "|", "^", "<<", ">>") else own | least | shifts
+                    if operand[1] not in inner:
+                        raise Unread(f"{operand[1]} in an operand of {found[1]} without brackets")
+        return found
+
+    def _effect(self) -> Tree:
+        if self._now in ("++", "--"):
+            raise Unread(f"line {self.tokens[self.at][2]}: {self._now} before a name")
+        found = super()._effect()
+        if found[0] == "call" and found[1][1] in self.calls and "arrier" not in found[1][1]:
+            raise Unread(f"line {self.tokens[self.at][2]}: the value of {found[1][1]} is not used")
+        return found
+
+    def _read_for(self) -> Tree:
+        return self._braced(super()._read_for())
+
+    def _read_if(self) -> Tree:
+        found = super()._read_if()
+        self._braced(found[:3])
+        return found if found[3][0] == "if" else self._braced(found)
+
+    def _braced(self, found: Tree) -> Tree:
+        """Return a statement whose last part is a block."""
+        if found[-1][0] != "block":
+            raise Unread(f"line {self.tokens[self.at][2]}: a statement without braces")
+        return found
+
     def _close(self) -> None:
         """Take `>`, of `>>` the first."""
         kind, text, line = self.tokens[self.at]
@@ -113,12 +159,14 @@ class WgslParser(Parser):
         return self._now in ("var", "let", "const")
 
     def _declare(self) -> Tree:
-        self._take()
+        word = self._take()
         shared = False
+        if self._inside and word == "const":
+            raise Unread(f"line {self.tokens[self.at][2]}: a const in a function")
         if not self._inside and self._has("<"):
             while not self._has(">"):
                 shared |= self._take() == "workgroup"
-        variable = self._typed(self._declared(self._take()), shared)
+        variable = self._typed(self._declared(self._take(), word != "var"), shared)
         self._unset = variable.name
         value = self._expression() if self._has("=") else None
         self._unset = ""
@@ -141,4 +189,7 @@ class WgslParser(Parser):
             if found.kind not in made or found.width != (4 if made is MADE else found.width):
                 raise Unread(f"line {line}: vectors of other numbers")
             return ("name", made[found.kind])
-        return super()._primary()
+        bracket = self._now == "("
+        made_of = super()._primary()
+        self._brackets |= {id(made_of)} if bracket else set()
+        return made_of

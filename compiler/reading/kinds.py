@@ -67,7 +67,7 @@ class Kinds:
 
     def cast(self, value: Number, kind: str) -> Number:
         """Return a number as one of another kind."""
-        if value.kind != kind and (other := words.cast(value, kind, self)) is not None:  # type: ignore[arg-type]  # type: ignore[arg-type]
+        if value.kind != kind and (other := words.cast(value, kind, self)) is not None:  # type: ignore[arg-type]
             return other
         if kind not in ("float32", "int32", "uint32") or value.kind == kind:
             return value

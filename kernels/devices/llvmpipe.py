@@ -32,8 +32,8 @@ def iterations(source: str) -> int:
     for line in source.splitlines():
         if line.rstrip().endswith("{"):
             loop = LOOP.match(line)
-            count = constants.get(loop[1], loop[1]) if loop else ""
-            blocks.append((int(count) if count.isdigit() else 0, inside))
+            limit = str(constants.get(loop[1], loop[1])) if loop else ""
+            blocks.append((int(limit) if limit.isdigit() else 0, inside))
             inside = 0
         elif line.strip() == "}" and blocks:
             count, before = blocks.pop()

@@ -23,9 +23,9 @@ from typing import Any
 
 from .frame import Macros
 from .lanes import Unread
-from .tokens import tokens
-
-Tree = tuple[Any, ...]
+from .tokens import Tree as Tree
+from .tokens import constant as constant
+from .tokens import rounds, tokens
 
 OUTSIDE = {
     "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
@@ -590,23 +590,3 @@ class Parser:
                 found = ("of", found, self._take())
             else:
                 return found
-
-
-def constant(tree: Tree) -> int:
-    """Return the value of an expression of literal integers."""
-    if tree[0] == "number":
-        return int(tree[1].rstrip("uU"), 0)
-    if tree[0] == "binary" and tree[1] in ("+", "-", "*", "/"):
-        a, b = constant(tree[2]), constant(tree[3])
-        return {"+": a + b, "-": a - b, "*": a * b, "/": a // b if b else 0}[tree[1]]
-    raise Unread(f"the size of a type: {tree!r}")
-
-
-def rounds(tree: Tree) -> bool:
-    """Return whether an expression is a sum, a product, or a function of numbers."""
-    form, *given = tree
-    if form == "choice":
-        return any(map(rounds, given[1:]))
-    if form in ("binary", "call"):
-        return given[0] in ("+", "-", "*", "/") or given[0] in [("name", n) for n in ("min", "max", "floor")]
-    return form in ("unary", "cast") and rounds(given[1])

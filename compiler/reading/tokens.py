@@ -9,6 +9,9 @@ from typing import Any
 from .frame import Macros
 from .lanes import Unread
 
+Tree = tuple[Any, ...]
+"""An expression: its form, then its parts."""
+
 Token = tuple[str, str, int]
 """Its kind, its text, and its line."""
 
@@ -71,3 +74,23 @@ def _expanded(sequence: list[Token], macros: Mapping[str, Any]) -> Iterator[Toke
         rest = {name: macro for name, macro in macros.items() if name != text}
         done = [one for token in body for one in values.get(token[1], [(token[0], token[1], line)])]
         yield from _expanded(done, rest)
+
+
+def constant(tree: Tree) -> int:
+    """Return the value of an expression of literal integers."""
+    if tree[0] == "number":
+        return int(tree[1].rstrip("uU"), 0)
+    if tree[0] == "binary" and tree[1] in ("+", "-", "*", "/"):
+        a, b = constant(tree[2]), constant(tree[3])
+        return {"+": a + b, "-": a - b, "*": a * b, "/": a // b if b else 0}[tree[1]]
+    raise Unread(f"the size of a type: {tree!r}")
+
+
+def rounds(tree: Tree) -> bool:
+    """Return whether an expression is a sum, a product, or a function of numbers."""
+    form, *given = tree
+    if form == "choice":
+        return any(map(rounds, given[1:]))
+    if form in ("binary", "call"):
+        return given[0] in ("+", "-", "*", "/") or given[0] in [("name", n) for n in ("min", "max", "floor")]
+    return form in ("unary", "cast") and rounds(given[1])

@@ -11,7 +11,7 @@ MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
 """Functions that make vectors of four, by the kind of number."""
 
 ARITHMETIC, RELATIONS = {"+", "-", "*", "/", "%"}, {"==", "!=", "<", ">", "<=", ">="}
-"""Operators of WGSL that may stand in an operand of some others without brackets."""
+"""Operators of WGSL that may be in an operand of some others without brackets."""
 
 SEEN = {"float32": "as_float", "int32": "as_int", "uint32": "as_uint"}
 """Functions that take bits for another kind's, by that kind."""

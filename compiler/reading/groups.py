@@ -1,7 +1,8 @@
 """Work groups: which groups are run, the memory that their items share, and barriers.
 
 Lanes are the items of a few groups, one group behind the other. Two items race for an element of the shared
-memory where one writes it and another reads or writes it with no barrier between both.
+memory where one writes it and another reads or writes it with no barrier between both; nor may an item write
+what it has read itself.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from .words import apart, joined
 if TYPE_CHECKING:
     from .machine import Machine
 
-NOBODY, SEVERAL = -1, -2
-"""Who has read or written an element since the last barrier, where that is not one item."""
+NOBODY = -1
+"""Who has written an element since the last barrier, where no item has."""
+
+SOME = 32
+"""How many pairs of distances of a group from two borders are drawn in each run."""
 
 LOCAL_FENCE = 1
 """What a barrier's flags must have: that it orders the memory of a group."""
@@ -71,8 +75,8 @@ def _cases(
 ) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
 
-    Near two borders are `every` pair of distances, or for each distance one of the other axis, and a whole
-    group, whose items have every pair of their own.
+    Near two borders are `every` pair of distances, or some, and a whole group, whose items have every pair of
+    their own.
     """
     random, caps = words(seed), (steps[0] + window, steps[1] + window)
 
@@ -83,12 +87,10 @@ def _cases(
 
     across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
     cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
-    near = [range(1, cap + 2) for cap in caps]
+    near = range(1, caps[0] + 2), range(1, caps[1] + 2)
     pairs = [*itertools.product(*near)]
     if not every:
-        pairs = [(n, near[1][next(random) % len(near[1])]) for n in near[0]]
-        pairs += [(near[0][next(random) % len(near[0])], n) for n in near[1]]
-        pairs = [steps] * 4 + pairs
+        pairs = [steps] * 4 + [(1 + next(random) % a[-1], 1 + next(random) % b[-1]) for a, b in [near] * SOME]
     for n, (b, d) in enumerate(pairs):
         k = n if n < 4 else next(random)
         cases.append(((0 if k % 2 else None, b), (0 if k // 2 % 2 else None, d)))
@@ -107,14 +109,16 @@ class Shared:
         self.value = np.zeros((2, groups * size), dtype=np.uint64)
         self.shape = np.zeros(groups * size, dtype=np.uint64)
         self.held = np.zeros(groups * size, dtype=bool)
-        self.writer, self.reader = (np.full(groups * size, NOBODY, dtype=np.int32) for _ in range(2))
+        self.writer, self.writes = np.full(groups * size, NOBODY, dtype=np.int32), False
+        self.reader = np.zeros(groups * size, dtype=bool)
         group, self.item = np.divmod(np.arange(lanes.count, dtype=np.int32), np.int32(items))
         self.first = group.astype(np.int64) * size
 
     def wait(self) -> None:
         """Begin another phase."""
         self.writer.fill(NOBODY)
-        self.reader.fill(NOBODY)
+        self.reader.fill(False)
+        self.writes = False
 
     def load(self, offset: Any, width: int, machine: Machine) -> Number:
         """Return numbers, each lane those of its group."""
@@ -142,12 +146,10 @@ class Shared:
         at, item = (every, self.item) if running.all() else (every[running], self.item[running])
         if not self.held[at].all():
             raise Wrong(f"{self.name} is read before it is written")
-        writer, reader = self.writer[at], self.reader[at]
+        writer = self.writer[at] if self.writes else item
         if ((writer != NOBODY) & (writer != item)).any():
             raise Wrong(f"{self.name}: an item reads what another writes, without a barrier between")
-        self.reader[at] = item
-        several = (self.reader[at] != item) | ((reader != NOBODY) & (reader != item))
-        self.reader[at[several]] = SEVERAL
+        self.reader[at] = True
         found = Number(self.value.take(every, axis=1), self.shape[every], self.kind, span=self.span)
         return found if found.axes < 3 else joined(found)
 
@@ -160,9 +162,10 @@ class Shared:
         value = self._apart(value)
         running = machine.running
         at, item = self._index(offset, machine)[running], self.item[running]
-        writer, reader = self.writer[at], self.reader[at]
-        if ((reader != NOBODY) & (reader != item)).any():
+        writer = self.writer[at]
+        if self.reader[at].any():
             raise Wrong(f"{self.name}: an item writes what another reads, without a barrier between")
+        self.writes = True
         self.writer[at] = item
         if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
             raise Wrong(f"{self.name}: two items write one number")

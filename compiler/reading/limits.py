@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,26 +18,33 @@ BYTES = 2**30
 """Most memory, in addition to what the process has."""
 
 
-def limited(check: Callable[..., Any], *arguments: Any) -> Any:
-    """Return what a function returns in a process of its own; `Unread` if that takes too much.
+def limited(check: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    """Return what a function returns for each of some arguments, each in a process of its own, all at once.
 
-    Where there is no fork, as on Windows, there are no limits either.
+    Raises `Unread` if one takes too much. Where there is no fork, as on Windows, there are no limits either.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
-        return check(*arguments)
+        return [check(*arguments) for arguments in calls]
     context = multiprocessing.get_context("fork")
-    here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_answer, args=(there, check, arguments))
-    process.start()
-    there.close()
-    try:
-        answer = here.recv()
-    except EOFError:
-        answer = Unread(f"a source that takes more than {SECONDS} s of computing time, or {BYTES >> 20} MB")
-    process.join()
-    if isinstance(answer, Exception):
-        raise answer
-    return answer
+    running = []
+    for arguments in calls:
+        here, there = context.Pipe(duplex=False)
+        process = context.Process(target=_answer, args=(there, check, arguments))
+        process.start()
+        there.close()
+        running.append((here, process))
+    answers: list[Any] = []
+    for here, process in running:
+        try:
+            answers.append(here.recv())
+        except EOFError:
+            rule = f"a source that takes more than {SECONDS} s of computing time, or {BYTES >> 20} MB"
+            answers.append(Unread(rule))
+        process.join()
+    for answer in answers:
+        if isinstance(answer, Exception):
+            raise answer
+    return answers
 
 
 def _answer(to: Any, check: Callable[..., Any], arguments: Any) -> None:

@@ -96,10 +96,9 @@ class Machine(Kinds):
     # ---- names ---------------------------------------------------------------------------------------------
 
     def _find(self, name: str) -> dict[str, Any]:
-        frame: dict[str, Any]
-        for frame in reversed(self.frames[self.base :]):
-            if name in frame:
-                return frame
+        for k in range(len(self.frames) - 1, self.base - 1, -1):
+            if name in self.frames[k]:
+                return self.frames[k]
         if name not in self.frames[0]:
             raise Wrong(f"{name} is not declared")
         return self.frames[0]
@@ -299,7 +298,8 @@ class Machine(Kinds):
     def _value_name(self, name: str) -> Any:
         if name in ("true", "false"):
             return name == "true"
-        return self.written(self._find(name)[name], name)
+        value = self._find(name)[name]
+        return value if type(value) is int else self.written(value, name)
 
     def _value_list(self, values: list[Tree]) -> Any:
         return [self.value(value) for value in values]

@@ -20,7 +20,7 @@ import base64
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cache, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -373,6 +373,7 @@ def pointed(found: Pointer, type_: Type, aligned: bool = False) -> Pointer:
     return Pointer(found.memory, found.offset, type_.width)
 
 
+@cache
 def component(member: str) -> int | None:
     """Return which number of a vector a member is, None of another member."""
     if re.fullmatch("s[0-9a-f]", member):

@@ -82,10 +82,11 @@ def test_a_source_that_never_ends_is_not_checked(plain, monkeypatch):
     monkeypatch.setattr("wamnet.compiler.reading.limits.SECONDS", 1)
     source, *others = plain("c")
     loops = "".join(f"for (int q{k} = 0; q{k} < 3000; ++q{k}) {{ " for k in range(3)) + "}" * 3
+    endless = source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1)
     with pytest.raises(Unread, match="more than 1 s"):
-        limited(run_text, source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1), *others)
+        limited(run_text, [(endless, *others)])
 
 
 def test_a_source_that_fills_the_memory_is_not_checked():
     with pytest.raises(Unread, match="1024 MB"):
-        limited(bytearray, 2**31)
+        limited(bytearray, [(2**31,)])

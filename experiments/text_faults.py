@@ -177,8 +177,56 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("operators in no order", ("wgsl",), "x >= width || y >= height", "x >= width || y >= height && true"),
     ("a value that is dropped", ("wgsl",), "let tap", "clamp(1, 0, 2); let tap"),
     ("a constant of other bits", C_LIKE, "0.318309873f", "0.318309885f"),
+    ("an integer with f", C_LIKE, "1.0f - t22", "1f - t22"),
+    ("a negative integer against a size", C_LIKE, "* value;", "* (c - 1 < sizeof v1 ? value : 0.0f);"),
+    ("a difference of a size", C_LIKE, TAP, "row = sizeof v1 - 25 > 0 ? 0 : row; " + TAP),
+    ("a vector of a comma", ("metal",), TAP, "float4 v0 = (float4)(0.0f, 1.0f, 2.0f, 3.0f); " + TAP),
+    ("one number for a group", ("opencl",), TAP, "__local int tap; tap = "),
+    ("one number for a group", ("metal",), TAP, "threadgroup int tap; tap = "),
+    ("one number for a group", ("cuda",), TAP, "__shared__ int tap; tap = "),
+    ("a row by way of a float", ("opencl",), TAP, "row = fmin(fmax(y + dy - 1, 0), height - 1); int tap = "),
+    ("a row by way of a float", ("cuda",), TAP, "row = fminf(fmaxf(y + dy - 1, 0), height - 1); int tap = "),
+    ("the least of a float and an integer", ("opencl", "metal"), "(t41, 1.0f)", "(t41, 1)"),
+    ("an address before its array", BUFFERS[:4], "+= part1[j]", "+= (part1 - 6 + 6)[j]"),
+    ("an address before the weights", BUFFERS[:4], "weights[(tap + c)", "(weights - 6)[(tap + 1 + c)"),
+    ("an address behind an array", BUFFERS[:4], "float v1[6];", "float v1[6]; float *p = v1 + 7;"),
+    ("arrays that together are beyond the stack", C_LIKE, "float v1[6];",
+        "float v1[6];" + "".join(f" float v0{k}[262144];" for k in range(5))),
+    ("a type of another language", ("c", "cuda", "metal", "opencl"), "float v1[6];", "f32 v0; float v1[6];"),
+    ("a qualifier of another language", ("c",), "float v1[6];", "precise float v1[6];"),
+    ("a name that is a word of a language", C_LIKE, TAP, "int short = 0; int tap = "),
+    ("a name that is a macro of a header", C_LIKE, TAP, "int NAN = 0; int tap = "),
+    ("a declaration for a loop's body", C_LIKE, TAP, "for (int q = 0; q < 1; ++q) float r; int tap = "),
+    ("a second pragma of fused products", ("c",), CENTRE, f"""#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=fast")
+#else
+#pragma STDC FP_CONTRACT ON
+#endif
+{CENTRE}"""),
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""
+
+LOAD = "    memcpy(to->lane, from, sizeof to->lane);"
+OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
+    ("a vector of a comma", "metal group full", "return float4(element", "return (float4)(element"),
+    ("one number for a group", "cuda group full", "float x0_0 = ", "__shared__ float x0_0; x0_0 = "),
+    ("one vector for a group", "opencl group full", "vector part_0_0 =",
+        "__local vector part_0_0; part_0_0 ="),
+    ("an operator that vectors lack", "cuda group full", "v1_0_0 += part_0_0;",
+        "v1_0_0 = v1_0_0 + part_0_0;"),
+    ("operands that an operator lacks", "cuda group full", "part_0_0 += m * x0_0", "part_0_0 += x0_0 * m"),
+    ("a vector for a number", "opencl group full", "vector t4 = ", "float t4 = "),
+    ("a size behind its use", "opencl group full", "#define GROUP_HEIGHT 8\n", ""),
+    ("vectors of another size", "opencl dot16 whole8", "#define vector float16", "#define vector float4"),
+    ("no header of a function", "c dot16 whole8", "#include <string.h>\n", ""),
+    ("a copy to itself", "c dot16 whole8", LOAD, LOAD + LOAD.replace("from", "to->lane")),
+    ("a copy of less than nothing", "c dot16 whole8", LOAD, LOAD + "memcpy(to->lane, from, -4);"),
+    ("weights seen as integers", "c dot16 whole8", LOAD, "const int32_t *w = (const int32_t *)from;\n"
+        "    for (int i = 0; i < LANES; ++i) { to->lane[i] = w[i]; }"),
+    ("a row of an array by another", "c tile8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
+)  # fmt: skip
+"""What a fault is, in which language, schedule and variant, and what it puts instead of what."""
 
 Given = tuple[str, Any, Any, Any]
 """A kernel's text, certificate, manifest and weights."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import words
 from .field import Number, blended, choice, expression, hashed
-from .lanes import Wrong, chosen, clamped
+from .lanes import Unread, Wrong, chosen, clamped
 from .memory import Pointer, Texel, Weights
 from .syntax import Type
 
@@ -17,10 +17,13 @@ if TYPE_CHECKING:
     from .machine import Machine
 
 
-def extreme(name: str, sign: int) -> Callable[..., Any]:
-    """Return min or max, of numbers or of integers."""
+def extreme(name: str, sign: int, floats: bool = False) -> Callable[..., Any]:
+    """Return min or max, of numbers or of integers; of `floats` only where it makes floats of integers."""
 
     def of_two(machine: Machine, a: Any, b: Any) -> Any:
+        kinds = {n.kind if isinstance(n, Number) else "int32" for n in (a, b)}
+        if len(kinds) > 1 or (floats and kinds != {"float32"}):
+            raise Unread(f"{name} of {' and '.join(sorted(kinds))}")
         if isinstance(a, Number) or isinstance(b, Number):
             return expression(name, *machine.alike(a, b), commutes=True)
         return clamped(a, b, sign)
@@ -118,7 +121,8 @@ KINDS = {"int": "int32", "uint": "uint32", "float": "float32"}
 
 BUILTINS: dict[str, Callable[..., Any]] = {
     "clamp": clamp, "select": select, "texelFetch": fetch, "textureSize": size_of,
-    **dict.fromkeys(("min", "fmin", "fminf"), MINIMUM), **dict.fromkeys(("max", "fmax", "fmaxf"), MAXIMUM),
+    "min": MINIMUM, **dict.fromkeys(("fmin", "fminf"), extreme("minimum", -1, floats=True)),
+    "max": MAXIMUM, **dict.fromkeys(("fmax", "fmaxf"), extreme("maximum", 1, floats=True)),
     **dict.fromkeys(("floor", "floorf"), of_one("floor")),
     **dict.fromkeys(("fabs", "fabsf", "abs"), of_one("absolute")),
     **dict.fromkeys(("int", "i32", "convert_int"), conversion("int32")),

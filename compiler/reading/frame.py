@@ -45,6 +45,9 @@ REPEATED = re.compile("IMAGE|ELEMENTWISE|pragma unroll")
 FIRST = re.compile("version|extension|include|precision|CONTRACT|define PRECISE|# ?error")
 """What comes before all functions."""
 
+WIDTH = re.compile(r"(?m)^typedef (?:float|int)(\d+) (?:vector|mask)\b|^# define vector float(\d+)")
+"""How many numbers OpenCL's vectors have, by each of the words that say so."""
+
 LAST = re.compile("# ?undef|pop_options")
 """What comes behind all functions."""
 
@@ -158,13 +161,21 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
         if (at in seen and not several) or (item in seen and "pragma" not in item):
             raise Unread(f"a second {item[:100]!r}")
         seen |= {at, item}
-        if (FIRST.search(item) and k > functions[0]) or (LAST.search(item) and k < functions[-1]):
+        late = re.match("# define", item) and k > functions[-1]
+        if late or (FIRST.search(item) and k > functions[0]) or (LAST.search(item) and k < functions[-1]):
             raise Unread(f"{item[:100]!r} at another place")
         behind = [one for one in own[:k] if one.startswith(("uniform", "layout"))]
         if (item.startswith("# version") and k) or (item.startswith("precision") and behind):
             raise Unread(f"{item[:100]!r} behind {own[k - 1][:100]!r}")
     if target == "glsl-es" and not source.startswith("#version"):
         raise Unread("a source that does not begin with its version")
+    widths = {a or b for item in own for a, b in WIDTH.findall(item)}
+    if len(widths) > 1:
+        raise Unread(f"vectors of {' and of '.join(sorted(widths))} numbers")
+    if "memcpy" in source and "# include < string .h >" not in own:
+        raise Unread("memcpy without string.h")
+    if sum("FP_CONTRACT" in item for item in own) > 1:
+        raise Unread("a second pragma of products that are fused")
     needs = NEEDS.get(target, {})
     for words in needs.get("all", ()) + needs.get("floats", ()) * floats + needs.get("exact", ()) * exact:
         if not any(words in item for item in own):

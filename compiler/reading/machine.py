@@ -55,7 +55,7 @@ BITS = {
 """Operators of bits, as a program calls them."""
 
 MOST_NUMBERS = 2**20
-"""Most numbers of an array: no kernel comes near, and more would not fit the stack of a thread."""
+"""Most numbers of all arrays: no kernel comes near, and more would not fit the stack of a thread."""
 
 MASK = ""
 """Where a frame keeps the lanes that declare its variables, which no other lane sees: no name is empty."""
@@ -86,7 +86,7 @@ class Machine(Kinds):
         self.loops: dict[int, together.Loop | None] = {}
         self.mask = None
         self.entered: Mask | None = None
-        self.base = 0
+        self.base, self.turns, self.numbers = 0, 1, dict[int, int]()
         self.frames: list[dict[str, Any]] = [dict(outside)]
         for variable, value in text.outside:
             if variable.name not in self.frames[0]:
@@ -126,8 +126,9 @@ class Machine(Kinds):
 
     def _memory(self, variable: Variable, size: int) -> Any:
         """Return an array of a text: each lane's, or its group's."""
-        if size > MOST_NUMBERS:
-            raise Wrong(f"{variable.name} is an array of {size} numbers: at most {MOST_NUMBERS}")
+        self.numbers[id(variable)] = size
+        if sum(self.numbers.values()) > MOST_NUMBERS:
+            raise Wrong(f"{variable.name} is an array of {size} numbers: at most {MOST_NUMBERS} in all")
         if not variable.shared:
             return Memory(variable.name, size, self.mask, variable.type.kind)
         if self.group is None:
@@ -269,12 +270,14 @@ class Machine(Kinds):
     def _run_turns(self, loop: together.Loop, turns: int) -> None:
         """Run all turns of a loop at once."""
         self.frames.append({MASK: self.mask, loop.variable: Every(turns)})
+        self.turns = turns
         for statement in loop.statements:
             if statement[0] == "declare":
                 self.frames[-1][statement[1].name] = self.value(statement[2], statement[1].type)
             else:
                 self.run(statement)
         self.frames.pop()
+        self.turns = 1
 
     def _truth(self, value: Any) -> Any:
         if isinstance(value, (bool, np.ndarray)):
@@ -410,6 +413,8 @@ class Machine(Kinds):
             return self._operate_numbers(op, a, b)
         if op in self.operators and wide(a) > 1:
             return self._call_operator(op, a, b)
+        if self.operators and max(wide(n) for n in (a, b)) > 1:
+            raise Unread(f"operator {op} of vectors that have none")
         if isinstance(a, list) or isinstance(b, list):
             a, b = (stacked(one) if numbers(one) else one for one in (a, b))
         if isinstance(a, Number) or isinstance(b, Number):
@@ -417,7 +422,7 @@ class Machine(Kinds):
         if isinstance(a, Pointer):
             if len(a.sizes) != 1 or op not in "+-" or not isinstance(b, (int, Place)):
                 raise Unread(f"operator {op} of an address")
-            return Pointer(a.memory, plus(a.offset, times(b, a.width), -1 if op == "-" else 1), a.width)
+            return a.moved(times(b, -1) if op == "-" else b, self)
         if isinstance(a, Raw) and isinstance(b, Raw) and op in "+*" and a.counts:
             return Raw(self.whole(plus(a.place, b.place) if op == "+" else times(a.place, b.place)))
         if not all(isinstance(one, (int, Place)) and not isinstance(one, bool) for one in (a, b)):
@@ -541,13 +546,16 @@ class Machine(Kinds):
         if type_.kind == "void":
             return None
         if type_.pointer:
+            kind = getattr(found.memory, "kind", "")
+            if not self.aligned and kind not in ("", type_.kind):
+                raise Unread(f"{kind} seen as {type_.kind}, which C leaves undefined")
             return words.pointed(found, type_, self.aligned)
         if isinstance(found, list):
             if found != [0] and len(found) != type_.width:
                 raise Wrong(f"{len(found)} numbers for {type_.width}")
             found = self.converted(found, type_)
             return found[0] if len(found) == 1 else stacked(found)
-        if wide(found) not in (1, type_.width):
+        if wide(found) not in (1, type_.width * self.turns):
             raise Wrong(f"{wide(found)} numbers for {type_.width}")
         return self.converted(found, type_)
 

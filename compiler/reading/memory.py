@@ -42,6 +42,16 @@ class Pointer:
             step *= size or 1
         return Pointer(self.memory, plus(self.offset, times(index, step)), self.width, self.sizes[1:])
 
+    def moved(self, index: Any, machine: Machine) -> Pointer:
+        """Return the place of an element, or of the end, as a pointer; `Wrong` outside of the array."""
+        offset = plus(self.offset, times(index, self.width))
+        own = self.sizes[0]
+        at, end = (offset, getattr(self.memory, "size", None)) if own is None else (index, own)
+        beyond = (at.values < 0)[machine.running].any() if isinstance(at, Place) else at < 0
+        if beyond or (isinstance(at, int) and isinstance(end, int) and at > end):
+            raise Wrong("an address outside of its array")
+        return Pointer(self.memory, offset, self.width)
+
     def load(self, machine: Machine) -> Any:
         """Return what is there."""
         return self.memory.load(self.offset, self.width, machine)
@@ -177,13 +187,12 @@ class Weights:
     TEXELS = 1024
 
     def __init__(self, numbers: Number, spectra: range = range(0)) -> None:
-        self.numbers, self.spectra = numbers, spectra
+        self.numbers, self.spectra, self.size = numbers, spectra, int(numbers.value.shape[2])
 
     def load(self, offset: Any, width: int, machine: Machine) -> Number:
         """Return numbers of the file."""
-        count = self.numbers.value.shape[2]
-        if not isinstance(offset, int) or not 0 <= offset <= count - width:
-            raise Wrong(f"the weights are read at {offset}: there are {count}")
+        if not isinstance(offset, int) or not 0 <= offset <= self.size - width:
+            raise Wrong(f"the weights are read at {offset}: there are {self.size}")
         part = slice(offset, offset + width) if width > 1 else offset
         weight = offset + width <= self.spectra.start or offset >= self.spectra.stop
         return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=weight)

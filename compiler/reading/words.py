@@ -339,6 +339,7 @@ class Stored:
 
     def __init__(self, raw: NDArray[np.float32], kind: str = "float32") -> None:
         self.raw, self.kind, self.held = raw, kind, np.ascontiguousarray(raw).view(TYPES[kind])
+        self.size = len(self.held)
 
     def seen_as(self, kind: str) -> Stored:
         """Return the same numbers as some of another kind."""
@@ -393,6 +394,8 @@ class Slot:
 def copy(machine: Machine, to: Any, source: Any, count: int) -> None:
     """Copy bytes of one memory to another, or to a variable."""
     kind = getattr(source.memory, "kind", "")
+    if type(count) is not int or count < 1 or source.memory is getattr(to, "memory", None):
+        raise Wrong("it copies nothing, or a memory to itself")
     if isinstance(to, Slot):
         if (to.type.kind, to.type.width, kind, count) != ("int32", 1, "uint8", 4) or machine.mask is not None:
             raise Unread("a copy of bytes to a variable of another kind")

@@ -4,7 +4,7 @@ import functools
 
 import pytest
 import text_faults
-from texts import kernel, parts
+from texts import kernel, parts, planned
 
 from wamnet.compiler.core import sine
 from wamnet.compiler.proof.evidence import Refused
@@ -33,6 +33,19 @@ def test_faults_of_the_language_are_rejected(plain, what, target, old, new):
     assert old in source
     with pytest.raises((Refused, Unread), match=r"\S"):
         run_text(source.replace(old, new, 1), *others)
+
+
+@pytest.mark.parametrize(
+    ("what", "of", "old", "new"),
+    text_faults.OF_SCHEDULES,
+    ids=[" ".join(c[:2]) for c in text_faults.OF_SCHEDULES],
+)
+def test_faults_of_the_language_of_schedules_are_rejected(what, of, old, new, tmp_path):
+    source, *others = parts(planned(tmp_path, *of.split()))
+    assert old in source
+    last = "#define GROUP_HEIGHT 8\n" * (not new)
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(source.replace(old, new, 1) + last, *others)
 
 
 @pytest.mark.parametrize("target", sorted(LANGUAGES))

@@ -213,6 +213,8 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("one number for a group", "cuda group full", "float x0_0 = ", "__shared__ float x0_0; x0_0 = "),
     ("one vector for a group", "opencl group full", "vector part_0_0 =",
         "__local vector part_0_0; part_0_0 ="),
+    ("more memory for a group", "metal group full", "threadgroup float tile",
+        "threadgroup float spare[200000]; threadgroup float tile"),
     ("an operator that vectors lack", "cuda group full", "v1_0_0 += part_0_0;",
         "v1_0_0 = v1_0_0 + part_0_0;"),
     ("operands that an operator lacks", "cuda group full", "part_0_0 += m * x0_0", "part_0_0 += x0_0 * m"),

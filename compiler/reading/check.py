@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -58,6 +59,7 @@ def run_text(
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
     seed = secrets.randbits(31)
     try:
+        check_manifest(manifest, str(held["program"]), "spectra" in held)
         tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
         if tiles:
             lanes = tile_lanes((pixels, rows), window, not language.within, seed)
@@ -86,6 +88,22 @@ def run_text(
     finally:
         add_up_lanes(None)
     return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count, "compilers": len(texts)}
+
+
+def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
+    """Refuse a manifest by which a host would give a kernel other images, or work items, than it has."""
+    schedule, size = manifest["schedule"], manifest["window"]["size"]
+    own = [
+        f"window {size}x{size}, border {manifest['window']['border']}",
+        *("image {name}: {channels} in [{low}, {high}]".format(**image) for image in manifest["images"]),
+        f"output {manifest['output']['name']} =",
+    ]
+    found = re.findall(r"(?m)^  (window .*|image .*|output \w+ =)", program.replace(" whole in ", " in "))
+    items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
+    if own != found or len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
+        raise Wrong("its manifest has other images, another window or other work items than its program")
+    if items[1] != 1 and not tiles:
+        raise Wrong("its manifest gives a work item several rows")
 
 
 def different(source: str, language: Language, manifest: Any, exact: bool) -> list[Text]:
@@ -127,6 +145,9 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
     takes = text.functions[entry].takes
     check_interface(text, [v.name for v in takes if v.role not in known], claim)
     machine.call(entry, [known[v.role] if v.role in known else sized(given[v.name], v) for v in takes])
+    shared = 4 * sum(memory.size for memory in group.memories) if group else 0
+    if shared != manifest["schedule"].get("shared_bytes", 0):
+        raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
     if language.fragment:
         for channel in range(channels):
             result.hold(0, channel, target.load(channel, 1, machine), machine.running)

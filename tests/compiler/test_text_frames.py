@@ -48,6 +48,31 @@ def test_faults_of_the_language_of_schedules_are_rejected(what, of, old, new, tm
         run_text(source.replace(old, new, 1) + last, *others)
 
 
+@pytest.mark.parametrize(
+    ("of", "key", "value"),
+    [
+        ("window", "size", 5),
+        ("window", "border", "clamp"),
+        ("output", "name", "normal"),
+        ("schedule", "rows", 2),
+        ("schedule", "pixels", 1.5),
+        ("images", "channels", 4),
+        ("images", "name", "albedo"),
+        ("images", "high", 2.0),
+        ("images", "", None),
+    ],
+)
+def test_a_manifest_of_other_images_or_work_items_is_rejected(plain, of, key, value):
+    """What a host calls a kernel by is what its certificate says."""
+    source, held, manifest, weights = plain("opencl")
+    turned = manifest["images"][::-1]
+    if key:
+        first = {**(manifest[of][0] if of == "images" else manifest[of]), key: value}
+        turned = [first, *manifest["images"][1:]]
+    with pytest.raises(Refused, match="its manifest"):
+        run_text(source, held, {**manifest, of: turned if of == "images" else first}, weights)
+
+
 @pytest.mark.parametrize("target", sorted(LANGUAGES))
 def test_a_foreign_word_is_rejected_anywhere(plain, target):
     """The mirror of the classes above: no other word is before a word of a kernel."""

@@ -71,6 +71,9 @@ OTHERS = {
 }
 """Functions of the other language."""
 
+KNOWN = ("get_global_id", "gl_GlobalInvocationID")
+"""What a text does not declare, besides functions."""
+
 BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add,
     "-": np.subtract,
@@ -92,8 +95,11 @@ def parsed(source: str) -> Text:
     if not isinstance(source, str):
         raise TextError(f"{type(source).__name__} is not a text", "return the text")
     try:
-        parser = Parser(source)
+        # Of both languages: what the other one calls a function is explained where it is called.
+        others = {name for _, name in OTHERS}
+        parser = Parser(source, calls={*KNOWN, *others, *BUILTINS["opencl"], *BUILTINS["glsl"]})
         parser.types["size_t"] = Type("uint32")
+        parser.inside = {"const", "precise", "__global", "__local", "shared"}
         return parser.parse()
     except Unread as error:
         raise TextError(f"it does not parse: {error}", "a bracket, a semicolon or an operator") from None

@@ -169,6 +169,15 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
             raise Unread(f"{item[:100]!r} behind {own[k - 1][:100]!r}")
     if target == "glsl-es" and not source.startswith("#version"):
         raise Unread("a source that does not begin with its version")
+    _check_together(own, source)
+    needs = NEEDS.get(target, {})
+    for words in needs.get("all", ()) + needs.get("floats", ()) * floats + needs.get("exact", ()) * exact:
+        if not any(words in item for item in own):
+            raise Unread(f"a source without {words!r}")
+
+
+def _check_together(own: Sequence[str], source: str) -> None:
+    """Refuse items that may each be there, but not together."""
     widths = {a or b for item in own for a, b in WIDTH.findall(item)}
     if len(widths) > 1:
         raise Unread(f"vectors of {' and of '.join(sorted(widths))} numbers")
@@ -176,10 +185,6 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
         raise Unread("memcpy without string.h")
     if sum("FP_CONTRACT" in item for item in own) > 1:
         raise Unread("a second pragma of products that are fused")
-    needs = NEEDS.get(target, {})
-    for words in needs.get("all", ()) + needs.get("floats", ()) * floats + needs.get("exact", ()) * exact:
-        if not any(words in item for item in own):
-            raise Unread(f"a source without {words!r}")
 
 
 def preprocessed(source: str, true: Sequence[str]) -> tuple[str, Macros]:

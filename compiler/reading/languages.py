@@ -12,10 +12,10 @@ from .wgsl_syntax import WgslParser
 
 RESERVED = (
     "active alignas alignof and asm atomic_uint attribute auto bitand bitor bool break buffer case cast "
-    "catch centroid char class coherent common complex concept const const_cast constant constexpr "
+    "catch centroid char class coherent common compl complex concept const const_cast constant constexpr "
     "continue decltype default delete device discard do double dvec2 dvec3 dvec4 else enum explicit "
-    "export extern external false filter fixed flat float for friend global goto half highp hvec2 hvec3 "
-    "hvec4 if inline inout input int interface invariant isampler2D kernel layout local long lowp mat2 "
+    "export extern external false filter fixed flat float for friend generic global goto half highp hvec2 "
+    "hvec3 hvec4 if inline inout input int interface invariant isampler2D kernel layout local long lowp mat2 "
     "mat3 mat4 mediump mutable namespace new noexcept noinline noperspective not operator or out output "
     "partition patch precise precision private protected public quad readonly read_only register restrict "
     "return sample sampler sampler2D sampler3D samplerCube shared short signed sizeof smooth static "
@@ -52,9 +52,10 @@ class Language:
     pixels of the image only. `fragment`: one pixel's result is a variable. `brings`: names that the source
     does not declare. `host`: a function of the source that calls the kernel for every work item. `doubles`:
     a constant without a suffix is one. `aligned`: a vector is at a multiple of its size. `precise`: what
-    rounds is declared so. `mixes`: 2 if kinds of numbers become others without a word, 1 if integers become
-    floats. `of_floats`, `of_integers`: what the names of other schedules than plain begin with that are
-    read, of networks of floats and of integers.
+    rounds is declared so. `types`, `qualifiers`: words for them in functions; all types where there are
+    none. `lists`: a cast of several values is a vector. `mixes`: 2 if kinds of numbers become others
+    without a word, 1 if integers become floats. `of_floats`, `of_integers`: what the names of other
+    schedules than plain begin with that are read, of networks of floats and of integers.
     """
 
     calls: str
@@ -65,9 +66,12 @@ class Language:
     host: str = ""
     doubles: bool = False
     aligned: bool = True
+    types: str = ""
+    qualifiers: str = "const precise shared"
     mixes: int = 2
     reserved: str = RESERVED
     precise: bool = False
+    lists: bool = False
     of_floats: tuple[str, ...] = ()
     of_integers: tuple[str, ...] = ()
 
@@ -81,6 +85,10 @@ LANGUAGES: Mapping[str, Language] = {
         "convert_int convert_uint dot_acc_sat_4x8packed_ss_int fabs floor fmax fmin get_global_id "
         "get_group_id get_local_id max min __builtin_ia32_vpdpbusd512",
         doubles=True,
+        lists=True,
+        types="void bool float float4 float8 float16 int int4 int8 int16 uint uint4 uint8 uint16 uchar "
+        "uchar4",
+        qualifiers="const __global __local",
         brings=("CLK_LOCAL_MEM_FENCE",),
         of_floats=("tile", "vector", "group", "fft"),
         of_integers=("tile", "vector", "group", "dot"),
@@ -92,6 +100,8 @@ LANGUAGES: Mapping[str, Language] = {
         host="wamnet_image",
         doubles=True,
         aligned=False,
+        types="void bool float int int8_t uint8_t int32_t uint32_t __m512i",
+        qualifiers="const",
         of_floats=("tile", "fft"),
         of_integers=("tile", "dot"),
     ),
@@ -129,6 +139,8 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "metal": Language(
         "clamp fabs float4 floor int max min threadgroup_barrier",
+        types="void bool float float4 int int4 uint uint2",
+        qualifiers="const device threadgroup",
         brings=("mem_flags::mem_threadgroup",),
         of_floats=("group",),
         of_integers=("group",),
@@ -136,6 +148,8 @@ LANGUAGES: Mapping[str, Language] = {
     "cuda": Language(
         "__dp4a __int_as_float __syncthreads fabsf floorf fmaxf fminf make_int4 max min",
         doubles=True,
+        types="void bool float int int4 uint",
+        qualifiers="const __shared__",
         brings=("threadIdx", "blockIdx", "blockDim"),
         of_floats=("group",),
         of_integers=("group",),
@@ -162,4 +176,7 @@ def parsed(source: str, language: Language, true: Sequence[str]) -> Text:
     parser = language.parser(*preprocessed(source, true), {*language.calls.split(), *language.brings})
     parser.doubles, parser.precise = language.doubles, language.precise
     parser.reserved = frozenset(language.reserved.split())
+    parser.inside, parser.lists = set(language.qualifiers.split()), language.lists
+    if language.types:
+        parser.types = {name: parser.types[name] for name in language.types.split()}
     return parser.parse()

@@ -33,9 +33,6 @@ OUTSIDE = {
 }  # fmt: skip
 """Qualifiers that change no value: outside of functions frame.py has compared them."""
 
-INSIDE = {"const", "__global", "device", "precise"}
-"""Qualifiers of what a function declares."""
-
 SHARED = {"__local", "threadgroup", "__shared__", "shared"}
 """Qualifiers of memory that the work items of a group share."""
 
@@ -45,6 +42,9 @@ SCALARS = {
     "i32": "int32", "u32": "uint32", "sampler2D": "image",
 }  # fmt: skip
 """Names of types of one number."""
+
+IN_A_FUNCTION = 3
+"""How many blocks are open in that of a function: the source, what it takes, its statements."""
 
 BINARY = [
     {"||"}, {"&&"}, {"|"}, {"^"}, {"&"}, {"==", "!="}, {"<", ">", "<=", ">="}, {"<<", ">>"}, {"+", "-"},
@@ -104,7 +104,7 @@ class Parser:
 
     def __init__(self, text: str, macros: Macros | None = None, calls: Collection[str] = ()) -> None:
         self.tokens, self.at, self.text = [*tokens(text, macros), ("end", "", 0)], 0, Text()
-        self._role, self._binding, self.doubles, self.precise = "", -1, False, False
+        self._role, self._binding, self.doubles, self.precise, self.lists = "", -1, False, False, False
         self._fixed, self.reserved = False, frozenset[str]()
         self.calls, self.scopes, self._inside, self._unset, self._precise = (
             calls,
@@ -116,7 +116,7 @@ class Parser:
         self.types = {name: Type(kind) for name, kind in SCALARS.items()}
         for base in ("float", "int", "uint", "uchar"):
             self.types |= {f"{base}{n}": Type(SCALARS[base], n) for n in (2, 4, 8, 16)}
-        self.types["__m512i"] = Type("int32", 16)
+        self.types["__m512i"], self.inside = Type("int32", 16), set[str]()
         for base, kind in (("vec", "float32"), ("ivec", "int32")):
             self.types |= {f"{base}{n}": Type(kind, n) for n in (2, 4)}
 
@@ -238,7 +238,8 @@ class Parser:
         """
         if name in self.reserved or "__" in name or name.startswith("gl_") or not name.strip("_"):
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {name}, which is reserved")
-        if name in self.types or name in self.calls or name in self.text.functions or name in self.scopes[-1]:
+        known = name in self.types or name in self.calls or name in self.text.functions
+        if known or (self._inside and name.upper() == name) or name in self.scopes[-1]:
             raise Unread(f"line {self.tokens[self.at - 1][2]}: another {name}")
         self.scopes[-1] |= {name, f"{name} is fixed"} if fixed else {name}
         return name
@@ -257,11 +258,11 @@ class Parser:
         """Skip qualifiers; return whether the variable is shared."""
         shared = False
         while True:
+            if self._inside and self._now not in self.inside:
+                return shared
             if self._now in SHARED:
                 shared = True
                 self._take()
-            elif self._inside and self._now not in INSIDE:
-                return shared
             elif self._now in ("layout", "__attribute__"):
                 self._take()
                 self._group_size()
@@ -312,7 +313,7 @@ class Parser:
     def _is_type(self) -> bool:
         """Return whether a type begins here."""
         kind, text, _ = self.tokens[self.at]
-        return kind == "name" and (text in self.types or text in INSIDE or text in SHARED or text == "union")
+        return kind == "name" and (text in self.types or text in self.inside or text == "union")
 
     def _type(self) -> Type:
         name = self._take()
@@ -463,6 +464,10 @@ class Parser:
         shared, type_ = self._qualified()
         found: list[tuple[Variable, Any]] = []
         self._variables(type_, shared, found)
+        if shared and (len(self.scopes) != IN_A_FUNCTION or not all(v.sizes for v, _ in found)):
+            raise Unread(
+                f"line {self.tokens[self.at - 1][2]}: memory of a group that is no array of its kernel"
+            )
         pairs: list[Tree] = [("declare", variable, value) for variable, value in found]
         return pairs[0] if len(pairs) == 1 else ("declarations", pairs)
 
@@ -477,12 +482,12 @@ class Parser:
     def _read_for(self) -> Tree:
         self._take("(")
         self.scopes.append(set())
-        start = self._statement()
+        start = self._branch(begins=True)
         condition = self._expression()
         self._take(";")
         step = self._effect()
         self._take(")")
-        found = ("for", start, condition, step, self._statement())
+        found = ("for", start, condition, step, self._branch())
         self.scopes.pop()
         return found
 
@@ -493,9 +498,12 @@ class Parser:
         then = self._branch()
         return ("if", condition, then, self._branch() if self._has("else") else ("block", []))
 
-    def _branch(self) -> Tree:
-        if self._declares():
-            raise Unread(f"line {self.tokens[self.at][2]}: a declaration that is a branch")
+    def _branch(self, begins: bool = False) -> Tree:
+        """Read what is no block of its own: no declaration; or what a loop `begins` with: no other."""
+        if self._declares() != begins:
+            raise Unread(
+                f"line {self.tokens[self.at][2]}: a declaration that is a branch, or none before a loop"
+            )
         return self._statement()
 
     def _read_return(self) -> Tree:
@@ -526,8 +534,6 @@ class Parser:
         if self._now in ("-", "!", "&", "*"):
             op = self._take()
             return ("unary", op, self._unary())
-        if self._has("sizeof"):
-            return ("sizeof", self._unary())
         cast = self._cast()
         return self._postfix(self._primary()) if cast is None else cast
 
@@ -545,18 +551,20 @@ class Parser:
             return None
         if self._now == "{":
             return self._postfix(("cast", type_, self._value()))
-        if type_.width > 1 and self._now == "(":
+        if type_.width > 1 and self._now == "(" and self.lists:
             self._take()
             values = self._values(")")
             return self._postfix(("cast", type_, values[0] if len(values) == 1 else ("list", values)))
         return ("cast", type_, self._unary())
 
-    def _values(self, closing: str) -> list[Tree]:
+    def _values(self, closing: str, sizes: bool = False) -> list[Tree]:
+        """Read expressions up to a bracket; `sizes` of arrays too, which are counted without a sign."""
         found: list[Tree] = []
         while not self._has(closing):
             if found:
                 self._take(",")
-            found.append(self._expression())
+            size = sizes and self._has("sizeof")
+            found.append(("sizeof", self._unary()) if size else self._expression())
         return found
 
     def _primary(self) -> Tree:
@@ -582,7 +590,7 @@ class Parser:
     def _postfix(self, found: Tree) -> Tree:
         while True:
             if self._has("("):
-                found = ("call", found, self._values(")"))
+                found = ("call", found, self._values(")", found == ("name", "memcpy")))
             elif self._has("["):
                 found = ("at", found, self._expression())
                 self._take("]")

@@ -74,7 +74,7 @@ def is_many(frames: Sequence[Path], output: Path) -> bool:
 
 def _is_folder(output: Path) -> bool:
     """Tell whether an output names a folder, which may be there or not."""
-    return not output.suffix or (output.is_dir() and output.suffix.lower() not in SUFFIXES)
+    return not output.suffix or (output.suffix.lower() not in SUFFIXES and output.is_dir())
 
 
 def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> list[Path]:

@@ -9,7 +9,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -83,6 +85,14 @@ def _even(length: int) -> int:
     return length + length % 2
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Ignore Pillow's warnings, of animations whose header is damaged for example: its errors are told."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
 def read_origin(path: Path) -> str | None:
     """Return the text that names the origin of a PNG; None if the file is damaged, "" if it has no text.
 
@@ -91,7 +101,7 @@ def read_origin(path: Path) -> str | None:
     pillow = need("PIL.Image", "to read PNG files", "files")
     content = BytesIO(read_file(path, "picture", "move it elsewhere, or choose another output with -o"))
     try:
-        with pillow.open(content, formats=["PNG"]) as picture:
+        with _quiet(), pillow.open(content, formats=["PNG"]) as picture:
             origin = str(picture.text.get(ORIGIN, ""))
             # A picture of another origin is refused anyway, whatever its header says of its size.
             if origin:
@@ -112,11 +122,10 @@ def read_png(path: Path, tell: Callable[[str], None] | None = None) -> Floats:
     content = read_file(path)
     chunks = png_colors.read_chunks(path, content)
     try:
-        with pillow.open(BytesIO(content), formats=["PNG"]) as picture:
+        with _quiet(), pillow.open(BytesIO(content), formats=["PNG"]) as picture:
             width, height = picture.size
             # A file of a few bytes may state any size.
             check_room(PNG_BYTES * width * height, f"size of {path}", f"{width} x {height}", "cut it")
-            # Pillow warns of a palette with transparency that becomes RGB in one step.
             rgba = picture.convert("RGBA")
     except InputError:
         raise

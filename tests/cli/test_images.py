@@ -95,6 +95,8 @@ SRGB = chromaticities(0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06)
         # -0.2249404, 0; -0.0420569, 1.0420571, 0; -0.0196376, -0.0786361, 1.0982735.
         ([P3], (27, 104, 211), "converted to sRGB from cHRM"),
         ([chunk(b"sBIT", bytes([5, 6, 5]))], (51, 102, 204), "5, 6, 5 significant bits"),
+        # Pillow warns of an animation without frames.
+        ([chunk(b"acTL", bytes(8))], (51, 102, 204), ""),
         ([chunk(b"pHYs", struct.pack(">IIB", 1, 2, 0))], (51, 102, 204), "its pixels are not square"),
     ],
 )  # fmt: skip

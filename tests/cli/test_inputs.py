@@ -98,7 +98,7 @@ def test_a_name_that_no_file_system_takes(refused, here, monkeypatch, command) -
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this is the work")
 
-    monkeypatch.setattr("wamnet.kernels.run.denoise_on", never)
+    monkeypatch.setattr("wamnet.kernels.run.denoise_on.denoise_on", never)
     monkeypatch.setattr("wamnet.kernels.run.render_frame.render_parallel", never)
     line = refused(*command, "-o", "n" * 300 + ".exr")
     assert "cannot be written (File name too long)" in line

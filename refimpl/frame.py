@@ -141,8 +141,8 @@ def validate(frame: Frame, finite: bool = True) -> None:
 
 def not_finite(frame: Frame) -> dict[str, int]:
     """Return the number of pixels with a NaN or an infinity of each layer that has some."""
-    counts = {name: int((~np.isfinite(v)).any(axis=-1).sum()) for name, v in frame.layers.items()}
-    return {name: count for name, count in counts.items() if count}
+    finite = {name: np.isfinite(values) for name, values in frame.layers.items()}
+    return {name: int((~each).any(axis=-1).sum()) for name, each in finite.items() if not each.all()}
 
 
 def check_finite(what: str, image: Floats) -> None:

@@ -82,7 +82,7 @@ def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> li
     if not is_many(frames, output):
         return [output]
     if NUMBER.search(output.name):
-        outputs = [_of_number(frame, output) for frame in frames]
+        outputs = [_of_number(number, output) for number in _frame_numbers(frames, output)]
     elif _is_folder(output):
         outputs = [output / f"{frame.stem}{suffix}" for frame in frames]
     else:
@@ -101,16 +101,29 @@ def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> li
     return outputs
 
 
-def _of_number(frame: Path, pattern: Path) -> Path:
-    """Return the name of a pattern with a frame's number, which are the last digits of its name."""
-    numbers = re.findall("[0-9]+", frame.stem)
-    if not numbers:
-        rule = f"its name has no number, which -o {pattern} needs"
-        raise InputError("input frame", str(frame), rule, "rename it, or give a folder with -o")
+def _frame_numbers(frames: Sequence[Path], pattern: Path) -> list[int]:
+    """Return each frame's number: the last digits of its name that are not the same in all frames.
+
+    `a.0001_v2.exr` and `a.0002_v2.exr` are 1 and 2.
+    """
+    names = [re.findall("[0-9]+", frame.stem) for frame in frames]
+    for frame, digits in zip(frames, names, strict=True):
+        if not digits:
+            rule = f"its name has no number, which -o {pattern} needs"
+            raise InputError("input frame", str(frame), rule, "rename it, or give a folder with -o")
+    shortest = min(map(len, names))
+    # Counted from the end, so that a folder of takes with other prefixes has numbers too.
+    varying = (at for at in range(1, shortest + 1) if len({digits[-at] for digits in names}) > 1)
+    place = next(varying, 1)
+    return [int(digits[-place]) for digits in names]
+
+
+def _of_number(number: int, pattern: Path) -> Path:
+    """Return the name of a pattern with a number in it."""
     place = NUMBER.search(pattern.name)
     assert place is not None, "the caller has looked for it"
-    number = str(int(numbers[-1])).rjust(int(place[1] or "1"), "0")
-    return pattern.with_name(pattern.name[: place.start()] + number + pattern.name[place.end() :])
+    text = str(number).rjust(int(place[1] or "1"), "0")
+    return pattern.with_name(pattern.name[: place.start()] + text + pattern.name[place.end() :])
 
 
 def overlapped(

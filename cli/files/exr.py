@@ -310,7 +310,10 @@ def _stack(path: Path, name: str, planes: Sequence[Plane], pixels: Sequence[Mapp
         raise InputError(
             f"{path}: pixels of {name}", ", ".join(kinds), rule, "export them as 16 or 32 bit floats"
         )
-    return np.stack([channel.astype(np.float32) for channel in channels], axis=-1)
+    layer = np.empty((*channels[0].shape, len(channels)), np.float32)
+    for index, channel in enumerate(channels):
+        layer[:, :, index] = channel
+    return layer
 
 
 def _without_misses(layers: dict[str, Floats]) -> int:

@@ -72,7 +72,7 @@ OTHERS = {
 """Functions of the other language."""
 
 KNOWN = ("get_global_id", "gl_GlobalInvocationID")
-"""What a text does not declare, besides functions."""
+"""What a text does not declare, except functions."""
 
 BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": np.add,

@@ -87,7 +87,7 @@ def _even(length: int) -> int:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Ignore Pillow's warnings, of animations whose header is damaged for example: its errors are told."""
+    """Ignore the warnings of Pillow, as for a damaged animation header: its errors are reported."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

@@ -466,7 +466,7 @@ class Parser:
         self._variables(type_, shared, found)
         if shared and (len(self.scopes) != IN_A_FUNCTION or not all(v.sizes for v, _ in found)):
             raise Unread(
-                f"line {self.tokens[self.at - 1][2]}: memory of a group that is no array of its kernel"
+                f"line {self.tokens[self.at - 1][2]}: shared memory that is not an array of its kernel"
             )
         pairs: list[Tree] = [("declare", variable, value) for variable, value in found]
         return pairs[0] if len(pairs) == 1 else ("declarations", pairs)
@@ -499,7 +499,7 @@ class Parser:
         return ("if", condition, then, self._branch() if self._has("else") else ("block", []))
 
     def _branch(self, begins: bool = False) -> Tree:
-        """Read what is no block of its own: no declaration; or what a loop `begins` with: no other."""
+        """Read a statement that is not a block: no declaration; or what a loop `begins` with: no other."""
         if self._declares() != begins:
             raise Unread(
                 f"line {self.tokens[self.at][2]}: a declaration that is a branch, or none before a loop"

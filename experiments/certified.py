@@ -57,9 +57,7 @@ def row(model: str, name: str, folder: Path) -> list[str]:
     """Return a row of the table: of one kernel."""
     target, schedule, *rest = name.split(":")
     variant = rest[0] if rest else "full"
-    plan = plan_model(
-        load_model(ROOT / "cli" / "models" / f"{model}.safetensors"), target, "ieee", schedule, variant
-    )
+    plan = plan_model(load_model(ROOT / "models" / f"{model}.safetensors"), target, "ieee", schedule, variant)
     write(compile_plan(plan), folder)
     begun = time.process_time()
     bound = max(check(folder / CERTIFICATE_NAME)["bound"]["output"])

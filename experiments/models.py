@@ -1,7 +1,7 @@
 """Make the models that ship with the package: one for each scene of `experiments/quality.py`.
 
     python experiments/models.py
-    python experiments/models.py --scenes minicubes -o out/models --write cli/models
+    python experiments/models.py --scenes minicubes -o out/models --write models
 
 1. Each is the network of that experiment's row for a set of frames, seed 0; it is trained where the cache
    lacks it [`MADE_OF`]. That of the mini cubes knows all that the web page moves.

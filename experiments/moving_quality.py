@@ -49,7 +49,7 @@ from wamnet.refimpl.network.denoise import Model
 SCENE = "minicubes"
 """What moves."""
 
-MODEL = Path(__file__).parents[1] / "cli" / "models" / f"{SCENE}.safetensors"
+MODEL = Path(__file__).parents[1] / "models" / f"{SCENE}.safetensors"
 """The network that ships."""
 
 EVERY, FIRST = 8, 4

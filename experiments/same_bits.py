@@ -375,7 +375,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    shipped = Path(__file__).parents[1] / "cli/models/cornell.safetensors"
+    shipped = Path(__file__).parents[1] / "models/cornell.safetensors"
     parser.add_argument("--model", type=Path, default=shipped, help="a model of floats")
     parser.add_argument("--variant", default="whole8", help="how it is rounded")
     parser.add_argument("--size", type=int, default=32, help="pixels of a side")

@@ -22,8 +22,8 @@ from pathlib import Path
 from lab import command
 from lab.frames import Pair, frames, noisy, pairs
 from lab.sets import SETS
-from models import MADE_OF
 
+from models import MADE_OF
 from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import AMPLITUDES
 from wamnet.kernels.run.frame_plan import TEST, TRAIN
@@ -32,7 +32,7 @@ from wamnet.refimpl.network import dataset, whole
 from wamnet.refimpl.network.denoise import Model, denoise
 from wamnet.refimpl.network.train import whole_of
 
-MODELS = Path(__file__).parents[1] / "cli" / "models"
+MODELS = Path(__file__).parents[1] / "models"
 """The shipped models."""
 
 RAYS = 16

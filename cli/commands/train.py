@@ -379,7 +379,7 @@ def fit(
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
     from ...compiler.model_file import save_checkpoint, save_model
-    from ...refimpl.network.train import model_of, whole_of
+    from ...kernels.run.trainer import model_of_run
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
@@ -403,10 +403,7 @@ def fit(
                 on_checkpoint=lambda now: save_checkpoint(saved, now),
             )
     seconds = monotonic() - started
-    model = with_domain(model_of(state, facts(pairs)), pairs)
-    if recipe.whole:
-        model = whole_of(model, pairs, recipe.whole, recipe.seed)
-    save_model(output, model)
+    save_model(output, model_of_run(state, pairs))
     return state, seconds
 
 
@@ -422,33 +419,6 @@ def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
 
     with kernels.open_executor(executor) as device:
         yield partial(kernels.train_on, device)
-
-
-def facts(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
-    """Return what the training frames say of themselves, each value once: facts for the model's reader.
-
-    Frames that say their ranges need not list what each of them has drawn.
-    """
-    from ...refimpl.light.variation import RANGES
-
-    names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
-    values = {
-        name: dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info) for name in names
-    }
-    drawn = RANGES in values
-    return {
-        f"trained_on_{name}": ", ".join(found)
-        for name, found in values.items()
-        if len(found) == 1 or not drawn
-    }
-
-
-def with_domain(model: Model, pairs: Sequence[tuple[Frame, Frame]]) -> Model:
-    """Return the model with the domain of its training frames among its facts, if they are enough."""
-    from ...refimpl.network.domain import DOMAIN, domain_of_frames, to_json
-
-    domain = domain_of_frames(model, [noisy for noisy, _ in pairs])
-    return replace(model, info={**model.info, DOMAIN: to_json(domain)}) if domain else model
 
 
 def _say_what_there_is(path: Path, steps: int) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ... import models
 from ...refimpl.errors import InputError
 from . import options
 from .terminal import tell
@@ -13,9 +14,6 @@ from .terminal import tell
 if TYPE_CHECKING:
     from ...refimpl.light.scene import Scene
     from ...refimpl.network.denoise import Model
-
-MODELS = Path(__file__).parents[1] / "models"
-"""Folder of the models that come with the package, each with its recipe and its scores."""
 
 MODEL_PREFIX = "model:"
 """May be before the name of a model that ships with the package, and must where scenes have names too."""
@@ -35,14 +33,9 @@ def check_input(path: Path) -> None:
         raise InputError("input file", str(path), rule, "give a file on a disk")
 
 
-def shipped_models() -> list[str]:
-    """Return the names of the models that come with the package."""
-    return sorted(path.stem for path in MODELS.glob("*.safetensors"))
-
-
 def model_path(path: Path) -> Path:
     """Return the file of a model: the file that is named, else the shipped one of this name."""
-    known, name = shipped_models(), str(path).removeprefix(MODEL_PREFIX)
+    known, name = models.names(), str(path).removeprefix(MODEL_PREFIX)
     # No model is a folder: one of that name, perhaps of results, does not hide the model.
     if path.suffix or (path.exists() and not (name in known and path.is_dir())):
         return path
@@ -51,7 +44,7 @@ def model_path(path: Path) -> Path:
     if name not in known:
         rule = "there is no such file, and wamnet ships no model of this name"
         raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
-    return MODELS / f"{name}.safetensors"
+    return models.path(name)
 
 
 def load_model(path: Path, imported: bool = False) -> Model:

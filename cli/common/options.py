@@ -25,7 +25,7 @@ SCENES = "minicubes, glossy, vitrine, daylight, cornell, furnace, lone_light, em
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
 MODELS = "minicubes, cornell, glossy"
-"""Names of the models that ship with the package, for help texts; equal to the files in cli/models."""
+"""Names of the models that ship with the package, for help texts; equal to the files in models."""
 
 LARGEST_EXPOSURE_STOPS = 64.0
 """Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""

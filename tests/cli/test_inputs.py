@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wamnet import models
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
 from wamnet.compiler.model_file import load_model, save_model
@@ -117,10 +118,10 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
     A folder of that name hides nothing.
     """
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(inputs, "MODELS", tmp_path / "along")
+    monkeypatch.setattr(models, "FOLDER", tmp_path / "along")
     (tmp_path / "along").mkdir()
     shutil.copy(samples / "model.safetensors", tmp_path / "along" / "cubes.safetensors")
-    assert inputs.shipped_models() == ["cubes"]
+    assert models.names() == ["cubes"]
     for name in ("cubes", "model:cubes"):
         assert inputs.model_path(Path(name)) == tmp_path / "along" / "cubes.safetensors"
         assert inputs.load_model(Path(name)).features == ("color", "normal")

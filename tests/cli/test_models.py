@@ -8,8 +8,9 @@ import json
 import numpy as np
 import pytest
 
+from wamnet import models
 from wamnet.cli.common import options
-from wamnet.cli.common.inputs import MODELS, load_model, shipped_models
+from wamnet.cli.common.inputs import load_model
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
@@ -37,20 +38,20 @@ UNSEEN_S = 1.1
 
 
 def test_names_in_the_help_are_those_of_the_files():
-    assert sorted(NAMES) == shipped_models()
+    assert sorted(NAMES) == models.names()
 
 
 def test_digests_are_noted():
-    lines = (MODELS / "SHA256SUMS").read_text().splitlines()
+    lines = (models.FOLDER / "SHA256SUMS").read_text().splitlines()
     noted = {name: digest for digest, name in (line.split() for line in lines)}
-    found = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in MODELS.glob("*.safetensors")}
+    found = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in models.FOLDER.glob("*.safetensors")}
     assert noted == found
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_model_says_what_it_is(name):
     """Small, the network of its recipe, its scene, its scores beside another denoiser's."""
-    path = MODELS / f"{name}.safetensors"
+    path = models.path(name)
     assert path.stat().st_size < LARGEST_BYTES
     model = load_model(path)
     recipe = recipe_from_json(model.info["recipe"])
@@ -68,7 +69,7 @@ def test_a_model_says_what_it_is(name):
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "glossy"])
 def test_a_model_says_its_ranges(name):
     """Camera and time, for the page the lamps too; each frame's own draw is not among the facts."""
-    info = load_model(MODELS / f"{name}.safetensors").info
+    info = load_model(models.path(name)).info
     ranges = ranges_from_json(info["trained_on_ranges"])
     assert ranges.yaw_deg[0] <= -24.0
     assert ranges.yaw_deg[1] >= 24.0
@@ -83,7 +84,7 @@ def test_a_model_denoises_an_unseen_frame(name):
     scene = canonical(name, time=UNSEEN_S)
     noisy = render(scene, Job(256, 256, seed=990, feature_spp=16), rows=ROWS).frame
     target = to_display(render(scene, Job(256, 256, 64, seed=991), rows=ROWS).frame["color"])
-    model = load_model(MODELS / f"{name}.safetensors")
+    model = load_model(models.path(name))
     found = metrics.psnr(denoise(model, noisy), target)
     assert found >= LEAST_DB[name]
     # The features matter: without normals, and the light that follows from them, the network is far off.

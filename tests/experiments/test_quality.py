@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
-import models
 import numpy as np
 import pytest
 import quality
@@ -14,6 +13,7 @@ from lab import scores
 from lab.results import Results
 from lab.sets import SETS
 
+import models
 from wamnet.compiler.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError

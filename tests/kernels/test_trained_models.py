@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wamnet.cli.common.inputs import load_model, shipped_models, unlike_training
+from wamnet import models
+from wamnet.cli.common.inputs import load_model, unlike_training
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Program
@@ -41,7 +42,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import RANGES, ranges_from_json, varied
 from wamnet.refimpl.network.denoise import Model, denoise
 
-MODELS = shipped_models()
+MODELS = models.names()
 
 WIDTH, HEIGHT = 40, 27
 """Size of a frame in pixels: more than one tile of spectra (21 x 21), and no multiple of any tile."""

@@ -30,9 +30,7 @@ def models(folder):
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
     assert names, f"kernels/shelf is empty: {WAY_OUT}"
     return {
-        name: shelf.random_model()
-        if name == shelf.SMALL
-        else load_model(ROOT / f"cli/models/{name}.safetensors")
+        name: shelf.random_model() if name == shelf.SMALL else load_model(ROOT / f"models/{name}.safetensors")
         for name in names
     }
 

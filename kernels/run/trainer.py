@@ -24,9 +24,12 @@ from ...compiler.training.step import factor_names
 from ...compiler.training.step_kernel import FIRST, compile_step
 from ...refimpl.errors import InputError, TrainingError
 from ...refimpl.frame import Frame
+from ...refimpl.light.variation import RANGES
 from ...refimpl.network import adam, dataset, train
 from ...refimpl.network.adam import AdamState
 from ...refimpl.network.dataset import Dataset, Indices
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.domain import DOMAIN, domain_of_frames, to_json
 from ...refimpl.network.factored import Factors
 from ...refimpl.network.siren import Siren
 from ...refimpl.network.train import Checkpoint, Progress, Recipe, TrainState
@@ -218,3 +221,30 @@ def _block_end(step: int, end: int, recipe: Recipe, stops: Sequence[int]) -> int
     """Return where the block that begins at `step` ends: at a callback, or when it is long enough."""
     longest = max(1, min(BLOCK_STEPS, BLOCK_BYTES // (12 * recipe.batch)))
     return min(end, step + longest, *(step - step % every + every for every in stops))
+
+
+def model_of_run(state: TrainState, pairs: Sequence[tuple[Frame, Frame]]) -> Model:
+    """Return the trained model, rounded to integers if the recipe says so.
+
+    Its facts are those of its training frames, and their domain if they are enough.
+    """
+    model = train.model_of(state, facts_of(pairs))
+    if domain := domain_of_frames(model, [noisy for noisy, _ in pairs]):
+        model = replace(model, info={**model.info, DOMAIN: to_json(domain)})
+    recipe = state.recipe
+    return train.whole_of(model, pairs, recipe.whole, recipe.seed) if recipe.whole else model
+
+
+def facts_of(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:
+    """Return the facts of the noisy frames, each value once, for the model's reader.
+
+    Frames that name their ranges need not list what each of them has drawn.
+    """
+    names = dict.fromkeys(name for pair in pairs for name in pair[0].info)
+    values = {
+        name: dict.fromkeys(noisy.info[name] for noisy, _ in pairs if name in noisy.info) for name in names
+    }
+    drawn = RANGES in values
+    return {
+        f"trained_on_{name}": ", ".join(each) for name, each in values.items() if len(each) == 1 or not drawn
+    }

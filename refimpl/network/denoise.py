@@ -47,6 +47,16 @@ class Model:
     normalization: Normalization
     info: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return layers, window and features, and what the model was trained on, on two lines."""
+        siren, size = self.siren, self.window.size
+        kind = "integer" if self.is_whole else getattr(siren, "activation", "imported")
+        scene, steps = (self.info.get(key, "unknown") for key in ("trained_on_scene", "steps_done"))
+        return (
+            f"Model({' -> '.join(map(str, siren.widths))}, {kind}; window {size} x {size}; "
+            f"features {', '.join(self.features)};\n      trained on scene {scene}, {steps} steps)"
+        )
+
     @property
     def is_whole(self) -> bool:
         """Return whether the network, and the images that it reads, are of integers."""

@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 """The repository's root folder."""
 
-PARTS = ("refimpl", "compiler", "kernels", "spec", "cli")
+PARTS = ("models", "refimpl", "compiler", "kernels", "spec", "cli", "wamnet")
 """The folders that make up the package, in the order of imports: each may import those before it."""
 
 FOREIGN = {"out", "build", "dist", "__pycache__", "node_modules"}

@@ -357,8 +357,9 @@ def test_a_quick_run_works_where_nothing_else_is_installed(tmp_path):
                 (tmp_path / top).symlink_to(metadata.distribution(name).locate_file(top))
     tests = Path(__file__).parents[1]
     (tmp_path / "wamnet").mkdir()
-    for part in ("refimpl", "compiler", "kernels", "cli", "spec"):
-        (tmp_path / "wamnet" / part).symlink_to(tests.parent / part)
+    parts = ("models", "refimpl", "compiler", "kernels", "cli", "spec")
+    for path in (*(tests.parent / part for part in parts), *(tests.parent / "wamnet").glob("*.py")):
+        (tmp_path / "wamnet" / path.name).symlink_to(path)
     files = [tests / f"{name}.py" for name in ("refimpl/test_siren", "hard/test_adam", "compiler/test_trace")]
     done = subprocess.run(
         [
@@ -372,6 +373,7 @@ def test_a_quick_run_works_where_nothing_else_is_installed(tmp_path):
             *files,
             tests / "kernels/test_sines.py",
         ],
+        cwd=tmp_path,
         env={"PATH": os.environ["PATH"], "PYTHONPATH": str(tmp_path)},
         capture_output=True,
         text=True,

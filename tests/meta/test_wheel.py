@@ -11,7 +11,7 @@ import pytest
 
 pytestmark = pytest.mark.needs("programs")
 
-PARTS = ("refimpl", "compiler", "kernels", "cli")
+PARTS = ("wamnet", "models", "refimpl", "compiler", "kernels", "cli")
 """The folders that become `wamnet.refimpl` and so on."""
 
 OF_SPEC = ("spec/conformance", "spec/vectors")
@@ -29,6 +29,8 @@ def wheel(house, tmp_path_factory) -> zipfile.ZipFile:
     """Give the wheel built from a copy of the tree, with the setuptools of this environment."""
     folder = tmp_path_factory.mktemp("wheel")
     tree = folder / "tree"
+    (tree / "spec").mkdir(parents=True)
+    shutil.copy(house.root / "spec/__init__.py", tree / "spec")
     for part in (*PARTS, *OF_SPEC):
         shutil.copytree(house.root / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "LICENSE", "README.md"):
@@ -42,9 +44,9 @@ def wheel(house, tmp_path_factory) -> zipfile.ZipFile:
 
 def test_wheel_equals_the_tree(house, wheel):
     wanted = {
-        f"wamnet/{name}"
+        f"wamnet/{name.removeprefix('wamnet/')}"
         for name in (path.relative_to(house.root).as_posix() for path in house.files())
-        if name.startswith(tuple(f"{part}/" for part in (*PARTS, *OF_SPEC)))
+        if name.startswith(("spec/__init__.py", *(f"{part}/" for part in (*PARTS, *OF_SPEC))))
         and not name.startswith(SHELF)
         and not name.endswith(tuple(NOT_DATA))
     }

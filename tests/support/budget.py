@@ -11,6 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 BUDGET = {
+    "models": 50,
     "refimpl": 1150,
     "refimpl/light": 4375,
     "refimpl/network": 2750,
@@ -25,7 +26,7 @@ BUDGET = {
     "compiler/training": 1200,
     "kernels": 620,
     "kernels/devices": 2800,
-    "kernels/run": 3475,
+    "kernels/run": 3510,
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/blender": 500,
@@ -38,6 +39,7 @@ BUDGET = {
     "cli/course": 6150,
     "cli/files": 2200,
     "cli/reports": 1450,
+    "wamnet": 620,
 }
 """Most lines of each room, comments counted; a part by itself is the files above its rooms."""
 

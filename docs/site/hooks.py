@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import logging
 import posixpath
 import re
 import shutil
@@ -56,6 +57,8 @@ FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Order the pages."""
+    # Texts such as `[W][D_in]` in the spec are no cross-references of the API's page, which has none.
+    logging.getLogger("mkdocs.plugins.mkdocs_autorefs").setLevel(logging.ERROR)
     docs = Path(config.docs_dir)
 
     def pages(folder: str) -> list[str]:
@@ -76,6 +79,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Guide": ["guide/index.md", "first-kernel.md", *(f"guide/{name}" for name in in_order(docs))]},
         {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
+        {"API": ["reference.md"]},
         "recipes.md",
     ]
     return config

@@ -24,7 +24,7 @@ from .intervals import paired
 from .plots import Plot
 from .records import Records, bench_of
 from .results import PER_FRAME, Results, number
-from .speeds import TableOf, speed_against_error, speed_readme, speed_short
+from .speeds import TableOf, draw_speed_short, speed_against_error, speed_readme, speed_short
 from .tables import Column
 
 
@@ -514,6 +514,11 @@ PLOTS: Mapping[str, Plot] = {
         draw_speed("bench-minicubes"),
         ("bench-minicubes",),
         "Milliseconds a frame against PSNR lost and against the bound of the error: the mini cubes.",
+    ),
+    "speed-short": Plot(
+        draw_speed_short("bench-minicubes"),
+        ("bench-minicubes",),
+        "Milliseconds per frame, with PSNR and the bound on the rounding error of every frame.",
     ),
 }
 """The plots by the names of their files."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from wamnet.cli.reports import bench_report
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.reading.languages import is_read
 
-from . import tables
+from . import plots, tables
 from .records import Records, bench_of
 
 TableOf = Callable[[Records], str]
@@ -40,11 +41,11 @@ def speed_readme(record: str) -> TableOf:
 SPEED_SHORT = {
     ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
     ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
-    ("whole", "opencl fft32"): "wamnet, first layer from spectra (`fft32`)",
-    ("whole", "c fft32"): "wamnet, spectra (`fft32`) in C, by GCC",
+    ("whole", "opencl fft32"): "wamnet, first layer by FFT (`fft32`)",
+    ("whole", "c fft32"): "wamnet, the same in C, by GCC",
     ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
-    ("exact", "opencl tile16"): "wamnet, the same bits everywhere (profile `exact`)",
-    ("whole", "opencl plain"): "wamnet, the kernel that is made to be read (`plain`)",
+    ("exact", "opencl tile16"): "wamnet, bit-identical everywhere (profile `exact`)",
+    ("whole", "opencl plain"): "wamnet, the human-readable kernel (`plain`)",
     ("torch.compile", "–"): "the same network in `torch.compile`",
     ("onnxruntime", "–"): "the same network in ONNX Runtime",
     ("oidn:fast", "–"): "Open Image Denoise, fast",
@@ -67,20 +68,48 @@ def text_checked(form: str, way: str, bound: str) -> str:
     return "yes" if bound.endswith("†") and read else "no"
 
 
+def short_rows(records: Records, record: str) -> list[list[str]]:
+    """Return the cells of the few rows and columns of [`speed_against_error`] that fit on the first page."""
+    found = speed_against_error(record)(records).splitlines()
+    heads, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found)
+    shown: list[list[str]] = []
+    for row in rows:  # of a kernel that is in front too, the first
+        cells = dict(zip(heads, row, strict=True))
+        form, way = cells["form"].removesuffix(" *"), cells["executor, schedule"]
+        name = SPEED_SHORT.get((form, way))
+        if name and all(name != other for other, *_ in shown):
+            checked = text_checked(form, way, cells[SPEED_COLUMNS[-1]])
+            shown.append([name, way, *(cells[column] for column in SPEED_COLUMNS), checked])
+    return shown
+
+
 def speed_short(record: str) -> TableOf:
-    """Return the few rows and columns of [`speed_against_error`] that fit on the first page."""
+    """Return these rows as a table."""
+    heads = ["by", "schedule", *SPEED_COLUMNS, "text checked"]
+    return lambda records: tables.markdown(heads, short_rows(records, record))
 
-    def table(records: Records) -> str:
-        found = speed_against_error(record)(records).splitlines()
-        heads, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found)
-        shown: list[list[str]] = []
-        for row in rows:  # of a kernel that is in front too, the first
-            cells = dict(zip(heads, row, strict=True))
-            form, way = cells["form"].removesuffix(" *"), cells["executor, schedule"]
-            name = SPEED_SHORT.get((form, way))
-            if name and all(name != other for other, *_ in shown):
-                checked = text_checked(form, way, cells[SPEED_COLUMNS[-1]])
-                shown.append([name, way, *(cells[column] for column in SPEED_COLUMNS), checked])
-        return tables.markdown(["by", "schedule", *SPEED_COLUMNS, "text checked"], shown)
 
-    return table
+def draw_speed_short(record: str) -> Callable[[Records], Any]:
+    """Return what draws these rows: a dot for the time of each, with its quality and its bound in words."""
+
+    def draw(records: Records) -> Any:
+        figure, (axis,) = plots.axes(1, (8.0, 3.6))
+        rows = [row for row in short_rows(records, record) if row[3] != "–"]
+        for at, (_, way, ms, psnr, *_, bound, _) in enumerate(rows):
+            marker, color = ("s", "#D55E00") if way == "–" else ("o", "#0072B2")
+            time, proven = float(ms.replace(",", "")), bound.removesuffix(" †")
+            axis.plot(time, at, marker, color=color, markersize=7)
+            error = "" if proven == "–" else f", error at most {proven}"
+            axis.annotate(
+                f"{ms} ms, {psnr} dB{error}", (time, at), (9, -3), fontsize=8, textcoords="offset points"
+            )
+        axis.set_yticks(range(len(rows)), [row[0].replace("`", "") for row in rows], fontsize=8)
+        axis.invert_yaxis()
+        axis.set_xscale("log")
+        axis.set_xticks([30, 50, 100, 200, 500, 1000], ["30", "50", "100", "200", "500", "1000"])
+        axis.minorticks_off()
+        axis.set_xlim(30, 5000)
+        axis.set_xlabel("ms per frame of 512x512, two cores (left is faster)")
+        return figure
+
+    return draw

@@ -1,0 +1,93 @@
+"""The moving image at the top of README.md: noisy, both denoisers, and the reference.
+
+    python experiments/front.py -o docs/images/front.webp
+
+1. Frames of the scene minicubes: its time runs once around, and the camera swings inside the range that the
+   bundled model was trained on [`scenes`]. The model was not trained on these frames.
+2. Each is rendered with one path and 16 feature rays per pixel, denoised by the model and by Open Image
+   Denoise (high, with the same features declared clean), and rendered with many paths [`panels`].
+3. All are shown at the same exposure; the order of the panels is that of the caption.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+import wamnet
+from wamnet.cli.common.inputs import load_scene
+from wamnet.cli.common.options import View
+from wamnet.cli.files.outputs import replacing
+from wamnet.kernels.bench.peers.peer_oidn import Kept
+from wamnet.refimpl.encoding import to_8bit, to_display
+from wamnet.refimpl.light.scene import Scene
+
+FRAMES, FRAME_MS, YAW_DEG = 32, 120, 12.0
+"""Frames of the loop, the time that each is shown, and the largest turn of the camera."""
+
+SIZE, REFERENCE_SPP, LABEL_PX = 320, 512, 26
+"""Pixels of a panel's edge, paths per pixel of the reference, and the height of a label."""
+
+QUALITY = 45
+"""Quality of the WebP file, which decides its size."""
+
+LABELS = ("1 path per pixel", "wamnet", "Open Image Denoise", f"reference, {REFERENCE_SPP} paths per pixel")
+"""What is above each panel."""
+
+
+def scenes(period: float) -> Iterator[Scene]:
+    """Yield the scene at the times and cameras of the loop."""
+    for step in range(FRAMES):
+        phase = step / FRAMES
+        yaw = YAW_DEG * math.sin(2 * math.pi * phase)
+        yield load_scene("minicubes", period * phase, [], View(yaw))
+
+
+def panels(scene: Scene, model: wamnet.Model, other: Kept, seed: int) -> list[NDArray[np.uint8]]:
+    """Return the four images of a frame, 8 bits per channel."""
+    size = {"width": SIZE, "height": SIZE, "executor": "opencl"}
+    noisy = wamnet.render(scene, feature_spp=16, seed=seed, **size)
+    clean = wamnet.render(scene, spp=REFERENCE_SPP, seed=10_000 + seed, **size)
+    ours = wamnet.denoise(model, noisy, executor="opencl", encoded=True)
+    linear = (noisy["color"], other(noisy).copy(), clean["color"])
+    first, theirs, last = (to_display(color, model.normalization.exposure_stops) for color in linear)
+    return [to_8bit(image) for image in (first, ours, theirs, last)]
+
+
+def sheet(images: list[NDArray[np.uint8]]) -> Image.Image:
+    """Return four labelled panels in two rows."""
+    cell = SIZE + LABEL_PX
+    page = Image.new("RGB", (2 * SIZE + 4, 2 * cell), "white")
+    pen, font = ImageDraw.Draw(page), ImageFont.load_default(16)
+    for index, (image, label) in enumerate(zip(images, LABELS, strict=True)):
+        left, top = (index % 2) * (SIZE + 4), (index // 2) * cell
+        pen.text((left + 4, top + 3), label, "black", font)
+        page.paste(Image.fromarray(image), (left, top + LABEL_PX))
+    return page
+
+
+def main() -> None:
+    """Render and write the loop."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/front.webp"))
+    parser.add_argument("--period", type=float, default=8.0, help="the scene's time at the loop's end")
+    options = parser.parse_args()
+    model, other = wamnet.load("minicubes"), Kept((SIZE, SIZE), clean=True)
+    pages = [sheet(panels(scene, model, other, seed)) for seed, scene in enumerate(scenes(options.period))]
+    with replacing(options.output) as path:
+        pages[0].save(
+            path, "WEBP", save_all=True, append_images=pages[1:], duration=FRAME_MS, loop=0, quality=QUALITY
+        )
+    print(f"{options.output}: {options.output.stat().st_size / 1e6:.2f} MB, {len(pages)} frames")
+
+
+if __name__ == "__main__":
+    main()

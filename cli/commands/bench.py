@@ -181,7 +181,7 @@ def bench(
     PSNR against the references. Predictions come from operations, sines and bytes and the machine's measured
     rates.
     """
-    packages.need("matplotlib", "for the plots", "report")
+    packages.need("matplotlib", "for the plots")
     check_folder(output)
     usual = QUICK if quick else USUAL
     given = {"frames": frames, "reference_spp": reference_spp, "steps": steps}

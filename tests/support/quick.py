@@ -1,8 +1,8 @@
 """`pytest --quick`: the tests that need NumPy and little else, on a machine that has nothing more.
 
-1. A quick run has the packages of `wamnet[quick]` and what they require [`brought`]. Others are absent, also
-   where they are installed [`Absent`], and no program can be started [`refuse_programs`]: a run on a
-   developer's machine fails where a run on a bare one would.
+1. A quick run has the packages of the dependency group `quick` and what they require [`brought`]. Others are
+   absent, also where they are installed [`Absent`], and no program can be started [`refuse_programs`]: a run
+   on a developer's machine fails where a run on a bare one would.
 2. What a test needs is found, not listed. A file or folder whose import asks for an absent package is left
    out [`pytest_make_collect_report`]. Executors but `numpy` and peers are left out by the fixtures that open
    them.
@@ -37,7 +37,7 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 NEEDS = {
     "devices": "it runs kernels or other renderers",
-    "packages": "it imports what wamnet[quick] does not bring",
+    "packages": "it imports what the dependency group `quick` does not bring",
     "programs": "it starts programs",
     "time": "it computes for seconds",
 }
@@ -53,9 +53,11 @@ def left_out(need: str) -> str:
 
 
 def brought() -> set[str]:
-    """Return the distributions of `wamnet[quick]` and all that they require."""
-    project = tomllib.loads(PROJECT.read_text())["project"]
-    waiting = [Requirement(r) for r in project["dependencies"] + project["optional-dependencies"]["quick"]]
+    """Return the distributions of the group `quick` and all that they require."""
+    project = tomllib.loads(PROJECT.read_text())
+    waiting = [
+        Requirement(r) for r in project["project"]["dependencies"] + project["dependency-groups"]["quick"]
+    ]
     found = {"wamnet"}
     while waiting:
         name = canonicalize_name(waiting.pop().name)

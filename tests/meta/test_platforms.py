@@ -25,7 +25,7 @@ WITHOUT = {
 BRINGS = {("pyopencl", "pocl"): {"pocl-binary-distribution"}, ("moderngl", ""): {"glcontext"}}
 """What these install in turn, with an extra or always."""
 
-EXTRA = re.compile(r"wamnet\[([a-z,]+)\]")
+EXTRA = re.compile(r"wamnet\\*\[([a-z,]+)\\*\]")
 """Extras in a requirement of this package."""
 
 GROUP = re.compile(r"pip install [^\n`']*--group ([a-z]+)")

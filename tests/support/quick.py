@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires
@@ -55,21 +55,30 @@ def left_out(need: str) -> str:
 def brought() -> set[str]:
     """Return the distributions of the group `quick` and all that they require."""
     project = tomllib.loads(PROJECT.read_text())
-    waiting = [
-        Requirement(r) for r in project["project"]["dependencies"] + project["dependency-groups"]["quick"]
-    ]
-    found = {"wamnet"}
+    return {"wamnet"} | distributions(
+        project["project"]["dependencies"] + project["dependency-groups"]["quick"]
+    )
+
+
+def distributions(requirements: Iterable[str]) -> set[str]:
+    """Return the names of the distributions that requirements install, and of all that these require."""
+    waiting, names = [(requirement, "") for requirement in requirements], set[str]()
+    seen = set[tuple[str, str]]()
     while waiting:
-        name = canonicalize_name(waiting.pop().name)
-        if name in found:
+        source, extra = waiting.pop()
+        requirement = Requirement(source)
+        if (source, extra) in seen or (
+            requirement.marker and not requirement.marker.evaluate({"extra": extra})
+        ):
             continue
-        found.add(name)
+        seen.add((source, extra))
+        names.add(canonicalize_name(requirement.name))
         try:
-            texts = requires(name) or []
+            texts = requires(requirement.name) or []
         except PackageNotFoundError:  # another version of Python needs it
             continue
-        waiting += [r for r in map(Requirement, texts) if not r.marker or r.marker.evaluate({"extra": ""})]
-    return found
+        waiting += [(each, option) for each in texts for option in ("", *requirement.extras)]
+    return names
 
 
 class Absent(MetaPathFinder):

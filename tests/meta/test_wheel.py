@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
+import runpy
 import shutil
 import subprocess
 import sys
 import zipfile
+from email import message_from_string
+from email.message import Message
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
@@ -29,7 +33,7 @@ NOT_DATA = {".pyc"}
 """Suffixes of files in these folders that are not part of the package."""
 
 
-IN_WHEEL = (*PARTS, *OF_SPEC, "pyproject.toml", "LICENSE", "README.md")
+IN_WHEEL = (*PARTS, *OF_SPEC, "pyproject.toml", "setup.py", "LICENSE", "README.md")
 """What of the tree a wheel is built from; a source distribution has more."""
 
 
@@ -97,17 +101,57 @@ def test_wheel_has_the_command_and_the_licence(wheel):
     assert "Apache License" in texts["LICENSE"]
 
 
-def test_base_install_needs_numpy_and_safetensors_alone(wheel):
-    metadata = next(
-        wheel.read(name).decode() for name in wheel.namelist() if name.endswith(".dist-info/METADATA")
-    )
-    needs = [
-        line.removeprefix("Requires-Dist: ")
-        for line in metadata.splitlines()
-        if line.startswith("Requires-Dist:")
-    ]
-    base = sorted(need for need in needs if "extra ==" not in need)
+@pytest.fixture(scope="module")
+def metadata(wheel) -> Message:
+    """Give what a package index reads of the wheel; its payload is the description."""
+    (name,) = (name for name in wheel.namelist() if name.endswith(".dist-info/METADATA"))
+    return message_from_string(wheel.read(name).decode())
+
+
+def test_base_install_needs_numpy_and_safetensors_alone(metadata):
+    base = sorted(need for need in metadata.get_all("Requires-Dist") if "extra ==" not in need)
     assert [need.rstrip("0123456789.").rstrip(">=") for need in base] == ["numpy", "safetensors"]
+
+
+def test_metadata_names_home_and_authors(house, metadata):
+    """The citation names the same home, version and authors."""
+    urls = dict(line.split(", ") for line in metadata.get_all("Project-URL"))
+    assert set(urls) == {"Homepage", "Documentation", "Issues", "Changelog"}
+    assert all(url.startswith(urls["Homepage"]) for url in urls.values())
+    citation = (house.root / "CITATION.cff").read_text(encoding="utf-8")
+    for line in (
+        f'repository-code: "{urls["Homepage"]}"',
+        f"version: {metadata['Version']}",
+        f'- name: "{metadata["Author"]}"',
+        f"license: {metadata['License-Expression']}",
+    ):
+        assert line in citation
+
+
+def test_description_does_not_depend_on_files(metadata):
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    description = metadata.get_payload()
+    targets = re.findall(r"\]\(([^)]*)\)|(?:src|href)=\"([^\"]*)", description)
+    assert len(targets) > 10
+    assert all("".join(target).startswith("https://") for target in targets), targets
+    assert "<!--" not in description
+
+
+@pytest.mark.parametrize(
+    ("readme", "description"),
+    [
+        ("[a](docs/b.md#c)", "[a](https://x/y/blob/HEAD/docs/b.md#c)"),
+        ("![a](docs/b.png)", "![a](https://x/y/raw/HEAD/docs/b.png)"),
+        ("[![`a`](./b.SVG)](docs)", "[![`a`](https://x/y/raw/HEAD/b.SVG)](https://x/y/blob/HEAD/docs)"),
+        ('<img width="9" src="b.webp">', '<img width="9" src="https://x/y/raw/HEAD/b.webp">'),
+        ("[a]: b.md\n[a](#c)", "[a]: https://x/y/blob/HEAD/b.md\n[a](https://x/y#c)"),
+        ("[a](http://b) [c](mailto:d@e) <a href='//f'>", "[a](http://b) [c](mailto:d@e) <a href='//f'>"),
+        ("`[a](b)`\n```\n[a](b) <!-- c -->\n```\n", "`[a](b)`\n```\n[a](b) <!-- c -->\n```\n"),
+        ("It takes <!--= ms -->5<!--/--> ms.<!-- a\nb -->", "It takes 5 ms."),
+    ],
+)
+def test_links_of_the_description(house, readme, description):
+    assert runpy.run_path(str(house.root / "setup.py"))["described"](readme, "https://x/y") == description
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ RELATIVE = re.compile(
 """What comes before the target of a link or an image, and the target, which has no scheme."""
 
 IMAGES = (".png", ".jpg", ".gif", ".svg", ".webp", ".webm", ".mp4")
-"""Suffixes of files that a page shows: the home serves them under `raw`, and a page about each under `blob`."""
+"""Suffixes of files that a page shows: the home has them under `raw`, and pages about them under `blob`."""
 
 
 def described(readme: str, home: str) -> str:

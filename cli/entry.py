@@ -3,7 +3,7 @@
 Nothing is written and no process started before [`main`] of main.py runs, so that Ctrl-C may end the process
 at once until then [`run`]. Modules in C turn an interrupt of their import into errors of their own: therefore
 it is not raised meanwhile. Standard streams are there and take any text before anything is imported
-[`_open_streams`]. A package that `pip install wamnet` alone leaves out is one line [`_incomplete`].
+[`_open_streams`]. A package that the base install lacks is one line [`_incomplete`].
 """
 
 import atexit

@@ -36,7 +36,7 @@ def test_an_interrupt_of_the_imports_is_one_line(tmp_path, name) -> None:
 
 @pytest.mark.parametrize("name", ["typer", "rich", "wamnet.cli.main"])
 def test_a_base_installation_prints_what_to_install(tmp_path, name) -> None:
-    """`pip install wamnet` alone ended in a traceback; a missing module of ours is a bug."""
+    """The base install ended in a traceback; a missing module of ours is a bug."""
     code = f"import sys; sys.modules[{name!r}] = None; from wamnet.cli import entry; sys.exit(entry.run())"
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)

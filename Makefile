@@ -34,11 +34,11 @@ baselines: setup ## Add PyTorch and Open Image Denoise, with which all tests of 
 	@.ci/setup baselines
 
 demo: ## Render, train, compile, run and compare; results in out/demo (5 minutes on two cores)
-	@.ci/setup opencl,opengl,cli,report
+	@.ci/setup full
 	@$(VENV)/bin/wamnet demo -o out/demo
 
 docs: ## Build the web site: spec, tutorial, course; open out/site/index.html
-	@.ci/setup opencl,opengl,cli,report,docs
+	@.ci/setup docs
 	@$(VENV)/bin/python docs/site/build.py
 
 quick: ## Run the tests that need NumPy, and no device, compiler or browser (2 minutes at most on two cores)

@@ -3,7 +3,7 @@
 Nothing is written and no process started before [`main`] of main.py runs, so that Ctrl-C may end the process
 at once until then [`run`]. Modules in C turn an interrupt of their import into errors of their own: therefore
 it is not raised meanwhile. Standard streams are there and take any text before anything is imported
-[`_open_streams`].
+[`_open_streams`]. A package that the base install lacks is one line [`_incomplete`].
 """
 
 import atexit
@@ -50,14 +50,16 @@ def _run() -> int:
     ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:
         signal.signal(signal.SIGINT, _end)
-    from .main import main
-
     try:
+        from .main import main
+
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         return main()
     except KeyboardInterrupt:
         return _interrupted()
+    except ModuleNotFoundError as error:
+        return _incomplete(error)
     finally:
         if ours:
             # What Python does at its end is not work that could be lost; an interrupt then needs no words.
@@ -67,6 +69,17 @@ def _run() -> int:
 def _end(_number: int, _frame: object) -> None:
     """End the process at once."""
     os._exit(_interrupted())
+
+
+def _incomplete(error: ModuleNotFoundError) -> int:
+    """Print which package the base installation lacks, and how to install it; a module of ours is a bug."""
+    if (error.name or "wamnet").startswith("wamnet"):
+        raise error
+    fix = "install it: pip install 'wamnet[full]'"
+    sys.stderr.write(
+        f"wamnet: error: Python package {error.name!r} is missing: the command needs it; {fix}\n"
+    )
+    return 2
 
 
 def _interrupted() -> int:

@@ -11,7 +11,7 @@
     python experiments/flicker.py
     python experiments/flicker.py --scale paper -o out/flicker-paper
 
-Without the package `pyoidn` (extra `baselines`) the rows of Open Image Denoise are left out, and it says so.
+Without the package `pyoidn` (group `baselines`) the rows of Open Image Denoise are left out, and it says so.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def methods() -> dict[str, Method]:
     """Return the methods that this installation can run; say which it cannot."""
     there = importlib.util.find_spec("pyoidn") is not None
     if not there:
-        sys.stderr.write(f"{OIDN} is left out: pip install 'wamnet[baselines]'\n")
+        sys.stderr.write(f"{OIDN} is left out: pip install pyoidn\n")
     return {name: method for name, method in METHODS.items() if there or not name.startswith(OIDN)}
 
 

@@ -10,7 +10,7 @@
     python experiments/heads.py
     python experiments/heads.py --scenes glossy --seeds 0 1
 
-It needs PyTorch, `pip install 'wamnet[baselines]'`. Pictures are small and trainings short: rows are compared
+It needs PyTorch, `pip install torch`. Pictures are small and trainings short: rows are compared
 with each other, and not with those of `quality.py`.
 """
 

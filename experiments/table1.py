@@ -360,7 +360,7 @@ def available(rows: Sequence[str]) -> list[str]:
     kept = []
     for row in (name for name in ROWS if name in rows):
         if missing := ROWS[row].missing:
-            way_out = "pip install 'wamnet[baselines]'"
+            way_out = "pip install --group baselines"
             sys.stderr.write(f"table1: {row} is left out: {', '.join(missing)} is missing; {way_out}\n")
         else:
             kept.append(row)

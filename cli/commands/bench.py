@@ -170,18 +170,17 @@ def bench(
     first_runs: FirstRuns = False,
     quick: Quick = False,
 ) -> None:
-    r"""Measure speed against error: kernels, schedules, forms of the network, and peers, in one run.
+    """Measure speed against error: kernels, schedules, forms of the network, and peers, in one run.
 
     Frames of all of them are interleaved: drift of the machine affects them alike.
 
-    The model of the mini cubes that ships with the package is measured on unseen frames of its scene, which
-    are rendered first; another one on those of its own scene, or of a data set. Peers that are installed take
-    part: PyTorch, ONNX Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and Open Image Denoise,
-    which is another denoiser. [bold]pip install 'wamnet\[peers]'[/] brings them. Errors are against float64,
-    PSNR against the references. Predictions come from operations, sines and bytes and the machine's measured
-    rates.
+    The bundled mini-cubes model is measured on unseen frames of its scene, which are rendered first; another
+    model on those of its own scene, or of a data set. Baselines that are installed take part: PyTorch, ONNX
+    Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and the denoiser Open Image Denoise:
+    [bold]pip install torch onnxruntime openvino halide tinygrad pyoidn[/]. Errors are against float64, PSNR
+    against the references. Predictions come from operations, sines and bytes and measured rates.
     """
-    packages.need("matplotlib", "for the plots", "report")
+    packages.need("matplotlib", "for the plots")
     check_folder(output)
     usual = QUICK if quick else USUAL
     given = {"frames": frames, "reference_spp": reference_spp, "steps": steps}

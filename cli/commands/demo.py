@@ -175,7 +175,7 @@ def demo(
     Open FOLDER/report.html afterwards. After Ctrl-C, the same command resumes where it was.
     """
     for module in ("matplotlib", "jinja2"):
-        need(module, "to draw the report", "report")
+        need(module, "to draw the report")
     if quick and size is not None:
         raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
     plan = for_this_machine(QUICK if quick else Plan(size_px=Plan.size_px if size is None else size))

@@ -50,8 +50,8 @@ def do_on_cluster(
     on_result: Callable[[_Task, _Result], None],
 ) -> None:
     """Do the tasks on a Dask client's workers; `do` must be importable there. Results come in any order."""
-    distributed = need("distributed", PURPOSE, "cluster")
-    cloudpickle = need("cloudpickle", PURPOSE, "cluster")
+    distributed = need("distributed", PURPOSE)
+    cloudpickle = need("cloudpickle", PURPOSE)
 
     def call(parcel: bytes) -> _Result:
         """Do a task on a worker: a nested function travels whole, and needs nothing there but Python.
@@ -82,7 +82,7 @@ def do_on_cluster(
             del future, result  # lets the scheduler forget it
     except ImportError as error:
         rule = "a worker needs what this process has"
-        way_out = "install it there: pip install 'wamnet[cluster]'"
+        way_out = "install it there: pip install 'wamnet[full]'"
         raise InputError(f"Python package {error.name!r} on a worker", "missing", rule, way_out) from None
     except distributed.KilledWorker:
         rule = "several workers have ended while they did the same task"
@@ -95,7 +95,7 @@ def do_on_cluster(
 @contextmanager
 def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """Yield a Dask client: of the scheduler at an address, or of `workers` processes that end with it."""
-    distributed = need("distributed", PURPOSE, "cluster")
+    distributed = need("distributed", PURPOSE)
     with _quiet_logs():
         if scheduler is not None:
             with _connected(distributed, scheduler) as client:

@@ -9,13 +9,13 @@ from ...compiler.core.writing import signals_wait
 from ...refimpl.errors import InputError
 
 
-def need(module: str, purpose: str, extra: str) -> Any:
-    """Import an optional module, or say what needs it and which extra of this package installs it."""
+def need(module: str, purpose: str, package: str = "'wamnet[full]'") -> Any:
+    """Import an optional module, or say what needs it and which package brings it."""
     try:
         with signals_wait():
             return importlib.import_module(module)
     except ImportError:
         rule = f"it is needed {purpose}"
         raise InputError(
-            f"Python package {module!r}", "missing", rule, f"install it: pip install 'wamnet[{extra}]'"
+            f"Python package {module!r}", "missing", rule, f"install it: pip install {package}"
         ) from None

@@ -126,7 +126,7 @@ def _write(
 
     Text that came from a source gets its bytes.
     """
-    openexr = need("OpenEXR", "to write EXR files", "files")
+    openexr = need("OpenEXR", "to write EXR files")
     compression = openexr.ZIP_COMPRESSION if compress else openexr.NO_COMPRESSION
     form = {"compression": compression, "type": openexr.scanlineimage}
     with replacing(path) as new, spelled(new) as name:
@@ -279,7 +279,7 @@ def _matrix(path: Path, file: File, index: int) -> tuple[Floats | None, str]:
 
 def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
     """Return the name, the attributes and, if pixels are read, the channels (H, W) of each part."""
-    openexr = need("OpenEXR", "to read EXR files", "files")
+    openexr = need("OpenEXR", "to read EXR files")
     path, log = file.path, [""]
     with file.in_utf8() as readable, spelled(readable) as name:
         try:

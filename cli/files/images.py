@@ -49,13 +49,13 @@ def write_png(path: Path, encoded: Floats, origin: str = "") -> None:
 
     With an `origin` the file keeps a text that names it.
     """
-    pillow = need("PIL.Image", "to write PNG files", "files")
+    pillow = need("PIL.Image", "to write PNG files")
     _save(path, pillow.fromarray(encoding.to_8bit(encoded)), origin)
 
 
 def _save(path: Path, picture: Any, origin: str) -> None:
     """Write an image of Pillow's as a PNG."""
-    text = need("PIL.PngImagePlugin", "to write PNG files", "files").PngInfo()
+    text = need("PIL.PngImagePlugin", "to write PNG files").PngInfo()
     if origin:
         text.add_text(ORIGIN, origin)
     with replacing(path) as new:
@@ -67,9 +67,9 @@ def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) 
 
     Both sides of the whole are even, as films want it.
     """
-    pillow = need("PIL.Image", "to write PNG files", "files")
-    drawing = need("PIL.ImageDraw", "to label", "files")
-    font = need("PIL.ImageFont", "to label", "files").load_default()
+    pillow = need("PIL.Image", "to write PNG files")
+    drawing = need("PIL.ImageDraw", "to label")
+    font = need("PIL.ImageFont", "to label").load_default()
     height, width, _ = panels[0][1].shape
     whole = pillow.new("RGB", (_even(width * len(panels)), _even(height + LABEL_PX)))
     for index, (label, encoded) in enumerate(panels):
@@ -98,7 +98,7 @@ def read_origin(path: Path) -> str | None:
 
     What is not a regular file is refused: a pipe of this name would make us wait.
     """
-    pillow = need("PIL.Image", "to read PNG files", "files")
+    pillow = need("PIL.Image", "to read PNG files")
     content = BytesIO(read_file(path, "picture", "move it elsewhere, or choose another output with -o"))
     try:
         with _quiet(), pillow.open(content, formats=["PNG"]) as picture:
@@ -117,7 +117,7 @@ def read_png(path: Path, tell: Callable[[str], None] | None = None) -> Floats:
     `tell` is given a sentence on what was converted or ignored.
     """
     check_input(path)
-    pillow = need("PIL.Image", "to read PNG files", "files")
+    pillow = need("PIL.Image", "to read PNG files")
     # Not from the file itself: of a chunk that says it is huge, a file would give room for all of it.
     content = read_file(path)
     chunks = png_colors.read_chunks(path, content)

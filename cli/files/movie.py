@@ -28,9 +28,9 @@ def write_movie(path: Path, pictures: Sequence[Path], fps: float) -> None:
 
 def check(path: Path, fps: float) -> None:
     """Refuse a film that could not be written, before the work begins."""
-    need("PIL.Image", "to write pictures", "files")
+    need("PIL.Image", "to write pictures")
     if path.suffix.lower() == ".mp4":
-        need("imageio_ffmpeg", "to write MP4 files", "video")
+        need("imageio_ffmpeg", "to write MP4 files")
     elif fps > MOST_FPS_OF_GIF:
         raise InputError("--fps", fps, f"a GIF has {MOST_FPS_OF_GIF:g} at most", "use fewer, or .mp4")
     elif 0.0 < fps < 1.0 / LONGEST_S_OF_GIF:
@@ -40,7 +40,7 @@ def check(path: Path, fps: float) -> None:
 
 def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
     """Yield the pictures one after another, as RGB."""
-    pillow = need("PIL.Image", "to read PNG files", "files")
+    pillow = need("PIL.Image", "to read PNG files")
     for path in pictures:
         try:
             with pillow.open(path) as picture:
@@ -65,7 +65,7 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
 
 def _write_mp4(path: Path, pictures: Sequence[Path], fps: float) -> None:
     """Write H.264 with the ffmpeg that comes with its package."""
-    ffmpeg = need("imageio_ffmpeg", "to write MP4 files", "video")
+    ffmpeg = need("imageio_ffmpeg", "to write MP4 files")
     writer = None
     try:
         for picture in _opened(pictures):

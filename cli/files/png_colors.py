@@ -86,7 +86,7 @@ def in_srgb(path: Path, chunks: Mapping[bytes, bytes], picture: Any) -> tuple[Fl
 
 def _by_profile(path: Path, picture: Any) -> tuple[Any, str]:
     """Return the levels (H, W, 3) of a picture in sRGB, by the profile in it, and the profile's name."""
-    color = need("PIL.ImageCms", "to convert by ICC profiles", "files")
+    color = need("PIL.ImageCms", "to convert by ICC profiles")
     try:
         profile = color.ImageCmsProfile(BytesIO(picture.info["icc_profile"]))
         converted = color.profileToProfile(picture, profile, color.createProfile("sRGB"))

@@ -59,7 +59,7 @@ def build_page(animation: Animation, model: Model, fast: Model | None = None) ->
 
 def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Path | None) -> str:
     """Return the page of files and names as a command is given them."""
-    need("jinja2", "for web pages", "report")
+    need("jinja2", "for web pages")
     network = load_model(model)
     name = scene or learned_scene(network)
     return build_page(animation_of(name, assignments), network, load_model(fast) if fast else None)

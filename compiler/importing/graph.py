@@ -107,7 +107,7 @@ def read(path: Path) -> Graph:
     try:
         import onnx
     except ImportError as error:
-        told = f"package {error.name} cannot be imported: pip install 'wamnet[targets]'"
+        told = f"package {error.name} cannot be imported: pip install 'wamnet[full]'"
         raise ExecutorUnavailable(told) from None
     way_out = "export the network again, all of it in one file"
     try:

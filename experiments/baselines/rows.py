@@ -418,7 +418,7 @@ def svgf(bench: Bench, seed: int) -> Ready:
 
 def non_local_means(bench: Bench, seed: int) -> Ready:
     """Open scikit-image's non-local means, with the strength that suits a training frame best."""
-    restoration = need("skimage.restoration", "for non-local means", "experiments")
+    restoration = need("skimage.restoration", "for non-local means", "scikit-image")
 
     def filtered(frame: Frame, strength: float) -> Floats:
         noisy = to_display(frame["color"].astype(np.float64))

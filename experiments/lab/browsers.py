@@ -92,7 +92,7 @@ def chromium(flags: Sequence[str] = ()) -> Iterator[Any]:
     try:
         from playwright.sync_api import Error, sync_playwright
     except ImportError:
-        raise ExecutorUnavailable("no package playwright; pip install 'wamnet[web]'") from None
+        raise ExecutorUnavailable("no package playwright; pip install playwright") from None
     if program is None:
         raise ExecutorUnavailable("no Chromium; in Debian: apt-get install chromium")
     with sync_playwright() as driver:

@@ -91,7 +91,7 @@ def flip_map(picture: Floats, target: Floats) -> NDArray[np.float32]:
         if low < 0.0 or high > 1.0:
             rule = "FLIP takes display-encoded colours in [0, 1]"
             raise InputError(f"range of {what}", f"{low:g} to {high:g}", rule, "encode or clip it")
-    package = need("flip_evaluator", "to compute FLIP", "experiments")
+    package = need("flip_evaluator", "to compute FLIP", "flip-evaluator")
     images = [np.ascontiguousarray(values, np.float32) for values in (target, picture)]
     found, _, _ = package.evaluate(*images, "LDR", applyMagma=False, computeMeanError=False)
     return np.asarray(found, np.float32).reshape(picture.shape[:2])

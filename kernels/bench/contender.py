@@ -133,7 +133,7 @@ class Opened:
 class Contender:
     """A way to denoise: its name, what it is in words, and how it is opened for a model and a size (px).
 
-    `packages` must be installed, and `extra` of this package brings them; `variant` is None for another
+    `packages` must be installed; `variant` is None for another
     denoiser. `executor` names the kernels' executor, None for peers. `caches` says where compiled code stays.
     """
 
@@ -144,7 +144,6 @@ class Contender:
     executor: str | None = None
     schedule: str = ""
     packages: tuple[str, ...] = ()
-    extra: str = "peers"
     caches: str = NO_CACHE
 
     def missing(self) -> str:
@@ -152,7 +151,7 @@ class Contender:
         absent = [name for name in self.packages if find_spec(name) is None]
         if not absent:
             return ""
-        return f"not installed: {', '.join(absent)}; pip install 'wamnet[{self.extra}]'"
+        return f"not installed: {', '.join(absent)}; pip install {' '.join(absent)}"
 
     def prepare(self, tools: Tools) -> None:
         """Import the packages and open the executor, which is not compiling; or raise ExecutorUnavailable."""

@@ -32,7 +32,7 @@ def graph(model: Model) -> bytes:
         return peer_onnxruntime.graph(model)
     except ImportError as error:
         raise ExecutorUnavailable(
-            f"package {error.name} cannot be imported: pip install 'wamnet[targets]'"
+            f"package {error.name} cannot be imported: pip install {error.name}"
         ) from None
 
 

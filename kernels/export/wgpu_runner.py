@@ -21,7 +21,7 @@ from ..devices.executor import Kernel, Memory
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 
-WAY_OUT = "pip install 'wamnet[targets]', and a Vulkan driver: apt-get install mesa-vulkan-drivers"
+WAY_OUT = "pip install wgpu, and a Vulkan driver: apt-get install mesa-vulkan-drivers"
 """How to get a device."""
 
 UNIFORM_BYTES = 16

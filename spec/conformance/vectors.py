@@ -119,6 +119,7 @@ def page() -> str:
         "# Vectors",
         "",
         f"Version {VERSION}. Written by `wamnet conformance --write spec/vectors`; this page too.",
+        "Licence of the vectors, scenes and images in this folder: Apache-2.0.",
         "How to use them, and what the words mean: spec/conformance.md.",
         "The form of the files: schema.json beside this page.",
         "",

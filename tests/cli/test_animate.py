@@ -349,4 +349,4 @@ def test_another_animation_is_refused(wamnet, refused) -> None:
 def test_without_the_package(refused, monkeypatch) -> None:
     """The usual line, before the work."""
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    assert "install it: pip install 'wamnet[video]'" in refused("animate", "m.safetensors", "-o", "a.mp4")
+    assert "install it: pip install 'wamnet[full]'" in refused("animate", "m.safetensors", "-o", "a.mp4")

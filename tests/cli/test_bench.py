@@ -140,7 +140,7 @@ def test_an_output_that_is_a_file_is_refused(refused, here) -> None:
 
 def test_without_matplotlib_nothing_is_measured(refused, here, monkeypatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
-    assert "pip install 'wamnet[report]'" in refused("bench")
+    assert "pip install 'wamnet[full]'" in refused("bench")
 
 
 def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> None:
@@ -158,14 +158,14 @@ def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> Non
 
 
 def test_absent_peers_are_named(wamnet, here, monkeypatch) -> None:
-    """In the result, in its text, and on the terminal, with the extra that brings them."""
+    """In the result, in its text, and on the terminal, with the command that installs them."""
     monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
     only = "numpy:plain,torch*,oidn*,onnx*,tinygrad"
     outcome = wamnet("bench", "model.safetensors", "--only", only, "--size", 8, "--repeats", 1, "-o", "s")
     assert outcome.status == 0
     lines = outcome.out.splitlines()
     for name, package in (("torch", "torch"), ("oidn:fast", "pyoidn"), ("tinygrad", "tinygrad, pyopencl")):
-        line = f"{name}: missing, not installed: {package}; pip install 'wamnet[peers]'"
+        line = f"{name}: missing, not installed: {package}; pip install {package.replace(',', '')}"
         assert line in lines
         assert f"* {line}" in (here / "s/bench.md").read_text().splitlines()
 

@@ -181,6 +181,6 @@ def test_nobody_is_there(monkeypatch) -> None:
 def test_without_the_package(monkeypatch) -> None:
     """The usual line, with the way to do without."""
     monkeypatch.setitem(sys.modules, "distributed", None)
-    text = r"'distributed' is missing: .*--workers 1.*; install it: pip install 'wamnet\[cluster\]'"
+    text = r"'distributed' is missing: .*--workers 1.*; install it: pip install 'wamnet\[full\]'"
     with pytest.raises(InputError, match=text), cluster.open_client(2, None):
         pass

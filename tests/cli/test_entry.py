@@ -34,6 +34,19 @@ def test_an_interrupt_of_the_imports_is_one_line(tmp_path, name) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["typer", "rich", "wamnet.cli.main"])
+def test_a_base_installation_prints_what_to_install(tmp_path, name) -> None:
+    """The base install ended in a traceback; a missing module of ours is a bug."""
+    code = f"import sys; sys.modules[{name!r}] = None; from wamnet.cli import entry; sys.exit(entry.run())"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    line = (
+        f"wamnet: error: Python package '{name}' is missing: the command needs it; "
+        "install it: pip install 'wamnet[full]'\n"
+    )
+    assert (done.returncode, done.stderr) == (2, line) or (name[0] == "w" and "Traceback" in done.stderr)
+
+
 def test_the_entry_imports_next_to_nothing(tmp_path) -> None:
     """What is imported before Ctrl-C is handled must be a matter of milliseconds."""
     code = "import sys; import wamnet.cli.entry; sys.exit('typer' in sys.modules or 'rich' in sys.modules)"

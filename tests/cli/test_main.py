@@ -51,6 +51,27 @@ def test_help_lists_the_commands(wamnet, arguments) -> None:
     assert all(command in outcome.out for command in COMMANDS)
 
 
+@pytest.mark.parametrize(
+    ("line", "completed"),
+    [
+        ("wamnet den", {"denoise"}),
+        ("wamnet course g", {"grade"}),
+        ("wamnet denoise --exec", {"--executor"}),
+        ("wamnet denoise --executor open", {"opencl", "opengl"}),
+    ],
+)
+def test_a_shell_completes_commands_options_and_choices(tmp_path, line, completed) -> None:
+    """By the variables of typer's script for bash, which `--show-completion` prints."""
+    words = line.split()
+    position = {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    environment = os.environ | position | {"_WAMNET_COMPLETE": "complete_bash"}
+    command = [sys.executable, "-m", "wamnet.cli"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.returncode, set(done.stdout.split()), done.stderr) == (0, completed, "")
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_help_has_examples(wamnet, command) -> None:
     """And defaults, where there are options."""

@@ -10,16 +10,16 @@ from wamnet.cli.common.packages import need
 from wamnet.refimpl.errors import InputError
 
 
-def test_a_missing_package_names_its_extra() -> None:
-    """What, for what, and the command that brings it."""
-    text = r"'no_such_package' is missing: it is needed to fly; install it: pip install 'wamnet\[x\]'"
+@pytest.mark.parametrize(("package", "install"), [((), r"'wamnet\[full\]'"), (("no-such",), "no-such")])
+def test_a_missing_package_is_named_with_the_command_that_installs_it(package, install) -> None:
+    text = f"'no_such_package' is missing: it is needed to fly; install it: pip install {install}"
     with pytest.raises(InputError, match=text):
-        need("no_such_package", "to fly", "x")
+        need("no_such_package", "to fly", *package)
 
 
 def test_a_package_that_is_there_is_returned() -> None:
     """Also a module inside a package."""
-    assert need("os.path", "to test", "x").sep == "/"
+    assert need("os.path", "to test").sep == "/"
 
 
 def test_an_interrupt_waits_until_a_module_is_imported(tmp_path, monkeypatch) -> None:
@@ -29,5 +29,5 @@ def test_an_interrupt_waits_until_a_module_is_imported(tmp_path, monkeypatch) ->
     )
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(KeyboardInterrupt):
-        need("interrupting", "to test", "test")
+        need("interrupting", "to test")
     assert sys.modules.pop("interrupting").whole

@@ -239,7 +239,7 @@ def test_what_is_said_of_several_frames_is_said_once(wamnet, here):
         frame.info.pop("scene")
         color = frame["color"].copy()
         color[0, 0] = np.inf
-        openexr = exr.need("OpenEXR", "to write", "files")
+        openexr = exr.need("OpenEXR", "to write")
         channels = {c: np.ascontiguousarray(color[:, :, i]) for i, c in enumerate("RGB")}
         channels |= {
             f"normal.{c}": np.ascontiguousarray(frame["normal"][:, :, i]) for i, c in enumerate("XYZ")

@@ -92,7 +92,7 @@ def test_rows_without_their_packages_are_left_out(monkeypatch, capsys):
         name for name, row in rows.ROWS.items() if {"torch", "pyoidn"} & set(row.packages)
     }
     told = capsys.readouterr().err
-    assert "table1: pix2pix is left out: torch is missing; pip install 'wamnet[baselines]'" in told
+    assert "table1: pix2pix is left out: torch is missing; pip install --group baselines" in told
     assert "table1: oidn-noisy is left out: pyoidn is missing" in told
 
 

@@ -86,7 +86,7 @@ def test_missing_package_has_the_same_policy(run, pytester, before, asserted, re
     pytester.makepyfile(NEEDED.format(before, asserted))
     result = run(require)
     result.assert_outcomes(**{outcome or ("errors" if before else "failed"): 1})
-    missing = "MISSING: PyTorch cannot be imported (*); pip install 'wamnet?baselines?'"
+    missing = "MISSING: PyTorch cannot be imported (*); pip install torch"
     result.stdout.fnmatch_lines([f"torch: {missing}", "pyoidn: not requested by any test that ran"])
     if require:
         result.stdout.fnmatch_lines([f"*package torch is required and {missing}"])

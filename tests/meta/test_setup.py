@@ -70,19 +70,20 @@ def test_folder_that_is_no_environment(house, tmp_path):
     assert (tmp_path / "precious").read_text() == "kept"
 
 
-def test_all_stands_for_its_extras_and_not_for_the_baselines(house, tmp_path):
+def test_all_stands_for_its_groups_and_not_for_the_baselines(house, tmp_path):
     """With a stand-in for Python that notes what pip has to install."""
     (tmp_path / "bin").mkdir()
     python_that_says(tmp_path / "bin", f'case "$*" in *"pip install"*) echo "$*" >>{tmp_path}/asked;; esac')
     (tmp_path / ".wamnet").mkdir()
     (tmp_path / ".wamnet/tools-tried").touch()  # nothing is installed through apt
-    for extras in ("all", "all", "cli,report", "quick", "baselines", "baselines"):
-        done = setup(house, extras, VENV=str(tmp_path))
+    for group in ("full", "full", "all", "all", "full", "docs", "quick", "baselines", "baselines"):
+        done = setup(house, group, VENV=str(tmp_path))
         assert done.returncode == 0, done.stderr
     asked = (tmp_path / "asked").read_text().splitlines()
     assert [line.partition("--constraint .ci/constraints.txt ")[2] for line in asked] == [
-        "--editable .[all]",
-        "--editable .[baselines]",
+        "--editable .[full]",
+        "--editable .[full] --group all",
+        "--editable .[full] --group baselines",
     ]
 
 
@@ -126,10 +127,10 @@ def test_ci_requires_the_baselines_that_it_installs(house):
     assert "ALSO=torch,pyoidn" in steps[second]
 
 
-def test_extras_must_be_named(house):
+def test_the_group_must_be_named(house):
     done = setup(house)
     assert done.returncode != 0
-    assert "usage: .ci/setup EXTRAS" in done.stderr
+    assert "usage: .ci/setup GROUP" in done.stderr
 
 
 @pytest.mark.parametrize("script", ["setup", "lint", "run", "long"])

@@ -40,7 +40,7 @@ class Chromium(AbstractContextManager["Chromium"]):
         try:
             from playwright.sync_api import Error, sync_playwright
         except ImportError:
-            raise ExecutorUnavailable("no package playwright; pip install 'wamnet[web]'") from None
+            raise ExecutorUnavailable("no package playwright; pip install playwright") from None
         self._driver = sync_playwright().start()
         try:
             launch = self._driver.chromium.launch

@@ -26,9 +26,6 @@ PACKAGES = {
 SANDBOX = "bubblewrap"
 """The sandbox of students' code, a program that is required like a package."""
 
-EXTRAS = {"onnx": "targets", "onnxruntime": "targets"}
-"""Which extra brings a package, where it is not `baselines`."""
-
 FOUND: dict[str, str] = {}
 """What has been found of each requested one: "ok (version)" or "MISSING: reason"."""
 
@@ -43,10 +40,7 @@ def needed(name: str) -> Any:
     try:
         module = importlib.import_module(name)
     except (ImportError, OSError) as error:
-        FOUND[name] = (
-            f"MISSING: {PACKAGES[name]} cannot be imported ({error}); "
-            f"pip install 'wamnet[{EXTRAS.get(name, 'baselines')}]'"
-        )
+        FOUND[name] = f"MISSING: {PACKAGES[name]} cannot be imported ({error}); pip install {name}"
         if name in required():
             pytest.fail(f"package {name} is required and {FOUND[name]}", pytrace=False)
         pytest.skip(f"package {name} is {FOUND[name]}", allow_module_level=True)

@@ -1,8 +1,8 @@
 """`pytest --quick`: the tests that need NumPy and little else, on a machine that has nothing more.
 
-1. A quick run has the packages of `wamnet[quick]` and what they require [`brought`]. Others are absent, also
-   where they are installed [`Absent`], and no program can be started [`refuse_programs`]: a run on a
-   developer's machine fails where a run on a bare one would.
+1. A quick run has the packages of the dependency group `quick` and what they require [`brought`]. Others are
+   absent, also where they are installed [`Absent`], and no program can be started [`refuse_programs`]: a run
+   on a developer's machine fails where a run on a bare one would.
 2. What a test needs is found, not listed. A file or folder whose import asks for an absent package is left
    out [`pytest_make_collect_report`]. Executors but `numpy` and peers are left out by the fixtures that open
    them.
@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires
@@ -37,7 +37,7 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 NEEDS = {
     "devices": "it runs kernels or other renderers",
-    "packages": "it imports what wamnet[quick] does not bring",
+    "packages": "it imports what the dependency group `quick` does not bring",
     "programs": "it starts programs",
     "time": "it computes for seconds",
 }
@@ -53,21 +53,32 @@ def left_out(need: str) -> str:
 
 
 def brought() -> set[str]:
-    """Return the distributions of `wamnet[quick]` and all that they require."""
-    project = tomllib.loads(PROJECT.read_text())["project"]
-    waiting = [Requirement(r) for r in project["dependencies"] + project["optional-dependencies"]["quick"]]
-    found = {"wamnet"}
+    """Return the distributions of the group `quick` and all that they require."""
+    project = tomllib.loads(PROJECT.read_text())
+    return {"wamnet"} | distributions(
+        project["project"]["dependencies"] + project["dependency-groups"]["quick"]
+    )
+
+
+def distributions(requirements: Iterable[str]) -> set[str]:
+    """Return the names of the distributions that requirements install, and of all that these require."""
+    waiting, names = [(requirement, "") for requirement in requirements], set[str]()
+    seen = set[tuple[str, str]]()
     while waiting:
-        name = canonicalize_name(waiting.pop().name)
-        if name in found:
+        source, extra = waiting.pop()
+        requirement = Requirement(source)
+        if (source, extra) in seen or (
+            requirement.marker and not requirement.marker.evaluate({"extra": extra})
+        ):
             continue
-        found.add(name)
+        seen.add((source, extra))
+        names.add(canonicalize_name(requirement.name))
         try:
-            texts = requires(name) or []
+            texts = requires(requirement.name) or []
         except PackageNotFoundError:  # another version of Python needs it
             continue
-        waiting += [r for r in map(Requirement, texts) if not r.marker or r.marker.evaluate({"extra": ""})]
-    return found
+        waiting += [(each, option) for each in texts for option in ("", *requirement.extras)]
+    return names
 
 
 class Absent(MetaPathFinder):

@@ -49,12 +49,12 @@ def render(
     depth: Annotated[int, typer.Option(help="Most edges of a path, from the camera on.")] = 6,
     repeats: Repeats = 5,
 ) -> None:
-    r"""Measure samples a second of the renderer: the reference, its kernels, Mitsuba 3, Embree.
+    """Measure samples a second of the renderer: the reference, its kernels, Mitsuba 3, Embree.
 
     Each makes its first frame with empty caches of compilers, then they take turns; a turn ends when the
     frame is in memory. The table has the median and the range, samples a second, and their ratio to the last
     way's; below it is how far each mean colour is from the first's, in standard errors. A sample is one path.
-    [bold]pip install 'wamnet\[bench]'[/] brings Mitsuba; it needs libLLVM too.
+    [bold]pip install mitsuba[/] adds Mitsuba, which needs libLLVM too.
     Embree by hand in C needs a compiler and libembree-dev.
     """
     from ....kernels.bench import measure_render as measuring

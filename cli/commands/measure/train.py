@@ -44,12 +44,11 @@ def train(
     seconds: Annotated[float, typer.Option(metavar="S", help="Of one measurement, about.")] = 1.0,
     repeats: Repeats = 5,
 ) -> None:
-    r"""Measure milliseconds of a training step: the reference, the compiled trainer, PyTorch.
+    """Measure milliseconds of a training step: the reference, the compiled trainer, PyTorch.
 
     They take turns with a product of two large matrices, on frames of noise, drawing of minibatches included;
     compiling does not count. The table has the median and the range, GFLOP/s of products of matrices, their
-    share of the product's, and what all steps would take. [bold]pip install 'wamnet\[peers]'[/] brings
-    PyTorch.
+    share of the product's, and what all steps would take. [bold]pip install torch[/] adds PyTorch.
     """
     from ....kernels.bench import measure_train as measuring
     from ....kernels.bench.workload import check_size

@@ -47,9 +47,7 @@ def open_mitsuba(variant: str) -> Any:
     try:
         mi = importlib.import_module("mitsuba")
     except ImportError:
-        raise ExecutorUnavailable(
-            "mitsuba: the package is not installed; pip install 'wamnet[bench]'"
-        ) from None
+        raise ExecutorUnavailable("mitsuba: the package is not installed; pip install mitsuba") from None
     if variant.startswith("llvm"):
         _check_llvm()
     mi.set_variant(variant)

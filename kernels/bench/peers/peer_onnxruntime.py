@@ -177,7 +177,7 @@ def run_graph(data: bytes, images: Mapping[str, NDArray[np.float32]]) -> tuple[s
     try:
         import onnxruntime
     except ImportError:
-        raise ExecutorUnavailable("onnxruntime is not installed: pip install 'wamnet[targets]'") from None
+        raise ExecutorUnavailable("onnxruntime is not installed: pip install onnxruntime") from None
     session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
     return f"ONNX Runtime {onnxruntime.__version__}", session.run(None, dict(images))[0]
 

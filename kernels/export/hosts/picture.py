@@ -21,7 +21,7 @@ def beside(noisy: NDArray[np.float32], output: NDArray[np.float32]) -> bytes:
     try:
         from PIL import Image
     except ImportError:
-        raise ExecutorUnavailable("Pillow is not installed: pip install 'wamnet[files]'") from None
+        raise ExecutorUnavailable("Pillow is not installed: pip install 'wamnet[full]'") from None
     both = np.concatenate([noisy, output], axis=1).clip(0, 1)
     large = both.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
     file = io.BytesIO()

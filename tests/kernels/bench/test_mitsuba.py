@@ -176,7 +176,7 @@ def test_what_mitsuba_would_show_differently_is_refused(scene, settings, message
 
 def test_missing_mitsuba_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "mitsuba", None)
-    with pytest.raises(ExecutorUnavailable, match=r"package is not installed; pip install 'wamnet\[bench\]'"):
+    with pytest.raises(ExecutorUnavailable, match=r"package is not installed; pip install mitsuba"):
         peer_mitsuba.open_mitsuba("scalar_rgb")
 
 

@@ -89,10 +89,10 @@ def test_another_denoiser_makes_a_picture(peer) -> None:
     assert np.abs(picture - 0.735).max() <= 0.1
 
 
-def test_absent_peers_are_named_with_the_extra(monkeypatch) -> None:
+def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch) -> None:
     monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
     for peer in contenders.PEERS:
-        text = f"not installed: {', '.join(peer.packages)}; pip install 'wamnet[peers]'"
+        text = f"not installed: {', '.join(peer.packages)}; pip install {' '.join(peer.packages)}"
         assert peer.missing() == text
         with pytest.raises(ExecutorUnavailable, match="not installed: "):
             peer.prepare(Tools())

@@ -57,7 +57,7 @@ FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Order the pages."""
-    # Texts such as `[W][D_in]` in the spec are no cross-references of the API's page, which has none.
+    # Texts such as `[W][D_in]` in the spec look like cross-references, which the API's page does not have.
     logging.getLogger("mkdocs.plugins.mkdocs_autorefs").setLevel(logging.ERROR)
     docs = Path(config.docs_dir)
 
@@ -80,6 +80,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
         {"API": ["reference.md"]},
+        "limits.md",
         "recipes.md",
     ]
     return config

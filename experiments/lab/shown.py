@@ -15,16 +15,14 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from wamnet.cli.reports import bench_report
-from wamnet.cli.reports.plots import PAPER, trade_off_figure
 from wamnet.refimpl.errors import InputError
 
 from . import plots, printed, same, tables
 from .intervals import paired
 from .plots import Plot
-from .records import Records, bench_of
+from .records import Records
 from .results import PER_FRAME, Results, number
-from .speeds import TableOf, draw_speed_short, speed_against_error, speed_readme, speed_short
+from .speeds import TableOf, draw_speed, draw_speed_short, speed_against_error, speed_readme, speed_short
 from .tables import Column
 
 
@@ -322,11 +320,6 @@ def bench(record: str) -> TableOf:
         return tables.markdown(["by", *heads], cells)
 
     return made
-
-
-def draw_speed(record: str) -> Callable[[Records], Any]:
-    """Return what draws time against loss and against bounds."""
-    return lambda records: trade_off_figure(bench_report.panels(bench_of(records[record])), PAPER)
 
 
 def _short(row: Mapping[str, Any], key: str, form: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from wamnet.cli.reports import bench_report
+from wamnet.cli.reports.plots import PAPER, trade_off_figure
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.reading.languages import is_read
 
@@ -87,6 +88,11 @@ def speed_short(record: str) -> TableOf:
     """Return these rows as a table."""
     heads = ["by", "schedule", *SPEED_COLUMNS, "text checked"]
     return lambda records: tables.markdown(heads, short_rows(records, record))
+
+
+def draw_speed(record: str) -> Callable[[Records], Any]:
+    """Return what draws time against loss and against bounds."""
+    return lambda records: trade_off_figure(bench_report.panels(bench_of(records[record])), PAPER)
 
 
 def draw_speed_short(record: str) -> Callable[[Records], Any]:

@@ -64,12 +64,12 @@ class Request:
 
     The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
     `parameters` are those of the canonical scene; `still` is the scene of a file instead. Cameras are drawn
-    from the ranges `yaw_deg`, `pitch_deg` and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own), factors of
-    their power from the range `power` (None: the lamps' own). The features of noisy pictures are means over
-    `feature_spp` camera rays; 0: over the colour's one; they come from `feature_sampler`, "" is an even
-    spread. Targets have `spp` samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures
-    have the layers of what is seen past mirrors and glass too. `before`: they have layers of history after so
-    many pictures, in which the animation runs and the camera rests.
+    from the ranges `yaw_deg`, `pitch_deg` and `distance` (a factor), lamps' colours from the range
+    `saturation` (None: the lamps' own), factors of their power from `power` (None: the lamps' own). The
+    features of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one; they come
+    from `feature_sampler`, "" is an even spread. Targets have `spp` samples, those of test frames `test_spp`;
+    0: as many. `seen`: noisy pictures have the layers of what is seen past mirrors and glass too. `before`:
+    they have layers of history after so many pictures, in which the animation runs and the camera rests.
     """
 
     scene: str

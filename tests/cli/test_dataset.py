@@ -301,7 +301,7 @@ MINE = ("mine.json", "--frames", 2, "--test", 1, "--size", 12, "--spp", 2)
 
 
 def test_a_scene_file_is_a_scene(wamnet, refused, tmp_path) -> None:
-    """Static, from the draws' cameras and under their lights; its SHA-256 identifies it from file to model."""
+    """Static, from the draws' cameras and under their lights; its SHA-256 goes from file to model."""
     wamnet("scene", "cornell", "--time", 1, "-o", "mine.json")
     content, ranges = (tmp_path / "mine.json").read_bytes(), ("--yaw=-20:20", "--saturation=0:0.5")
     assert wamnet("dataset", *MINE, *ranges, "-o", "a").status == 0

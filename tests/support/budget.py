@@ -33,7 +33,7 @@ BUDGET = {
     "kernels/verify": 2925,
     "spec/conformance": 8600,
     "cli": 320,
-    "cli/commands": 6300,
+    "cli/commands": 6375,
     "cli/common": 1350,
     "cli/course": 6150,
     "cli/files": 2200,

@@ -27,8 +27,9 @@ from ...refimpl.errors import InputError
 from ..common import options
 from ..common.domain import Watch
 from ..common.effort import said_of_rendering
+from ..common.executors import chosen
 from ..common.inputs import load_model, model_path, unlike_training
-from ..common.options import ExecutorName, Renderer
+from ..common.options import ExecutorChoice
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
 from ..files.alone import working_in
@@ -71,6 +72,14 @@ class Shot:
 SceneToShow = Annotated[
     str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
 ]
+TracedBy = Annotated[
+    ExecutorChoice,
+    typer.Option(
+        "--renderer",
+        envvar=options.EXECUTOR_VARIABLE,
+        help="What traces the paths: [bold]auto[/] is the fastest of those available.",
+    ),
+]
 Rays = Annotated[
     int | None,
     typer.Option(
@@ -101,8 +110,8 @@ def animate(
     pitch: options.Pitch = 0.0,
     distance: options.Distance = 1.0,
     light: options.Lights = None,
-    executor: options.Executor = ExecutorName.numpy,
-    renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    executor: options.Executor = ExecutorChoice.auto,
+    renderer: TracedBy = ExecutorChoice.auto,
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
 ) -> None:
@@ -118,8 +127,8 @@ def animate(
     _check_names(output, model, fps)
     model = model_path(model)
     network = load_model(model)
-    digest = hashlib.sha256(model.read_bytes()).hexdigest()
-    facts = [digest, executor.value, renderer.value, *cut_facts(network, rank)]
+    by = chosen(executor), chosen(renderer, work="renderer")
+    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
@@ -133,7 +142,7 @@ def animate(
         working_in(folder, "drawing pictures"),
         hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
     ):
-        made, watch = _draw(shots, folder, network, (executor, renderer), rank)
+        made, watch = _draw(shots, folder, network, by, rank)
         if is_film:
             _join(output, shots, fps)
     if is_film:
@@ -151,7 +160,7 @@ def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
 
 
 def _draw(
-    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
+    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[str, str], rank: int
 ) -> tuple[int, Watch]:
     """Draw the pictures that are not in the folder, which only this process uses: how many, how far off."""
     from ...compiler.variants import FULL, with_rank
@@ -165,17 +174,17 @@ def _draw(
     for line in _said_of(left, renderer):
         say(line)
     with (
-        open_executor(executor.value) as runner,
+        open_executor(executor) as runner,
         progress("drawing", len(left)) as advance,
     ):
         together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
         draw = draw_frames if together else partial(draw_apart, film=shots)
-        for _ in draw(left, watch, runner, renderer.value, with_rank(FULL, rank)):
+        for _ in draw(left, watch, runner, renderer, with_rank(FULL, rank)):
             advance(1)
     return len(left), watch
 
 
-def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
+def _one_device(executor: str, renderer: str, noisy: Job, features: Sequence[str]) -> bool:
     """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
     from ...kernels.run.before import wants
     from ...refimpl.frame import SUN
@@ -183,16 +192,16 @@ def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features
     from ...refimpl.network.dataset import FEATURES
 
     beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
-    return renderer.value == executor.value != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
+    return renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
 
 
-def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
+def _said_of(shots: Sequence[Shot], renderer: str) -> list[str]:
     """Return the sentence about large work."""
     if not shots:
         return []
     jobs = [job for shot in shots for job in (shot.noisy, shot.reference) if job is not None]
     pixels = shots[0].noisy.width * shots[0].noisy.height
-    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer.value, None)
+    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer, None)
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import InputError
 from ..common import packages
 from ..common.effort import said_of_measuring
+from ..common.executors import fastest
 from ..common.inputs import load_model
 from ..common.options import ExecutorName, parse_names
 from ..common.terminal import hint_on_interrupt, progress, say, table
@@ -274,19 +275,7 @@ class Wanted:
         else:
             pairs = tuple(bench_frames.for_training(network, output))
         folder = bench_forms.folder_of(network, output)
-        return bench_forms.trained(network, forms, pairs, folder, _trainer())
-
-
-def _trainer() -> str:
-    """Return what trains: OpenCL where it is there, else the reference, which is slow."""
-    from ...kernels import open_executor
-
-    try:
-        open_executor("opencl").close()
-    except ExecutorUnavailable as error:
-        say(f"not trained with opencl, which takes far longer: {error}")
-        return "numpy"
-    return "opencl"
+        return bench_forms.trained(network, forms, pairs, folder, fastest(trains=True, work="trainer"))
 
 
 def _forms(network: Model, wanted: bool, quick: bool, steps: int) -> dict[str, Variant]:

@@ -16,7 +16,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import InputError
+from ..common.executors import fastest
 from ..common.inputs import unlike_training
 from ..common.terminal import say
 from ..files import dataset_files
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
     Pair = tuple[Frame, Frame]
-
-RENDERS_FIRST = ("opencl", "opengl")
-"""What renders the frames: the first kernel that runs here, else the reference."""
 
 SPP_OF_NUMPY = 32
 """Most samples of a reference where no kernel runs: more would take an hour."""
@@ -152,7 +150,7 @@ def _first(model: Model, name: str, otherwise: int) -> int:
 
 def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Frames:
     """Return test frames (size, size) of the model's scene, rendered where they are missing."""
-    executor = renderer()
+    executor = fastest(work="renderer")
     spp = min(spp, SPP_OF_NUMPY) if executor == "numpy" else spp
     # A data set has a training frame at least; the shortest one.
     numbers = {"frames": 1, "test_frames": count, "spp": 1, "test_spp": spp}
@@ -163,7 +161,7 @@ def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Fra
 
 def for_training(model: Model, folder: Path) -> Sequence[Pair]:
     """Return training frames of the model's scene, rendered where they are missing."""
-    executor = renderer()
+    executor = fastest(work="renderer")
     spp = min(TRAINING_SPP, SPP_OF_NUMPY) if executor == "numpy" else TRAINING_SPP
     place = folder / f"training-{scene_of(model)}-{TRAINING_PX}"
     numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": spp, "size_px": TRAINING_PX}
@@ -176,18 +174,3 @@ def _make(folder: Path, request: Request) -> None:
     from ...kernels.run.frame_plan import plan
 
     dataset.make(folder, request, plan(request), workers=1, scheduler=None)
-
-
-def renderer() -> str:
-    """Return the first executor that renders here; NumPy, which is slow, is named aloud."""
-    from ...kernels import open_executor
-
-    for name in RENDERS_FIRST:
-        try:
-            open_executor(name).close()
-        except ExecutorUnavailable as error:
-            say(f"not rendered with {name}: {error}")
-        else:
-            return name
-    say("rendered with NumPy, which is slow")
-    return "numpy"

@@ -23,7 +23,8 @@ import typer
 from ...refimpl.errors import InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
-from ..common.options import Renderer, Sampler
+from ..common.executors import chosen
+from ..common.options import ExecutorChoice, Sampler
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
@@ -133,6 +134,9 @@ BlenderProgram = Annotated[
 OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
 """Options that mean nothing without --from-blender."""
 
+OF_SCHEDULER = "the scheduler's workers may have no other"
+"""Why only NumPy is chosen for them."""
+
 OF_TIMES = ("start", "seconds", "arc")
 """Options that mean nothing for a static scene."""
 
@@ -164,7 +168,7 @@ def dataset(
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
-    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    executor: options.Renderer = ExecutorChoice.auto,
     context: options.OpenGLContext = None,
     sampler: options.SamplerName = Sampler.pcg4d,
     workers: Workers = None,
@@ -191,13 +195,13 @@ def dataset(
         numbers_of = (frames, test, outside, spp, test_spp, arc, seed, noisy_spp, percent)
         _make_from_blender(command, output, (from_blender, *numbers_of, view_layer, blender))
         return
-    options.refuse_given(command, OF_BLENDER, "without --from-blender")
     named = scene or _missing_scene(), options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
     request = _request(command, named, (*numbers, *ways), limits, (seen, power, before))
     _check_workers(workers, scheduler)
+    request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)
 
@@ -213,6 +217,7 @@ def _request(
     from ...kernels.run.frame_plan import Request
     from ...kernels.run.scene_source import scene_source
 
+    options.refuse_given(command, OF_BLENDER, "without --from-blender")
     source, (seen, power, before) = scene_source(*named), last
     if source.still is not None:
         options.refuse_given(command, OF_TIMES, "for a scene file, which is static")

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
 from ..common import options
 from ..common.effort import said_of_learning
@@ -71,9 +71,6 @@ DATA_SET = "frames"
 
 SHOWN_FIRST = ("opencl", "opengl", "numpy")
 """Whose picture the report shows: that of a compiled kernel, if one ran here."""
-
-RENDERS_FIRST = ("opencl", "opengl")
-"""What renders the frames: the first kernel that runs here, else the reference."""
 
 REPEATS = 3
 """Times of each contender that the report shows."""
@@ -224,25 +221,19 @@ def of_scene(plan: Plan, name: str) -> Plan:
 
 
 def for_this_machine(plan: Plan) -> Plan:
-    """Return the plan with the first kernel that runs here as its renderer, or one that NumPy can do.
+    """Return the plan with the fastest executors that are available here, or one that NumPy can do."""
+    from ...kernels.devices import registry
 
-    The device that renders trains too, if it can.
-    """
-    from ...kernels import open_executor
-
-    for name in RENDERS_FIRST:
-        try:
-            with open_executor(name) as executor:
-                trains = executor.trains
-        except ExecutorUnavailable as error:
-            say(f"not rendered with {name}: {error}")
-        else:
-            return replace(plan, renderer=name, trainer=name if trains else "numpy")
+    (name, passed), (trainer, _) = registry.fastest(), registry.fastest(trains=True)
+    for reason in passed:
+        say(f"not {reason}")
+    if name != "numpy":
+        return replace(plan, renderer=name, trainer=trainer)
     most, frames = REFERENCE_SPP_OF_NUMPY, min(plan.train_frames, TRAIN_FRAMES_OF_NUMPY)
     train_spp, spp = min(plan.train_spp, most), min(plan.reference_spp, most)
     say(f"rendered with NumPy, which is slow: {frames} training times, references have {spp} paths per pixel")
     few = replace(plan, train_frames=frames, train_spp=train_spp, reference_spp=spp)
-    return replace(few, renderer="numpy", trainer="numpy")
+    return replace(few, renderer=name, trainer=trainer)
 
 
 @contextmanager
@@ -284,6 +275,7 @@ def _check_note(folder: Path, text: str) -> bool:
 def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
+    say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest that are available here")
     for line in said_of_learning(plan.train_frames, plan.size_px**2):
         say(line)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))

@@ -193,7 +193,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
     def nothing(name: str):
         raise ExecutorUnavailable(f"{name}: nothing there")
 
-    monkeypatch.setattr("wamnet.kernels.open_executor", nothing)
+    monkeypatch.setattr("wamnet.kernels.devices.registry.open_executor", nothing)
     plan = demo.for_this_machine(demo.Plan())
     assert plan == demo.replace(
         demo.Plan(),
@@ -204,7 +204,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
         reference_spp=demo.REFERENCE_SPP_OF_NUMPY,
     )
     told = capsys.readouterr().out
-    assert "not rendered with opengl: opengl: nothing there" in told
+    assert "not opengl: nothing there" in told
     assert "rendered with NumPy, which is slow: 12 training times, references have 32 paths per pixel" in told
 
 

@@ -28,7 +28,7 @@ from ..common import options
 from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
-from ..common.inputs import load_model, model_path, unlike_training
+from ..common.inputs import load_model, model_path, trained_scene, unlike_training
 from ..common.options import ExecutorChoice
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
@@ -54,6 +54,8 @@ wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turni
 
 wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
 
+wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
+
 wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
 """Shown below the help of `wamnet animate`."""
 
@@ -70,7 +72,11 @@ class Shot:
 
 
 SceneToShow = Annotated[
-    str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
+    str | None,
+    typer.Option(
+        help="Canonical scene, or scene file (.json), which is static.",
+        show_default="the one that the model was trained on",
+    ),
 ]
 TracedBy = Annotated[
     ExecutorChoice,
@@ -234,11 +240,13 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
 
 
 def scene_of(model: Model) -> str:
-    """Return the canonical scene that a model has learned, or minicubes if that is not known."""
-    from ...refimpl.light.scenes import CANONICAL
+    """Return the canonical scene that a model was trained on, or minicubes; reject that of a file."""
+    from ...kernels.run.scene_source import SCENE_FILE
 
-    found = model.info.get("trained_on_scene", "")
-    return found if found in CANONICAL else "minicubes"
+    if f"trained_on_{SCENE_FILE}" in model.info:
+        name, rule = model.info.get("trained_on_scene", ""), "it is that of a scene file"
+        raise InputError("scene that the model was trained on", name, rule, "name the file with --scene")
+    return trained_scene(model) or "minicubes"
 
 
 def cut_facts(network: Model, rank: int) -> list[str]:
@@ -265,14 +273,14 @@ def plan_shots(
     and camera rays of the features (or 0).
     """
     from ...compiler.scenes.lower_encode import sees
+    from ...kernels.run.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
-    from ...refimpl.light.scenes import canonical
 
-    (name, chosen, view), (size, spp, seed, rays) = named, numbers
-    shots = []
+    (name, parameters, view), (size, spp, seed, rays) = named, numbers
+    source, shots = scene_source(name, parameters), []
     for index, time in enumerate(times):
-        scene = view.of(canonical(name, **{**chosen, "time": time}))
+        scene = view.of(source.at(time))
         noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=sees(features))
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]

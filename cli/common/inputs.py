@@ -76,6 +76,15 @@ def load_model(path: Path, imported: bool = False) -> Model:
     raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
 
 
+def trained_scene(model: Model) -> str | None:
+    """Return the canonical scene that a model was trained on; None for several, a file's, and no name."""
+    from ...kernels.run.scene_source import SCENE_FILE
+    from ...refimpl.light.scenes import CANONICAL
+
+    name = model.info.get("trained_on_scene", "")
+    return name if name in CANONICAL and f"trained_on_{SCENE_FILE}" not in model.info else None
+
+
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
     from ...kernels.run.scene_source import SCENE_FILE

@@ -45,7 +45,7 @@ class SceneSource:
         """Return the scene at a time in seconds; None: at the time that its parameters state, or 0."""
         if self.still is not None:
             return self.still
-        return canonical(self.name, **self.parameters, **({} if time_s is None else {"time": time_s}))
+        return canonical(self.name, **{**self.parameters, **({} if time_s is None else {"time": time_s})})
 
 
 def scene_source(name: str, parameters: Parameters | None = None) -> SceneSource:

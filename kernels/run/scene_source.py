@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -52,7 +53,8 @@ def scene_source(name: str, parameters: Parameters | None = None) -> SceneSource
     """Return the source that a command names; reject a file that is no scene, and names of none."""
     path, parameters = Path(name), parameters or {}
     if path.suffix.lower() != SUFFIX:
-        if name not in CANONICAL and (path.suffix or path.exists()):
+        there = os.path.exists(name)  # noqa: PTH110 (Path.exists raises for a name that is too long)
+        if name not in CANONICAL and (path.suffix or there):
             rule = f"neither a canonical scene nor a scene file, whose name ends in {SUFFIX}"
             raise InputError("scene", name, rule, f"use a {SUFFIX} file or one of {', '.join(CANONICAL)}")
         source = SceneSource(name, parameters)

@@ -9,6 +9,9 @@ its control characters, and [`shown`] also makes one line of a stated length.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 LONGEST_MESSAGE = 1000
 """Most characters of a message: some lines of a terminal, not a dump."""
 
@@ -38,6 +41,13 @@ def shown(text: str, most: int = LONGEST_MESSAGE) -> str:
         return line
     tail = (most - 3) // 3
     return f"{line[: most - 3 - tail]}...{line[len(line) - tail :]}"
+
+
+def suggested(name: str, names: Iterable[str]) -> str:
+    """Return the remedy for an unknown name: the nearest of the names, if one is near, and all of them."""
+    names = list(names)
+    near = get_close_matches(name, names, n=1)
+    return f"{f'did you mean {near[0]}? ' if near else ''}known are {', '.join(names)}"
 
 
 class WamnetError(Exception):

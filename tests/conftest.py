@@ -8,7 +8,8 @@
    that the usual set-up leaves out [`packages.needed`]. What is missing fails its tests when WAMNET_REQUIRE
    names it, as with `make test` and `.ci/run`; else they are skipped. Either way the summary says what was
    missing and why [`pytest_terminal_summary`]: nothing is left out in silence.
-3. The user's cache folder is never touched: tests have one of their own, which their commands inherit.
+3. The user's cache folder is never touched: tests have one of their own, which their commands inherit. So
+   they do the executor NumPy instead of `auto`: results do not depend on the machine.
    Measurements do not rest between runs [`no_rests`].
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 5. Processes stay small (tests/support/workers.py, tests/support/apart.py).
@@ -276,6 +277,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("WAMNET_CACHE", str(folder))
+        patch.setenv("WAMNET_EXECUTOR", "numpy")
         yield folder
 
 

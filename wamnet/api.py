@@ -149,7 +149,7 @@ def train(
         raise InputError("number of clean frames", len(targets), rule, "pass as many of both")
     pairs = list(zip(inputs, targets, strict=True))
     progress = None if on_progress is None else lambda state, loss: on_progress(state.step, loss)
-    name = _name(executor)
+    name = _name(executor, trains=True)
     if name == NUMPY:
         return model_of_run(train_reference(recipe, pairs, on_progress=progress), pairs)
     with _open(name) as device:
@@ -341,15 +341,16 @@ def trace(
 
 
 def executors() -> dict[str, str]:
-    """Return the executors that are available, fastest first, and the device of each.
+    """Return the executors that are available, usually fastest first, and the device of each.
 
     wamnet.executors()  # {"opencl": "...", "c": "...", "numpy": "..."}
     """
     from .kernels import EXECUTORS
+    from .kernels.devices.registry import FASTEST
     from .refimpl.errors import ExecutorUnavailable
 
     devices = {}
-    for name in EXECUTORS:
+    for name in dict.fromkeys((*FASTEST, *EXECUTORS)):
         try:
             with _open(name) as executor:
                 devices[name] = executor.device
@@ -365,25 +366,24 @@ def _open(name: str) -> Executor:
     return open_executor(name)
 
 
-def _name(executor: str) -> str:
-    """Return the name of an executor; of `auto`, that of the fastest one."""
-    return executor
+def _name(executor: str, trains: bool = False) -> str:
+    """Return the name of an executor; of `auto`, that of the fastest one, which `trains` if it must."""
+    from .kernels.devices.registry import fastest
+
+    return fastest(trains)[0] if executor == AUTO else executor
 
 
 def _scene(scene: Paths | Scene, parameters: Mapping[str, Any]) -> Scene:
     """Return a canonical scene by name, or that of a file."""
-    from .refimpl.light.scene import Scene, from_json
-    from .refimpl.light.scenes import canonical
-    from .refimpl.reading import read_file
+    from .kernels.run.scene_source import scene_source
+    from .refimpl.light.scene import Scene
 
-    if not isinstance(scene, Scene) and Path(scene).suffix.lower() != ".json":
-        return canonical(str(scene), **parameters)
+    if not isinstance(scene, Scene):
+        return scene_source(str(scene), parameters).at()
     if parameters:
         rule = "only canonical scenes have parameters"
         raise InputError("parameter", ", ".join(parameters), rule, "change the scene itself")
-    if isinstance(scene, Scene):
-        return scene
-    return from_json(read_file(Path(scene), "scene file", "check the name"))
+    return scene
 
 
 def _frame(layers: Layers) -> Frame:

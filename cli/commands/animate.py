@@ -27,8 +27,9 @@ from ...refimpl.errors import InputError
 from ..common import options
 from ..common.domain import Watch
 from ..common.effort import said_of_rendering
-from ..common.inputs import load_model, model_path, unlike_training
-from ..common.options import ExecutorName, Renderer
+from ..common.executors import chosen
+from ..common.inputs import load_model, model_path, trained_scene, unlike_training
+from ..common.options import ExecutorChoice
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
 from ..files.alone import working_in
@@ -53,6 +54,8 @@ wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turni
 
 wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
 
+wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
+
 wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
 """Shown below the help of `wamnet animate`."""
 
@@ -69,7 +72,19 @@ class Shot:
 
 
 SceneToShow = Annotated[
-    str | None, typer.Option(help="Canonical scene.", show_default="the one that the model has learned")
+    str | None,
+    typer.Option(
+        help="Canonical scene, or scene file (.json), which is static.",
+        show_default="the one that the model was trained on",
+    ),
+]
+TracedBy = Annotated[
+    ExecutorChoice,
+    typer.Option(
+        "--renderer",
+        envvar=options.EXECUTOR_VARIABLE,
+        help="What traces the paths: [bold]auto[/] is the fastest of those available.",
+    ),
 ]
 Rays = Annotated[
     int | None,
@@ -101,8 +116,8 @@ def animate(
     pitch: options.Pitch = 0.0,
     distance: options.Distance = 1.0,
     light: options.Lights = None,
-    executor: options.Executor = ExecutorName.numpy,
-    renderer: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    executor: options.Executor = ExecutorChoice.auto,
+    renderer: TracedBy = ExecutorChoice.auto,
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
 ) -> None:
@@ -118,8 +133,8 @@ def animate(
     _check_names(output, model, fps)
     model = model_path(model)
     network = load_model(model)
-    digest = hashlib.sha256(model.read_bytes()).hexdigest()
-    facts = [digest, executor.value, renderer.value, *cut_facts(network, rank)]
+    by = chosen(executor), chosen(renderer, work="renderer")
+    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
     rays = feature_rays(network) if feature_spp is None else feature_spp
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
@@ -133,7 +148,7 @@ def animate(
         working_in(folder, "drawing pictures"),
         hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
     ):
-        made, watch = _draw(shots, folder, network, (executor, renderer), rank)
+        made, watch = _draw(shots, folder, network, by, rank)
         if is_film:
             _join(output, shots, fps)
     if is_film:
@@ -151,7 +166,7 @@ def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
 
 
 def _draw(
-    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[ExecutorName, Renderer], rank: int
+    shots: Sequence[Shot], folder: Path, network: Model, by: tuple[str, str], rank: int
 ) -> tuple[int, Watch]:
     """Draw the pictures that are not in the folder, which only this process uses: how many, how far off."""
     from ...compiler.variants import FULL, with_rank
@@ -165,17 +180,17 @@ def _draw(
     for line in _said_of(left, renderer):
         say(line)
     with (
-        open_executor(executor.value) as runner,
+        open_executor(executor) as runner,
         progress("drawing", len(left)) as advance,
     ):
         together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
         draw = draw_frames if together else partial(draw_apart, film=shots)
-        for _ in draw(left, watch, runner, renderer.value, with_rank(FULL, rank)):
+        for _ in draw(left, watch, runner, renderer, with_rank(FULL, rank)):
             advance(1)
     return len(left), watch
 
 
-def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features: Sequence[str]) -> bool:
+def _one_device(executor: str, renderer: str, noisy: Job, features: Sequence[str]) -> bool:
     """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
     from ...kernels.run.before import wants
     from ...refimpl.frame import SUN
@@ -183,16 +198,16 @@ def _one_device(executor: ExecutorName, renderer: Renderer, noisy: Job, features
     from ...refimpl.network.dataset import FEATURES
 
     beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
-    return renderer.value == executor.value != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
+    return renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
 
 
-def _said_of(shots: Sequence[Shot], renderer: Renderer) -> list[str]:
+def _said_of(shots: Sequence[Shot], renderer: str) -> list[str]:
     """Return the sentence about large work."""
     if not shots:
         return []
     jobs = [job for shot in shots for job in (shot.noisy, shot.reference) if job is not None]
     pixels = shots[0].noisy.width * shots[0].noisy.height
-    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer.value, None)
+    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer, None)
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:
@@ -225,11 +240,13 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
 
 
 def scene_of(model: Model) -> str:
-    """Return the canonical scene that a model has learned, or minicubes if that is not known."""
-    from ...refimpl.light.scenes import CANONICAL
+    """Return the canonical scene that a model was trained on, or minicubes; reject that of a file."""
+    from ...kernels.run.scene_source import SCENE_FILE
 
-    found = model.info.get("trained_on_scene", "")
-    return found if found in CANONICAL else "minicubes"
+    if f"trained_on_{SCENE_FILE}" in model.info:
+        name, rule = model.info.get("trained_on_scene", ""), "it is that of a scene file"
+        raise InputError("scene that the model was trained on", name, rule, "name the file with --scene")
+    return trained_scene(model) or "minicubes"
 
 
 def cut_facts(network: Model, rank: int) -> list[str]:
@@ -256,14 +273,14 @@ def plan_shots(
     and camera rays of the features (or 0).
     """
     from ...compiler.scenes.lower_encode import sees
+    from ...kernels.run.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
-    from ...refimpl.light.scenes import canonical
 
-    (name, chosen, view), (size, spp, seed, rays) = named, numbers
-    shots = []
+    (name, parameters, view), (size, spp, seed, rays) = named, numbers
+    source, shots = scene_source(name, parameters), []
     for index, time in enumerate(times):
-        scene = view.of(canonical(name, **{**chosen, "time": time}))
+        scene = view.of(source.at(time))
         noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=sees(features))
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]

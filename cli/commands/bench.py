@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import InputError
 from ..common import packages
 from ..common.effort import said_of_measuring
-from ..common.inputs import load_model
+from ..common.executors import fastest
+from ..common.inputs import load_model, trained_scene
 from ..common.options import ExecutorName, parse_names
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files.alone import working_in
@@ -251,7 +252,7 @@ class Wanted:
 
     def _has_frames(self, network: Model) -> bool:
         """Return whether there is a data set, or a scene to render."""
-        return self.dataset is not None or bench_frames.scene_of(network) is not None
+        return self.dataset is not None or trained_scene(network) is not None
 
     def frames(self, network: Model, output: Path, size: int, counts: dict[str, int]) -> Frames:
         """Return the frames that are measured; none where it is noise, which is said."""
@@ -259,8 +260,8 @@ class Wanted:
             return Frames()
         if self.dataset is not None:
             return bench_frames.of_folder(self.dataset, network)
-        if bench_frames.scene_of(network) is None:
-            say("no frames: the model does not name one scene that can be rendered; give --dataset")
+        if trained_scene(network) is None:
+            say("no frames: the model does not name one canonical scene; give --dataset")
             return Frames()
         return bench_frames.rendered(network, output, size, counts["frames"], counts["reference_spp"])
 
@@ -273,19 +274,7 @@ class Wanted:
         else:
             pairs = tuple(bench_frames.for_training(network, output))
         folder = bench_forms.folder_of(network, output)
-        return bench_forms.trained(network, forms, pairs, folder, _trainer())
-
-
-def _trainer() -> str:
-    """Return what trains: OpenCL where it is there, else the reference, which is slow."""
-    from ...kernels import open_executor
-
-    try:
-        open_executor("opencl").close()
-    except ExecutorUnavailable as error:
-        say(f"not trained with opencl, which takes far longer: {error}")
-        return "numpy"
-    return "opencl"
+        return bench_forms.trained(network, forms, pairs, folder, fastest(trains=True, work="trainer"))
 
 
 def _forms(network: Model, wanted: bool, quick: bool, steps: int) -> dict[str, Variant]:

@@ -3,7 +3,7 @@
 1. The test frames of a data set, with what its manifest says of each [`of_folder`].
 2. Without a data set they are rendered into a folder, once: the scene, the ranges of time, camera and lamps,
    the camera rays of the features and the depth are those that the model names as its training's
-   [`scene_of`, `ranges_of`, `rendered`].
+   [`inputs.trained_scene`, `ranges_of`, `rendered`].
 3. Training frames of the same kind, for forms of the network that are trained on [`for_training`].
 
 An interrupted run resumes, as that of `wamnet dataset` does.
@@ -16,8 +16,9 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
-from ..common.inputs import unlike_training
+from ...refimpl.errors import InputError
+from ..common.executors import fastest
+from ..common.inputs import trained_scene, unlike_training
 from ..common.terminal import say
 from ..files import dataset_files
 from . import dataset
@@ -28,9 +29,6 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
     Pair = tuple[Frame, Frame]
-
-RENDERS_FIRST = ("opencl", "opengl")
-"""What renders the frames: the first kernel that runs here, else the reference."""
 
 SPP_OF_NUMPY = 32
 """Most samples of a reference where no kernel runs: more would take an hour."""
@@ -107,14 +105,6 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
     return {**found, **seeds, "time_in_training": str(frame["time_s"]) in known, "unlike_training": unlike}
 
 
-def scene_of(model: Model) -> str | None:
-    """Return the canonical scene that a model was trained on; None where it names none, or several."""
-    from ...refimpl.light.scenes import CANONICAL
-
-    name = model.info.get("trained_on_scene", "")
-    return name if name in CANONICAL else None
-
-
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
     from ...compiler.scenes.lower_encode import sees
@@ -122,7 +112,7 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     from ...refimpl.light.render import FEATURE_SAMPLER
     from ...refimpl.network.denoise import learned_feature_spp
 
-    scene = scene_of(model)
+    scene = trained_scene(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
     rays = learned_feature_spp(model)
     numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
@@ -152,20 +142,20 @@ def _first(model: Model, name: str, otherwise: int) -> int:
 
 def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Frames:
     """Return test frames (size, size) of the model's scene, rendered where they are missing."""
-    executor = renderer()
+    executor = fastest(work="renderer")
     spp = min(spp, SPP_OF_NUMPY) if executor == "numpy" else spp
     # A data set has a training frame at least; the shortest one.
     numbers = {"frames": 1, "test_frames": count, "spp": 1, "test_spp": spp}
-    place = folder / f"frames-{scene_of(model)}-{size}"
+    place = folder / f"frames-{trained_scene(model)}-{size}"
     _make(place, request_for(model, executor, size_px=size, seed=TEST_SEED, **numbers))
     return of_folder(place, model)
 
 
 def for_training(model: Model, folder: Path) -> Sequence[Pair]:
     """Return training frames of the model's scene, rendered where they are missing."""
-    executor = renderer()
+    executor = fastest(work="renderer")
     spp = min(TRAINING_SPP, SPP_OF_NUMPY) if executor == "numpy" else TRAINING_SPP
-    place = folder / f"training-{scene_of(model)}-{TRAINING_PX}"
+    place = folder / f"training-{trained_scene(model)}-{TRAINING_PX}"
     numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": spp, "size_px": TRAINING_PX}
     _make(place, request_for(model, executor, seed=TRAINING_SEED, **numbers))
     return of_folder(place, model, "train").pairs
@@ -176,18 +166,3 @@ def _make(folder: Path, request: Request) -> None:
     from ...kernels.run.frame_plan import plan
 
     dataset.make(folder, request, plan(request), workers=1, scheduler=None)
-
-
-def renderer() -> str:
-    """Return the first executor that renders here; NumPy, which is slow, is named aloud."""
-    from ...kernels import open_executor
-
-    for name in RENDERS_FIRST:
-        try:
-            open_executor(name).close()
-        except ExecutorUnavailable as error:
-            say(f"not rendered with {name}: {error}")
-        else:
-            return name
-    say("rendered with NumPy, which is slow")
-    return "numpy"

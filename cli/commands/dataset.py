@@ -23,12 +23,14 @@ import typer
 from ...refimpl.errors import InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
-from ..common.options import Renderer, Sampler
+from ..common.executors import chosen
+from ..common.options import ExecutorChoice, Sampler
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
 if TYPE_CHECKING:
     from ...kernels.run.frame_plan import FramePlan, Request, Task
+    from ...kernels.run.scene_source import Parameters
 
 EXAMPLES = """Examples:
 
@@ -41,6 +43,8 @@ wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:
 wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
 
 wamnet dataset minicubes --frames 64 --before 8 -o film
+
+wamnet dataset mine.json --frames 60 --yaw -24:24 --pitch -5:10 --distance 0.9:1.15 -o mine
 
 wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
 
@@ -61,7 +65,7 @@ SceneOrNone = Annotated[
     str | None,
     typer.Argument(
         metavar="SCENE",
-        help=f"Canonical scene ({options.SCENES}); --check needs none.",
+        help=f"Canonical scene ({options.SCENES}) or scene file (.json); --check needs none.",
         show_default=False,
     ),
 ]
@@ -130,6 +134,12 @@ BlenderProgram = Annotated[
 OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
 """Options that mean nothing without --from-blender."""
 
+OF_SCHEDULER = "the scheduler's workers may have no other"
+"""Why only NumPy is chosen for them."""
+
+OF_TIMES = ("start", "seconds", "arc")
+"""Options that mean nothing for a static scene."""
+
 OF_BOTH = ("frames", "test", "outside", "spp", "test_spp", "arc", "seed")
 """Options that mean the same with it and without."""
 
@@ -158,7 +168,7 @@ def dataset(
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
-    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    executor: options.Renderer = ExecutorChoice.auto,
     context: options.OpenGLContext = None,
     sampler: options.SamplerName = Sampler.pcg4d,
     workers: Workers = None,
@@ -185,27 +195,36 @@ def dataset(
         numbers_of = (frames, test, outside, spp, test_spp, arc, seed, noisy_spp, percent)
         _make_from_blender(command, output, (from_blender, *numbers_of, view_layer, blender))
         return
-    options.refuse_given(command, OF_BLENDER, "without --from-blender")
     named = scene or _missing_scene(), options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
-    request = _request((*named, *numbers, *ways), limits, (seen, power, before))
+    request = _request(command, named, (*numbers, *ways), limits, (seen, power, before))
     _check_workers(workers, scheduler)
+    request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
     with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
         make(output, request, plan(request), workers, scheduler)
 
 
 def _request(
-    first: tuple[Any, ...], limits: Mapping[str, str | None], last: tuple[bool, str | None, int]
+    command: typer.Context,
+    named: tuple[str, Parameters],
+    numbers: tuple[Any, ...],
+    limits: Mapping[str, str | None],
+    last: tuple[bool, str | None, int],
 ) -> Request:
-    """Return the request of its first fields, of the texts of its ranges by option, and of the last three."""
+    """Return the request of a scene's name and parameters, of fields, ranges by option and the last three."""
     from ...kernels.run.frame_plan import Request
+    from ...kernels.run.scene_source import scene_source
 
-    seen, power, before = last
+    options.refuse_given(command, OF_BLENDER, "without --from-blender")
+    source, (seen, power, before) = scene_source(*named), last
+    if source.still is not None:
+        options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
     factors = None if power is None else options.parse_limits("--power", power)
-    return replace(Request(*first, *ranges), seen=seen, power=factors, before=before)
+    found = Request(source.name, source.parameters, *numbers, *ranges)
+    return replace(found, seen=seen, power=factors, before=before, still=source.still)
 
 
 def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:

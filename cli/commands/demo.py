@@ -26,8 +26,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
+from ..common import options
 from ..common.effort import said_of_learning
 from ..common.packages import need
 from ..common.terminal import hint_on_interrupt, progress, say, table
@@ -51,7 +52,9 @@ EXAMPLES = """Examples:
 
 wamnet demo
 
-wamnet demo --size 384 -o out/large"""
+wamnet demo --size 384 -o out/large
+
+wamnet demo --scene mine.json -o out/mine"""
 """Shown below the help of `wamnet demo`."""
 
 FOLDER = "out/demo"
@@ -69,9 +72,6 @@ DATA_SET = "frames"
 SHOWN_FIRST = ("opencl", "opengl", "numpy")
 """Whose picture the report shows: that of a compiled kernel, if one ran here."""
 
-RENDERS_FIRST = ("opencl", "opengl")
-"""What renders the frames: the first kernel that runs here, else the reference."""
-
 REPEATS = 3
 """Times of each contender that the report shows."""
 
@@ -83,6 +83,8 @@ FORM_STEPS = 1000
 
 _Result = TypeVar("_Result")
 
+Limits = tuple[float, float]
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -90,10 +92,12 @@ class Plan:
 
     The frames are those of `wamnet dataset`: the network never sees a test frame's pose. Many targets of
     `train_spp` samples teach more than few clean ones; what is judged has references of `reference_spp`.
-    `steps` None means the preset's.
+    `steps` None means the preset's. A scene that moves is shown at different times, one of a file, which is
+    static and has a SHA-256, from cameras in the ranges.
     """
 
     scene: str = "minicubes"
+    scene_sha256: str = ""
     size_px: int = 256
     train_frames: int = 48
     test_frames: int = 2
@@ -105,10 +109,16 @@ class Plan:
     seed: int = 1
     renderer: str = "opencl"
     trainer: str = "opencl"
+    yaw_deg: Limits = (0.0, 0.0)
+    pitch_deg: Limits = (0.0, 0.0)
+    distance: Limits = (1.0, 1.0)
 
 
 QUICK = Plan(size_px=24, train_frames=2, test_frames=2, train_spp=8, reference_spp=8, steps=60)
 """Small enough to test the whole way; its pictures are not meant to be looked at."""
+
+VIEWS: dict[str, Limits] = {"yaw_deg": (-24.0, 24.0), "pitch_deg": (-5.0, 10.0), "distance": (0.9, 1.15)}
+"""Cameras of a static scene: about its own; seldom below a floor, or inside an object."""
 
 REFERENCE_SPP_OF_NUMPY = 32
 """Samples of a reference where no kernel runs: NumPy's would take an hour, and are thirty times slower."""
@@ -119,12 +129,13 @@ TRAIN_FRAMES_OF_NUMPY = 12
 
 @dataclass(frozen=True)
 class Unseen:
-    """A test frame: its time, the noisy frame, its reference, the denoised picture (H, W, 3), the scores.
+    """A test frame: time, heading, noisy frame, its reference, the denoised image (H, W, 3), the scores.
 
     `scores` has a tuple for each picture, input and denoised.
     """
 
     time_s: float
+    label: str
     noisy: Frame
     reference: Frame
     denoised: Any
@@ -149,6 +160,9 @@ class Results:
 
 
 def demo(
+    scene: Annotated[
+        str, typer.Option(help=f"Canonical scene ({options.SCENES}) or scene file (.json).")
+    ] = Plan.scene,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -178,9 +192,12 @@ def demo(
         need(module, "to draw the report")
     if quick and size is not None:
         raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
-    plan = for_this_machine(QUICK if quick else Plan(size_px=Plan.size_px if size is None else size))
+    sizes = QUICK if quick else Plan(size_px=Plan.size_px if size is None else size)
+    plan = for_this_machine(of_scene(sizes, scene))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
-    command = f"wamnet demo {'--quick' if quick else f'--size {plan.size_px}'} -o {shlex.quote(str(folder))}"
+    size_of = "--quick" if quick else f"--size {plan.size_px}"
+    scene_of = [] if scene == Plan.scene else ["--scene", scene]
+    command = shlex.join(["wamnet", "demo", *scene_of, *size_of.split(), "-o", str(folder)])
     with begun(plan, folder), hint_on_interrupt(lambda: f"resume with the same command: {command}"):
         results = carry_out(plan, folder)
         speed = (
@@ -190,26 +207,33 @@ def demo(
     _tell(results, folder)
 
 
+def of_scene(plan: Plan, name: str) -> Plan:
+    """Return the plan for a scene: the preset that suits its materials, and views if it is static."""
+    from ...kernels.run.scene_source import scene_source
+    from ...refimpl.light.shading import build, ever_follows
+
+    source = scene_source(name)
+    shown = source.at()
+    specular = ever_follows(build(shown, float))
+    preset = "sky" if shown.environment else "mirrors" if specular else plan.preset
+    views = VIEWS if source.still is not None else {}
+    return replace(plan, scene=name, scene_sha256=source.sha256, preset=preset, **views)
+
+
 def for_this_machine(plan: Plan) -> Plan:
-    """Return the plan with the first kernel that runs here as its renderer, or one that NumPy can do.
+    """Return the plan with the fastest executors that are available here, or one that NumPy can do."""
+    from ...kernels.devices import registry
 
-    The device that renders trains too, if it can.
-    """
-    from ...kernels import open_executor
-
-    for name in RENDERS_FIRST:
-        try:
-            with open_executor(name) as executor:
-                trains = executor.trains
-        except ExecutorUnavailable as error:
-            say(f"not rendered with {name}: {error}")
-        else:
-            return replace(plan, renderer=name, trainer=name if trains else "numpy")
+    (name, passed), (trainer, _) = registry.fastest(), registry.fastest(trains=True)
+    for reason in passed:
+        say(f"not {reason}")
+    if name != "numpy":
+        return replace(plan, renderer=name, trainer=trainer)
     most, frames = REFERENCE_SPP_OF_NUMPY, min(plan.train_frames, TRAIN_FRAMES_OF_NUMPY)
     train_spp, spp = min(plan.train_spp, most), min(plan.reference_spp, most)
     say(f"rendered with NumPy, which is slow: {frames} training times, references have {spp} paths per pixel")
     few = replace(plan, train_frames=frames, train_spp=train_spp, reference_spp=spp)
-    return replace(few, renderer="numpy", trainer="numpy")
+    return replace(few, renderer=name, trainer=trainer)
 
 
 @contextmanager
@@ -251,6 +275,7 @@ def _check_note(folder: Path, text: str) -> bool:
 def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
+    say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest that are available here")
     for line in said_of_learning(plan.train_frames, plan.size_px**2):
         say(line)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))
@@ -260,12 +285,22 @@ def carry_out(plan: Plan, output: Path) -> Results:
     inputs = [noisy for _, (noisy, _) in tests]
     images, by, runs = _timed(seconds, "kernels", lambda: run_kernels(model, inputs, output))
     unseen = tuple(
-        Unseen(time, noisy, reference, image, score(model, noisy, reference, image))
+        Unseen(
+            time, _label(plan, time, noisy), noisy, reference, image, score(model, noisy, reference, image)
+        )
         for (time, (noisy, reference)), image in zip(tests, images, strict=True)
     )
     results = Results(times, unseen, by, model, state, per_step, runs, seconds)
     write_pictures(output, results)
     return results
+
+
+def _label(plan: Plan, time_s: float, frame: Frame) -> str:
+    """Return how the report calls a frame: by its time, or by the camera of a static scene."""
+    if not plan.scene_sha256:
+        return f"time {time_s:.2f} s"
+    yaw, pitch = (float(frame.info[name]) for name in ("yaw_deg", "pitch_deg"))
+    return f"view, yaw {yaw:.1f}°, pitch {pitch:.1f}°"
 
 
 def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) -> _Result:
@@ -279,10 +314,19 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
+    from ...compiler.scenes.lower_encode import sees
     from ...kernels.run import frame_plan
+    from ...kernels.run.scene_source import scene_source
+    from ...refimpl.network.train import PRESETS
 
+    source = scene_source(plan.scene)
     request = frame_plan.Request(
-        plan.scene,
+        source.name,
+        still=source.still,
+        yaw_deg=plan.yaw_deg,
+        pitch_deg=plan.pitch_deg,
+        distance=plan.distance,
+        seen=sees(PRESETS[plan.preset].features),
         frames=plan.train_frames,
         test_frames=plan.test_frames,
         size_px=plan.size_px,
@@ -418,7 +462,7 @@ def _tell(results: Results, output: Path) -> None:
     for frame in results.unseen:
         before, after = frame.scores["input"], frame.scores["denoised"]
         rows = [(a.metric, str(a), str(b)) for a, b in zip(before, after, strict=True)]
-        title = f"Unseen time {frame.time_s:.2f} s"
+        title = f"Unseen {frame.label}"
         table(title, ("metric", "input", "denoised"), rows)
     table(
         "Executors against the float64 reference",

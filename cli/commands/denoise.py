@@ -21,8 +21,9 @@ import typer
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..common import options
 from ..common.domain import check_domain
+from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
-from ..common.options import ExecutorName
+from ..common.options import ExecutorChoice, ExecutorName
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
 from ..files.outputs import check_output
@@ -146,7 +147,7 @@ def denoise(
             "name with %04d for their numbers.",
         ),
     ] = Path("denoised.png"),
-    executor: options.Executor = ExecutorName.numpy,
+    executor: options.Executor = ExecutorChoice.auto,
     profile: options.Profile = "ieee",
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
@@ -175,12 +176,12 @@ def denoise(
     for result in outputs:
         check_output(result, suffixes, [model, *paths])
     network, notes = load_model(model), Notes()
-    chosen = chosen_variant(variant, rank)
-    with open_executor(executor.value) as runner:
-        denoiser = Denoiser(runner, network, profile, schedule, chosen, len(paths), keeps=True)
+    cut, name = chosen_variant(variant, rank), chosen(executor)
+    with open_executor(name) as runner:
+        denoiser = Denoiser(runner, network, profile, schedule, cut, len(paths), keeps=True)
         job = Job(denoiser, notes, anyway, keep_layers, view_layer)
         if many:
-            how = [executor.value, profile, schedule, chosen, keep_layers, view_layer]
+            how = [name, profile, schedule, cut, keep_layers, view_layer]
             content = hashlib.sha256(model_path(model).read_bytes()).hexdigest()
             _denoise_all(job, paths, outputs, output, _digest(content, *how))
         else:

@@ -11,8 +11,9 @@ import typer
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.effort import said_of_rendering
+from ..common.executors import chosen
 from ..common.inputs import load_scene
-from ..common.options import FloatType, Renderer, Sampler
+from ..common.options import ExecutorChoice, FloatType, Sampler
 from ..common.terminal import progress, say
 from ..files.outputs import check_output, write_text
 
@@ -70,7 +71,7 @@ def render(
     max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
     sampler: options.SamplerName = Sampler.pcg4d,
     dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
-    executor: Annotated[Renderer, typer.Option(help="What traces the paths.")] = Renderer.numpy,
+    executor: options.Renderer = ExecutorChoice.auto,
     context: options.OpenGLContext = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes that share NumPy's work.", show_default="one per core")
@@ -82,7 +83,7 @@ def render(
     The same scene, size, samples and seed give the same frame, whatever the number of workers; kernels
     (OpenCL, OpenGL) give it up to rounding, much sooner.
     """
-    from ...kernels.run.render_frame import render_frame, renderer
+    from ...kernels.run.render_frame import render_frame
     from ...refimpl.light.render import Job
     from ...refimpl.light.transport import Settings
 
@@ -92,17 +93,27 @@ def render(
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler.value)
     job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp, seen=seen)
-    if workers is not None and renderer(executor.value).shares_work:
-        rule = f"{executor.value} shares the work by itself"
-        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
-    for line in said_of_rendering(loaded, job.samples, width * height, executor.value, workers):
+    tracer = _tracer(executor, workers, dtype)
+    for line in said_of_rendering(loaded, job.samples, width * height, tracer, workers):
         say(line)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples) as advance:
-        frame = render_frame(executor.value, loaded, job, workers=workers, on_progress=advance).frame
+        frame = render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
     seconds = clock.perf_counter() - started
     write_picture(path, frame, exposure)
     say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
+
+
+def _tracer(executor: ExecutorChoice, workers: int | None, dtype: FloatType) -> str:
+    """Return the executor that traces the paths; reject one that shares the work by itself."""
+    from ...kernels.run.render_frame import renderer
+
+    because = "kernels compute in float32" if dtype is FloatType.float64 else ""
+    name = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
+    if workers is not None and renderer(name).shares_work:
+        rule = f"{name} shares the work by itself"
+        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
+    return name
 
 
 def write_picture(path: Path, frame: Any, exposure: float) -> None:

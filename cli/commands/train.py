@@ -14,6 +14,7 @@ import typer
 
 from ...refimpl.errors import InputError
 from ..common import options
+from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK
 from ..common.options import Preset, TrainerName
 from ..common.terminal import hint_on_interrupt, progress, say
@@ -129,7 +130,7 @@ def train(
     seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
     resume: Resume = False,
     restart: Restart = False,
-    executor: options.Trainer = TrainerName.numpy,
+    executor: options.Trainer = TrainerName.auto,
 ) -> None:
     """Train a network on noisy frames and their references, or on the training frames of a data set.
 
@@ -151,13 +152,13 @@ def train(
         network = _first_network(begin, state)
         name = _variant_named(variant, whole, state)
         if name is not None:
-            chosen = {"--rank": rank, "--features": features, "--activation": activation}
-            recipe, network = _of_variant(recipe, begin, name, chosen)
+            others = {"--rank": rank, "--features": features, "--activation": activation}
+            recipe, network = _of_variant(recipe, begin, name, others)
         pairs = read_training(dataset, inputs, targets, recipe.features)
         if begin is not None and name is not None and whole_bits(name) and steps is None:
             _round_only(begin, pairs, output, recipe)
             return
-        state = _fit_to_the_end(recipe, pairs, output, state, network, executor.value)
+        state = _fit_to_the_end(recipe, pairs, output, state, network, chosen(executor, trains=True))
         _say_what_there_is(output, state.step)
 
 

@@ -45,7 +45,7 @@ def tune(
             metavar="MODEL", help="Trained model (.safetensors).", show_default="a network like the paper's"
         ),
     ] = None,
-    executor: options.Executor = ExecutorName.opencl,
+    executor: Annotated[ExecutorName, typer.Option(help="What runs the kernel.")] = ExecutorName.opencl,
     size: Annotated[int, typer.Option(help="Width and height of the picture, in pixels.")] = 512,
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,

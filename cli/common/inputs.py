@@ -69,12 +69,25 @@ def load_model(path: Path, imported: bool = False) -> Model:
     raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
 
 
+def trained_scene(model: Model) -> str | None:
+    """Return the canonical scene that a model was trained on; None for several, a file's, and no name."""
+    from ...kernels.run.scene_source import SCENE_FILE
+    from ...refimpl.light.scenes import CANONICAL
+
+    name = model.info.get("trained_on_scene", "")
+    return name if name in CANONICAL and f"trained_on_{SCENE_FILE}" not in model.info else None
+
+
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    told = []
+    from ...kernels.run.scene_source import SCENE_FILE
+
+    told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
         told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
+    elif files and scene and info.get(SCENE_FILE, "") not in files.split(", "):
+        told.append(f"{scene} is another scene file than the one the model was trained on: expect errors")
     elif beyond := outside_ranges(model, info):
         told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info and (rule := unlike_features(model, info)):
@@ -101,43 +114,29 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
+    from ...kernels.run.scene_source import SCENE_FILE
     from ...refimpl.light.scenes import CANONICAL, canonical
     from ...refimpl.light.variation import RANGES, outside, ranges_from_json
 
     text, scene = model.info.get(f"trained_on_{RANGES}"), info.get("scene", "")
+    files = model.info.get(f"trained_on_{SCENE_FILE}")
     if text is None:
         return []
-    own = canonical(scene).lights if scene in CANONICAL else ()
+    own = canonical(scene).lights if scene in CANONICAL and not files else ()
     return outside(ranges_from_json(text), info, [light.color for light in own])
 
 
 def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
-    """Return a canonical scene by name, as a view has it, or the scene in a JSON file."""
-    from ...refimpl.light.scene import from_json
-    from ...refimpl.light.scenes import CANONICAL, canonical
-    from ...refimpl.reading import read_file
+    """Return a canonical scene by name, or that of a scene file, as a view has it."""
+    from ...kernels.run.scene_source import scene_source
 
     parameters = options.parse_parameters(assignments)
     if time is not None:
         parameters["time"] = time
-    path = Path(name)
-    if path.suffix.lower() != ".json":
-        if name in CANONICAL:
-            found = canonical(name, **parameters)
-            return view.of(found) if view else found
-        if path.suffix or path.exists():
-            rule = "neither a canonical scene nor a scene file, whose name ends in .json"
-            raise InputError("scene", name, rule, f"use a .json file or one of {', '.join(CANONICAL)}")
-        return canonical(name, **parameters)
-    if parameters:
-        rule = "a scene file has no parameters"
-        raise InputError("option for the scene", ", ".join(parameters), rule, "change the file")
-    if view not in (None, options.View()):
-        rule = "a scene file has its own camera and lamps"
-        raise InputError("camera and lamps", "given", rule, "change the file, or write it with wamnet scene")
-    try:
-        return from_json(read_file(path, "scene file", "check the name"))
-    except InputError as error:
-        raise InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out) from None
+    source = scene_source(name, parameters)
+    # A file may say of itself that it is another scene's, from such a side: that stays.
+    if view is None or (source.still is not None and view == options.View()):
+        return source.at()
+    return view.of(source.at())

@@ -82,9 +82,10 @@ class ContextName(str, Enum):
     osmesa = "osmesa"
 
 
-class Renderer(str, Enum):
-    """What traces paths: the reference, or a kernel."""
+class ExecutorChoice(str, Enum):
+    """An executor, or the fastest that is available."""
 
+    auto = "auto"
     numpy = "numpy"
     opencl = "opencl"
     opengl = "opengl"
@@ -92,8 +93,9 @@ class Renderer(str, Enum):
 
 
 class TrainerName(str, Enum):
-    """What trains: the reference, or its steps compiled."""
+    """What trains: the reference, its steps compiled, or the faster one of those available."""
 
+    auto = "auto"
     numpy = "numpy"
     opencl = "opencl"
 
@@ -130,10 +132,24 @@ class Preset(str, Enum):
     sky = "sky"
 
 
+EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
+"""Environment variable that names the executor where the caller does not, for results that must not depend on
+the machine."""
+
 Executor = Annotated[
-    ExecutorName,
+    ExecutorChoice,
     typer.Option(
-        "--executor", help="What runs the kernel; see which are there with [bold]wamnet executors[/]."
+        "--executor",
+        envvar=EXECUTOR_VARIABLE,
+        help="What runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet executors[/] lists.",
+    ),
+]
+Renderer = Annotated[
+    ExecutorChoice,
+    typer.Option(
+        "--executor",
+        envvar=EXECUTOR_VARIABLE,
+        help="What traces the paths: [bold]auto[/] is the fastest of those available.",
     ),
 ]
 OpenGLContext = Annotated[
@@ -171,7 +187,9 @@ Profile = Annotated[
 Trainer = Annotated[
     TrainerName,
     typer.Option(
-        "--executor", help="What trains: the reference, or its step compiled, which is much faster."
+        "--executor",
+        envvar=EXECUTOR_VARIABLE,
+        help="What trains: the reference, or its step compiled; [bold]auto[/] is the fastest available.",
     ),
 ]
 ActivationName = Annotated[
@@ -415,10 +433,10 @@ def parse_names(text: str) -> tuple[str, ...]:
 
 
 def refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
-    """Refuse arguments and options that were given and have no meaning."""
+    """Refuse arguments and options that were given on the command line and have no meaning."""
     for name in names:
         source = context.get_parameter_source(name)
-        if source is not None and source.name != "DEFAULT":
+        if source is not None and source.name not in ("DEFAULT", "ENVIRONMENT"):
             option = f"--{name.replace('_', '-')}"
             shown = {"parameters": "--set", "image": "IMAGE", "scene": "SCENE"}.get(name, option)
             raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")

@@ -59,7 +59,11 @@ def facts(plan: Plan, results: Results, command: str) -> dict[str, Any]:
         "plan": asdict(plan),
         "model": _model_facts(results.model),
         "unseen": [
-            {"time_s": frame.time_s, **{name: scores.as_data(s) for name, s in frame.scores.items()}}
+            {
+                "time_s": frame.time_s,
+                "label": frame.label,
+                **{name: scores.as_data(s) for name, s in frame.scores.items()},
+            }
             for frame in results.unseen
         ],
         "train_times_s": results.train_times_s,

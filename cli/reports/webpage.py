@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import InputError
 from ..common import options
-from ..common.inputs import load_model, load_scene
+from ..common.inputs import load_model, load_scene, trained_scene
 from ..common.packages import need
 
 if TYPE_CHECKING:
@@ -67,22 +67,22 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
 
 def learned_scene(model: Model) -> str:
     """Return the canonical scene that a model has learned, minicubes if it names none; refuse others."""
-    from ...refimpl.light.scenes import CANONICAL
-
-    found = model.info.get("trained_on_scene", "") or "minicubes"
-    if found not in CANONICAL:
+    names = model.info.get("trained_on_scene", "")
+    found = trained_scene(model) if names else "minicubes"
+    if found is None:
         rule = "it must be one canonical scene, or one must be chosen"
-        raise InputError("scene that the model has learned", found, rule, "name one with --scene")
+        raise InputError("scene that the model has learned", names, rule, "name one with --scene, or a file")
     return found
 
 
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
     """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
     from ...kernels.run.page import Animation
-    from ...refimpl.light.scenes import CANONICAL
+    from ...kernels.run.scene_source import scene_source
 
-    if name not in CANONICAL:
-        return Animation((0.0,), (load_scene(name, None, assignments),))
+    still = scene_source(name, options.parse_parameters(assignments)).still
+    if still is not None:
+        return Animation((0.0,), (still,))
     if "time" in options.parse_parameters(assignments):
         rule = "a page shows all times of a canonical scene"
         raise InputError("parameter time", "given", rule, "leave it out, or give a scene file")

@@ -17,11 +17,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...compiler.model_file import load_model, save_model
-from ...refimpl.light.scenes import canonical
 from ...refimpl.network.denoise import Model
 from ..cache import FOLDER_VARIABLE
 from ..devices.registry import open_executor
 from ..run.pipeline import Pipeline
+from ..run.scene_source import scene_source
 from . import first_run
 
 CACHES = (*first_run.CACHES, FOLDER_VARIABLE)
@@ -29,7 +29,7 @@ CACHES = (*first_run.CACHES, FOLDER_VARIABLE)
 
 
 def first_picture(executor: str, model: Model, scene: str, size: int) -> float | None:
-    """Return the seconds to the first picture (size, size) of a canonical scene; None where that fails."""
+    """Return the seconds to the first picture (size, size) of a scene; None where that fails."""
     with tempfile.TemporaryDirectory() as folder:
         places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
         for place in places.values():
@@ -59,7 +59,7 @@ def main(arguments: Sequence[str]) -> None:
     start = time.perf_counter()
     with (
         open_executor(name) as executor,
-        Pipeline(executor, canonical(scene), model, (pixels, pixels)) as pipeline,
+        Pipeline(executor, scene_source(scene).at(), model, (pixels, pixels)) as pipeline,
     ):
         pipeline.run()
         seconds = time.perf_counter() - start

@@ -15,7 +15,6 @@ The network has random weights: speed does not depend on them [`random_model`].
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +29,6 @@ from ...compiler.compile import compile_plan
 from ...compiler.variants import plan_model
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from ...refimpl.light.scenes import CANONICAL, canonical
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
@@ -39,6 +37,7 @@ from ..measure import in_turns
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
+from ..run.scene_source import scene_source
 from ..run.tune import choose
 from .peers.moving import Maker, MitsubaOidn
 from .peers.peer_cycles import Cycles
@@ -64,10 +63,11 @@ PEERS: Mapping[str, Callable[[Scene, int], Maker]] = {"mitsuba": MitsubaOidn, "c
 
 
 def moments(name: str) -> list[Scene]:
-    """Return a canonical scene at each moment; one without a time only once."""
-    if "time" not in inspect.signature(CANONICAL[name]).parameters:
-        return [canonical(name)]
-    return [canonical(name, time=STEP_S * (moment + 0.5)) for moment in range(MOMENTS)]
+    """Return a scene at each time step; a static one only once."""
+    source = scene_source(name)
+    if source.still is not None:
+        return [source.still]
+    return [source.at(STEP_S * (moment + 0.5)) for moment in range(MOMENTS)]
 
 
 def random_model(features: Sequence[str], size: int, hidden: Sequence[int]) -> Model:
@@ -127,7 +127,7 @@ def _ours(
     rays: int,
 ) -> dict[str, Callable[[], Any]]:
     """Return the ways of an executor, whose pipelines are open until the stack is closed."""
-    scene, job, shape = canonical(name), Job(size, size, feature_spp=rays), (size, size)
+    scene, job, shape = scene_source(name).at(), Job(size, size, feature_spp=rays), (size, size)
     denoiser = compile_plan(choose(executor, plan_model(model, executor.name), shape).plan)
 
     def separate() -> None:

@@ -28,11 +28,11 @@ import numpy as np
 
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from ...refimpl.light.scenes import canonical
 from ..devices.registry import open_executor
 from ..measure import environment
 from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
+from ..run.scene_source import scene_source
 from .peers import peer_embree, peer_mitsuba, peer_numba
 
 Frames = Callable[[int], Any]
@@ -83,8 +83,8 @@ class Way:
 
 
 def ways_of(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> list[Way]:
-    """Return the ways to render a canonical scene, in the order of `by`."""
-    scene, ways = canonical(name), []
+    """Return the ways to render a scene, in the order of `by`."""
+    scene, ways = scene_source(name).at(), []
     for kind in by:
         if kind == "numpy":
             for count in dict.fromkeys(workers):

@@ -179,7 +179,8 @@ class Executor(ABC):
     homes of weights, apart from the target's usual one, whose kernels it runs
     [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
-    `interprets`: it runs programs as they are, without kernels.
+    `interprets`: it runs programs as they are, without kernels. `software`: a graphics library's own renderer
+    on the processor, slower than the reference.
     """
 
     name: str
@@ -195,6 +196,7 @@ class Executor(ABC):
     paints: bool = False
     smooths: bool = False
     interprets: bool = False
+    software: bool = False
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}

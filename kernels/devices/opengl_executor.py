@@ -60,6 +60,9 @@ HOW_TO_GET = {
 """What to do when a kind of context cannot be had, in Debian's words."""
 
 
+SOFTWARE = (llvmpipe.NAME, "softpipe", "swrast", "SwiftShader")
+"""Renderers on the processor, by what their names contain."""
+
 SOFTWARE_SCHEDULE = "inlined"
 """Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
 
@@ -115,6 +118,7 @@ class OpenGLExecutor(Executor):
         # current, and do nothing when it is asked to change.
         with self._context:
             self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
+        self.software = any(name in self.device for name in SOFTWARE)
         if llvmpipe.NAME in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
             name, least = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS

@@ -57,6 +57,9 @@ EXECUTORS: Mapping[str, Callable[..., Executor]] = {
 OPTIONS: Mapping[str, tuple[Mapping[str, str], ...]] = {"opengl": ({"context": "egl"}, {"context": "osmesa"})}
 """Options of executors that can be opened in several ways, each perhaps another driver."""
 
+FASTEST = ("opencl", "c", "opengl")
+"""Executors that may be faster than NumPy, the fastest first, as measured (docs/speed.md)."""
+
 WAYS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "-".join((name, *options.values())): (name, options)
     for name in EXECUTORS
@@ -80,3 +83,23 @@ def open_executor(name: str, **options: Any) -> Executor:
         if platform.machine().lower() not in ("x86_64", "amd64"):
             fix += f"; if this processor has no wheel, build one: pip install {missing} (g++, libx11-dev)"
         raise ExecutorUnavailable(f"{name}: package {missing} cannot be imported; {fix}") from None
+
+
+def fastest(trains: bool = False) -> tuple[str, list[str]]:
+    """Return the fastest executor that opens here, and of each faster one why it is passed over.
+
+    Opening compiles no kernel, and a second time takes milliseconds. `trains`: one that trains.
+    """
+    reasons = []
+    for name in FASTEST:
+        try:
+            with open_executor(name) as executor:
+                if executor.software:
+                    reasons.append(f"{name}: {executor.device} is a software renderer, slower than NumPy")
+                elif trains and not executor.trains:
+                    reasons.append(f"{name}: it does not train")
+                else:
+                    return name, reasons
+        except ExecutorUnavailable as error:
+            reasons.append(str(error))
+    return "numpy", reasons

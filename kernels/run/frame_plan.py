@@ -27,13 +27,14 @@ from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame
 from ...refimpl.light.render import FEATURE_SAMPLER, TILE_PIXELS, Job, other_sampler, spread
 from ...refimpl.light.scene import Scene, scene_digest
-from ...refimpl.light.scenes import TURN_SECONDS, canonical
+from ...refimpl.light.scenes import TURN_SECONDS
 from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, Ranges, check_ranges, varied
 from .before import MOST_BEFORE, followed
 from .draws import Draw, drawn, drawn_outside
 from .geometry import Comparison, Shown, compare
 from .render_frame import Progress, Rows, render_frame, renderer
+from .scene_source import SCENE_FILE, Parameters, SceneSource
 
 NOISY_SPP = 1
 """Paths per pixel of a noisy picture: what the network is made for."""
@@ -62,17 +63,17 @@ class Request:
     """All that determines a data set, except for the version: scene, animation, numbers, sizes, seed, ways.
 
     The animation runs from `start_s` for `seconds`, of which training leaves out the last `arc_s`;
-    `parameters` are those of the canonical scene. Cameras are drawn from the ranges `yaw_deg`, `pitch_deg`
-    and `distance` (a factor), lamps' colours from the range `saturation` (None: the lamps' own), factors of
-    their power from the range `power` (None: the lamps' own). The features of noisy pictures are means over
-    `feature_spp` camera rays; 0: over the colour's one; they come from `feature_sampler`, "" is an even
-    spread. Targets have `spp` samples, those of test frames `test_spp`; 0: as many. `seen`: noisy pictures
-    have the layers of what is seen past mirrors and glass too. `before`: they have layers of history after so
-    many pictures, in which the animation runs and the camera rests.
+    `parameters` are those of the canonical scene; `still` is the scene of a file instead. Cameras are drawn
+    from the ranges `yaw_deg`, `pitch_deg` and `distance` (a factor), lamps' colours from the range
+    `saturation` (None: the lamps' own), factors of their power from `power` (None: the lamps' own). The
+    features of noisy pictures are means over `feature_spp` camera rays; 0: over the colour's one; they come
+    from `feature_sampler`, "" is an even spread. Targets have `spp` samples, those of test frames `test_spp`;
+    0: as many. `seen`: noisy pictures have the layers of what is seen past mirrors and glass too. `before`:
+    they have layers of history after so many pictures, in which the animation runs and the camera rests.
     """
 
     scene: str
-    parameters: Mapping[str, float | tuple[float, ...]] = field(default_factory=dict)
+    parameters: Parameters = field(default_factory=dict)
     start_s: float = 0.0
     seconds: float = TURN_SECONDS
     frames: int = 8
@@ -95,10 +96,15 @@ class Request:
     feature_sampler: str = ""
     power: Pair | None = None
     before: int = 0
+    still: Scene | None = None
 
     def as_data(self) -> dict[str, Any]:
         """Return the request as JSON's types: what came later only if given, a source not the colour's."""
-        data = {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
+        fields = asdict(replace(self, still=None))
+        data = {name: list(v) if isinstance(v, tuple) else v for name, v in fields.items()}
+        del data["still"]
+        if self.still is not None:
+            data[SCENE_FILE] = self.source.sha256
         source = data.pop("feature_sampler") or spread(self.sampler, self.seen)
         if self.feature_spp > NOISY_SPP and source != self.sampler:
             data["feature_sampler"] = source
@@ -108,6 +114,11 @@ class Request:
             if not given:
                 del data[name]
         return {**data, "parameters": lists}
+
+    @property
+    def source(self) -> SceneSource:
+        """Return the scene as a function of time."""
+        return SceneSource(self.scene, self.parameters, self.still)
 
     @property
     def ranges(self) -> Ranges:
@@ -122,8 +133,7 @@ class Request:
 
     def scene_at(self, draw: Draw) -> Scene:
         """Return the scene that a frame shows; its info has the ranges too."""
-        scene = canonical(self.scene, **{**self.parameters, "time": draw.time_s})
-        found = varied(scene, draw.variation)
+        found = varied(self.source.at(draw.time_s), draw.variation)
         return replace(found, info={**found.info, RANGES: self.ranges.to_json()})
 
 
@@ -232,7 +242,7 @@ def frame_draws(request: Request) -> list[tuple[str, Draw]]:
 
     Test frames inside continue the sequences of the training frames, those outside the sequences of both.
     """
-    lights = canonical(request.scene, **request.parameters).lights
+    lights = request.source.at().lights
     ranges, (train, inside, beyond) = request.ranges, request.counts.values()
     found = drawn(request.seed, ranges, lights, 0, train + inside)
     far = drawn_outside(request.seed, ranges, request.arc_s, lights, train + inside, beyond)
@@ -299,11 +309,23 @@ def _check(request: Request) -> None:
     if "time" in request.parameters:
         value = request.parameters["time"]
         raise InputError("parameter time", value, "each frame has its own", "use --start and --seconds")
-    canonical(request.scene, **request.parameters)
+    request.source.at()
+    if request.still is not None:
+        _check_still(request)
     last = request.seed + 2 * sum(request.counts.values()) - 1
     if request.seed < 0 or last >= 1 << 32:
         rule = "seeds up to that plus twice the number of frames must fit into 32 bits"
         raise InputError("seed", request.seed, rule, "choose a smaller one, 0 or more")
+
+
+def _check_still(request: Request) -> None:
+    """Reject a static scene whose frames would all show the same."""
+    cameras = (request.yaw_deg, request.pitch_deg, request.distance)
+    varies = any(low < high for low, high in cameras) or request.saturation or request.power
+    if not varies and sum(request.counts.values()) > 1:
+        rule = "it is static, and without a range of camera or lights all its frames show the same"
+        way_out = "give one, for example --yaw=-24:24 --pitch=-5:10"
+        raise InputError("scene", request.scene, rule, way_out)
 
 
 def compared(

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, suggested
 from .materials import Conductor, Dielectric, Mirror
 from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
 
@@ -254,9 +254,7 @@ CANONICAL: dict[str, Callable[..., Scene]] = {
 def canonical(name: str, **parameters: Any) -> Scene:
     """Return a canonical scene by name; raise InputError for an unknown name, and wrong parameters."""
     if name not in CANONICAL:
-        raise InputError(
-            "scene", name, "no canonical scene has this name", f"known are {', '.join(CANONICAL)}"
-        )
+        raise InputError("scene", name, "no canonical scene has this name", suggested(name, CANONICAL))
     known = inspect.signature(CANONICAL[name]).parameters
     for parameter, value in parameters.items():
         what = f"parameter {parameter}"

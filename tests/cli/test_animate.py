@@ -19,6 +19,7 @@ from wamnet.cli.files.images import LABEL_PX, read_png
 from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl import encoding
+from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import history
 from wamnet.refimpl.light.render import Job, render
@@ -149,6 +150,24 @@ def test_a_network_that_sees_the_sun_gets_it(wamnet, tmp_path, monkeypatch, exec
     assert text in wamnet("view", "sun.safetensors", "--scene", "daylight", "-o", "page.html").err
 
 
+def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
+    """Every image shows it from the view that is named; a model of another file is warned of."""
+    assert wamnet("scene", "cornell", "-o", "mine.json").status == 0
+    network = load_model(tmp_path / "m.safetensors")
+    facts = {"trained_on_scene": "cornell", "trained_on_scene_sha256": "0" * 64}
+    save_model(tmp_path / "f.safetensors", replace(network, info=facts))
+    two = ("--scene", "mine.json", "--yaw", 9, "--seconds", 0.2, "--fps", 10, "--size", 13)
+    outcome = wamnet("animate", "f.safetensors", *two, "-o", "still")
+    assert "2 of 2 pictures are unlike those of the training: cornell is another scene file" in outcome.out
+    shown = varied(canonical("cornell"), Variation(9.0))
+    for index in (0, 1):
+        noisy = encoding.to_display(render(shown, Job(13, 13, seed=2 * index)).frame["color"], 0.0)
+        got = read_png(tmp_path / "still" / f"0000{index}.png")[LABEL_PX:-1, :13]
+        assert np.abs(got - noisy).max() <= 0.5 / 255 + 1e-6
+    (tmp_path / "mine.json").write_text((tmp_path / "mine.json").read_text().replace("0.73", "0.74"))
+    assert "it holds something else: 00000.png" in wamnet("animate", "f.safetensors", *two, "-o", "still").err
+
+
 def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     """Unless others are named; a model that does not tell shows mini cubes, with the colour's rays."""
     network = load_model(tmp_path / "m.safetensors")
@@ -156,6 +175,9 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     learned = replace(network, info=facts)
     assert (animate.scene_of(learned), learned_feature_spp(learned)) == ("cornell", 3)
     assert (animate.scene_of(network), learned_feature_spp(network)) == ("minicubes", 0)
+    file = replace(network, info={"trained_on_scene": "cornell", "trained_on_scene_sha256": "0" * 64})
+    with pytest.raises(InputError, match="trained on is cornell: it is that of a scene file; name the file"):
+        animate.scene_of(file)
     odd = replace(network, info={"trained_on_scene": "cornell, empty", "trained_on_feature_spp": "1, 3"})
     assert (animate.scene_of(odd), learned_feature_spp(odd)) == ("minicubes", 3)
     save_model(tmp_path / "l.safetensors", learned)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from wamnet.cli.commands import bench, bench_forms, bench_frames, train
+from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
 from wamnet.cli.reports import bench_report, plots, report
 from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
@@ -192,8 +193,8 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
 
 def small_scene(monkeypatch) -> None:
     """Let training frames be few and tiny, and NumPy render and train: no device is needed."""
-    monkeypatch.setattr(bench_frames, "renderer", lambda: "numpy")
-    monkeypatch.setattr(bench, "_trainer", lambda: "numpy")
+    monkeypatch.setattr(bench_frames, "fastest", lambda **_options: "numpy")
+    monkeypatch.setattr(bench, "fastest", lambda **_options: "numpy")
     monkeypatch.setattr(bench_frames, "TRAINING_FRAMES", 2)
     monkeypatch.setattr(bench_frames, "TRAINING_SPP", 2)
     monkeypatch.setattr(bench_frames, "TRAINING_PX", 12)
@@ -346,7 +347,7 @@ def test_the_shipped_model_is_measured_by_default(monkeypatch) -> None:
     name, network = wanted.network()
     wanted.check(network)
     assert name == "minicubes"
-    assert bench_frames.scene_of(network) == "minicubes"
+    assert inputs.trained_scene(network) == "minicubes"
 
 
 # ---- texts and plots of planted data -----------------------------------------------------------------------
@@ -508,6 +509,7 @@ def page(**facts) -> str:
         "command": "wamnet demo",
         "plan": {
             "scene": "cornell",
+            "scene_sha256": "",
             "renderer": "numpy",
             "trainer": "numpy",
             "size_px": 8,
@@ -516,7 +518,7 @@ def page(**facts) -> str:
             "train_spp": 4,
         },
         "model": {"features": ["color"], "window": {"size": 2}, "parameters": 7, "widths": [4, 3]},
-        "unseen": [{"time_s": 0.5, "input": scores, "denoised": scores}],
+        "unseen": [{"time_s": 0.5, "label": "time 0.50 s", "input": scores, "denoised": scores}],
         "train_times_s": [0.0],
         "denoised_by": "numpy",
         "runs": [],

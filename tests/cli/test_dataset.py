@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from wamnet.kernels.run import draws, frame_plan, render_frame
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
-from wamnet.refimpl.light.scene import scene_digest
+from wamnet.refimpl.light.scene import from_json, scene_digest
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges, Variation, ranges_from_json, varied
@@ -250,7 +251,11 @@ def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
     [
         ([], "argument SCENE is missing: a data set shows a scene; name one: minicubes"),
         (["--check"], "data set is dataset: it has no manifest.json; make one"),
-        (["mine.json"], "scene is mine.json: no canonical scene has this name"),
+        (["none.json"], "scene file is none.json: it cannot be read (No such file or directory); check"),
+        (
+            ["minicbes"],
+            "no canonical scene has this name; did you mean minicubes? known are minicubes, glossy",
+        ),
         (["minicubes", "--frames", 0], "frames is 0: it must be an integer from 1 to"),
         (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
@@ -289,6 +294,55 @@ def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:
     monkeypatch.setattr(kernels, "open_executor", missing)
     monkeypatch.setattr(render_frame, "open_executor", missing)
     assert "opencl: no device was found; install one" in refused("dataset", *TINY, "--executor", "opencl")
+
+
+MINE = ("mine.json", "--frames", 2, "--test", 1, "--size", 12, "--spp", 2)
+"""A small data set of a scene file, but for the ranges."""
+
+
+def test_a_scene_file_is_a_scene(wamnet, refused, tmp_path) -> None:
+    """Static, from the draws' cameras and under their lights; its SHA-256 goes from file to model."""
+    wamnet("scene", "cornell", "--time", 1, "-o", "mine.json")
+    content, ranges = (tmp_path / "mine.json").read_bytes(), ("--yaw=-20:20", "--saturation=0:0.5")
+    assert wamnet("dataset", *MINE, *ranges, "-o", "a").status == 0
+    manifest, digest = json.loads((tmp_path / "a/manifest.json").read_text()), sha256(content).hexdigest()
+    assert manifest["request"]["scene_sha256"] == digest
+    for facts in manifest["frames"]:
+        lights = tuple(map(tuple, facts["lights"]))
+        variation = Variation(facts["yaw_deg"], facts["pitch_deg"], facts["distance"], lights)
+        shown = varied(from_json(content), variation)
+        assert facts["scene_digest"] == scene_digest(shown)
+        for kind, spp in (("noisy", 1), ("target", 2)):
+            found = exr.read_frame(tmp_path / "a" / facts[kind]["file"])
+            assert found.info["scene_sha256"] == digest
+            want = render(shown, Job(12, 12, spp, facts[kind]["seed"])).frame["color"]
+            assert (found["color"] == want).all()
+    assert wamnet("train", "--dataset", "a", "--steps", 1).status == 0
+    small = ("render", "mine.json", "--width", 8, "--height", 8)
+    wamnet(*small, "--yaw", 10, "-o", "same.exr")
+    assert "expect" not in wamnet("denoise", "model.safetensors", "same.exr").out
+    (tmp_path / "mine.json").write_bytes(content + b"\n")
+    wamnet(*small, "-o", "other.exr")
+    sentence = "cornell is another scene file than the one the model was trained on"
+    assert sentence in wamnet("denoise", "model.safetensors", "other.exr").out
+    assert f"scene_sha256 {digest} (now" in refused("dataset", *MINE, *ranges, "-o", "a")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((), "scene is cornell: it is static, and without a range of camera or lights all its frames show"),
+        (
+            ("--yaw=-9:9", "--arc", 1),
+            "argument is --arc: it has no meaning for a scene file, which is static",
+        ),
+        (("--yaw=-9:9", "--set", "size=1"), "option for the scene is size: a scene file has no parameters"),
+    ],
+)
+def test_refusals_of_a_scene_file(wamnet, refused, arguments, text) -> None:
+    """What only a scene that moves has, and frames that would all be alike."""
+    wamnet("scene", "cornell", "-o", "mine.json")
+    assert text in refused("dataset", *MINE, *arguments)
 
 
 def test_another_request_overwrites_nothing(refused, wamnet) -> None:

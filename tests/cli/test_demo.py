@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands import bench, bench_forms, demo
-from wamnet.cli.files import exr
+from wamnet.cli.files import dataset_files, exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
 from wamnet.cli.reports import machine, runs
@@ -87,7 +87,7 @@ def test_the_numbers_are_those_of_the_files(finished, report) -> None:
         assert scores["PSNR"] == metrics.psnr(a, b)
         assert scores["SSIM"] == metrics.ssim(a, b)
         assert scores["relMSE"] == metrics.relmse(encoding.from_display(a), encoding.from_display(b))
-        assert set(frame) == {"time_s", "input", "denoised"}
+        assert set(frame) == {"time_s", "label", "input", "denoised"}
         assert frame["denoised"]["metrics"]["PSNR"] != scores["PSNR"]
 
 
@@ -193,7 +193,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
     def nothing(name: str):
         raise ExecutorUnavailable(f"{name}: nothing there")
 
-    monkeypatch.setattr("wamnet.kernels.open_executor", nothing)
+    monkeypatch.setattr("wamnet.kernels.devices.registry.open_executor", nothing)
     plan = demo.for_this_machine(demo.Plan())
     assert plan == demo.replace(
         demo.Plan(),
@@ -204,7 +204,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
         reference_spp=demo.REFERENCE_SPP_OF_NUMPY,
     )
     told = capsys.readouterr().out
-    assert "not rendered with opengl: opengl: nothing there" in told
+    assert "not opengl: nothing there" in told
     assert "rendered with NumPy, which is slow: 12 training times, references have 32 paths per pixel" in told
 
 
@@ -234,8 +234,25 @@ def test_a_target_that_promises_nothing_has_no_bound(finished) -> None:
     assert runs.frame_bound(plan, first_noisy(finished)) is None
 
 
+def test_a_scene_file_is_shown_from_views(wamnet, tmp_path) -> None:
+    """Its data set, its preset and its plan: the SHA-256 makes a changed file another plan."""
+    assert wamnet("scene", "glossy", "-o", "mine.json").status == 0
+    plan = demo.replace(demo.of_scene(demo.QUICK, "mine.json"), renderer="numpy", size_px=8)
+    demo.render_frames(plan, tmp_path / "out")
+    request = dataset_files.read_manifest(tmp_path / "out/frames")["request"]
+    assert request["scene_sha256"] == plan.scene_sha256 != ""
+    assert (plan.preset, request["seen"], request["yaw_deg"]) == ("mirrors", True, [-24.0, 24.0])
+    (time, (noisy, _)), _ = demo._pairs(tmp_path / "out", "test")
+    assert demo._label(plan, time, noisy).startswith(f"view, yaw {float(noisy.info['yaw_deg']):.1f}°, pitch")
+    (tmp_path / "mine.json").write_bytes((tmp_path / "mine.json").read_bytes() + b"\n")
+    assert demo.of_scene(demo.QUICK, "mine.json") != demo.of_scene(demo.QUICK, "glossy")
+    assert demo.of_scene(demo.QUICK, "mine.json").scene_sha256 != plan.scene_sha256
+
+
 def test_refusals(refused, tmp_path) -> None:
-    """A file in the folder's place; an invalid size."""
+    """A file in the folder's place; an invalid size; a scene that is not there."""
+    assert "did you mean cornell?" in refused("demo", "--scene", "cornel")
+    assert "scene file is none.json: it cannot be read" in refused("demo", "--scene", "none.json")
     (tmp_path / "a").write_text("hello")
     assert "output folder is a: it is a file; choose another with -o" in refused("demo", "-o", "a")
     assert "width is 0: it must be an integer" in refused("demo", "--size", 0)

@@ -207,11 +207,6 @@ def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
     wamnet("scene", "empty", "-o", "b.json")
     text = "option for the scene is time: a scene file has no parameters; change the file"
     assert text in refused("render", "b.json", "--time", 1)
-    text = (
-        "camera and lamps is given: a scene file has its own camera and lamps; change the file, or write it"
-    )
-    for option in (("--yaw", 1), ("--pitch", 1), ("--distance", 2), ("--light", "1=1,1,1")):
-        assert text in refused("render", "b.json", *option)
     assert "output file is b.json: it is an input of this command" in refused(
         "scene", "b.json", "-o", "b.json"
     )

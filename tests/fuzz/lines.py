@@ -114,6 +114,12 @@ APART: Sequence[tuple[str, str, str, str]] = (
         "animate model.safetensors --seconds 0.2 --fps 5 --size 4 -o out.gif",
     ),
     ("view", "safetensors", "model.safetensors", "view model.safetensors -o out.html"),
+    (
+        "dataset, scene",
+        "json",
+        "scene.json",
+        "dataset scene.json --frames 1 --test 0 --size 4 --spp 1 -o out",
+    ),
     ("view, scene", "json", "scene.json", "view model.safetensors --scene scene.json -o out.html"),
     ("export, scene", "json", "scene.json", "export model.safetensors --target c --scene scene.json -o out"),
     (

@@ -151,3 +151,50 @@ def test_automatic_context_opens_one(executor_named):
     executor_named("opengl-egl")
     with kernels.open_executor("opengl") as executor:
         assert "through" in executor.device
+
+
+class Device:
+    """An executor that opens."""
+
+    device = "a renderer"
+
+    def __init__(self, trains: bool = False, software: bool = False) -> None:
+        self.trains, self.software = trains, software
+
+    def __enter__(self) -> Device:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Close nothing."""
+
+
+@pytest.mark.parametrize(
+    ("there", "trains", "name", "passed"),
+    [
+        ({"opencl": Device(), "c": Device()}, False, "opencl", []),
+        ({"c": Device(), "opengl": Device()}, False, "c", ["opencl: missing"]),
+        ({"opengl": Device()}, False, "opengl", ["opencl: missing", "c: missing"]),
+        (
+            {"opengl": Device(software=True)},
+            False,
+            "numpy",
+            ["opencl", "c", "opengl: a renderer is a software"],
+        ),
+        ({}, False, "numpy", ["opencl: missing", "c: missing", "opengl: missing"]),
+        ({"opencl": Device(trains=True)}, True, "opencl", []),
+        ({"opencl": Device()}, True, "numpy", ["opencl: it does not train", "c: missing", "opengl: missing"]),
+    ],
+)
+def test_the_fastest_that_opens_is_chosen(monkeypatch, there, trains, name, passed) -> None:
+    """In the measured order; software OpenGL is slower than NumPy; all passed over have reasons."""
+
+    def opened(name: str) -> Device:
+        if name not in there:
+            raise ExecutorUnavailable(f"{name}: missing")
+        return there[name]
+
+    monkeypatch.setattr(registry, "open_executor", opened)
+    found, reasons = registry.fastest(trains)
+    assert found == name
+    assert len(reasons) == len(passed)
+    assert all(reason.startswith(begin) for reason, begin in zip(reasons, passed, strict=True))

@@ -6,7 +6,8 @@
 3. What a block prints must be the `text` block that follows it after `<!-- printed -->`, to the letter;
    `pytest --update-golden tests/meta/test_documents.py` writes it.
 4. A block after `<!-- with Blender -->` runs where the package bpy is, with the project's `examples` in the
-   folder; elsewhere the document is reported as a skipped test.
+   folder; elsewhere the document is reported as a skipped test. Any block outside a clone that names
+   `examples/` has them.
 5. A block after `<!-- not run: reason -->` is left out and reported, with its reason, as a skipped test. Only
    set-up may be marked so, for CI runs that itself [`SETUP`].
 """
@@ -126,7 +127,7 @@ def rewrite(path: Path, block: Block, printed: str) -> None:
 @pytest.mark.needs("programs")
 def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pytest.Config) -> None:
     wanting = [block for block in ALL[document] if block.blender]
-    if wanting:
+    if any("examples/" in block.text and not block.clone for block in ALL[document]):
         (tmp_path / "examples").symlink_to(ROOT / "examples")
     here = not wanting or find_spec("bpy") is not None
     for block in ALL[document]:

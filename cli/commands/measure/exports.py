@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +9,7 @@ import typer
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
 from ...common.inputs import load_model
-from ...common.options import SCENES
-from .shared import head, names_of, row
+from .shared import SceneShown, head, names_of, row
 
 if TYPE_CHECKING:
     from ....kernels.export.check import Verdict
@@ -41,7 +39,7 @@ def exports(
             show_default="a small network with random weights",
         ),
     ] = None,
-    scene: Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}).")] = "minicubes",
+    scene: SceneShown = "minicubes",
     targets: Annotated[
         str | None,
         typer.Option(metavar="NAME,...", help="Targets of wamnet export.", show_default="all"),
@@ -59,11 +57,10 @@ def exports(
     from ....kernels.export.check import HEAD
     from ....kernels.export.shelf import random_model
     from ....kernels.export.targets import NAMES
-    from ....refimpl.light.scenes import CANONICAL, canonical
+    from ....kernels.run.scene_source import scene_source
 
     # Of a scene that moves, a time when its parts are turned.
-    moves = "time" in signature(CANONICAL[scene]).parameters if scene in CANONICAL else False
-    shown = canonical(scene, **({"time": TIME_S} if moves else {}))
+    shown = scene_source(scene).at(TIME_S)
     chosen = tuple(NAMES) if targets is None else names_of("--targets", targets, NAMES)
     network = load_model(model) if model else random_model()
     head(*HEAD)

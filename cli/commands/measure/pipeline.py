@@ -9,9 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...common.options import SCENES
 from ...common.terminal import say
-from .shared import Repeats, check_count, counts_of, extent, facts, head, names_of, numpy_version, row
+from .shared import (
+    Repeats,
+    SceneShown,
+    check_count,
+    counts_of,
+    extent,
+    facts,
+    head,
+    names_of,
+    numpy_version,
+    row,
+)
 
 if TYPE_CHECKING:
     from ....kernels.bench.measure_pipeline import Measured
@@ -29,7 +39,7 @@ wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32
 
 
 def pipeline(
-    scene: Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}).")] = "minicubes",
+    scene: SceneShown = "minicubes",
     executors: Annotated[
         str, typer.Option(metavar="NAME,...", help="What runs the kernels: numpy, opencl, opengl, c.")
     ] = "opencl,opengl",
@@ -65,11 +75,11 @@ def pipeline(
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring
     from ....kernels.bench.workload import check_size
-    from ....refimpl.light.scenes import canonical
+    from ....kernels.run.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 
-    canonical(scene)
+    scene_source(scene)
     given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
     others = names_of("--peers", peers, measuring.PEERS) if peers else ()
     for size in widths:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...common.options import SCENES
+from ...common.options import SCENES, parse_names
 from ...common.terminal import progress, say
 from .shared import Repeats, Square, check_count, counts_of, extent, facts, head, names_of, numpy_version, row
 
@@ -27,7 +27,7 @@ wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba,embree --worker
 
 def render(
     scenes: Annotated[
-        str, typer.Option(metavar="NAME,...", help=f"Canonical scenes ({SCENES}).")
+        str, typer.Option(metavar="NAME,...", help=f"Canonical scenes ({SCENES}) or scene files.")
     ] = "minicubes,cornell",
     by: Annotated[
         str,
@@ -60,10 +60,9 @@ def render(
     from ....kernels.bench import measure_render as measuring
     from ....kernels.bench.workload import check_size
     from ....refimpl.light.render import Job
-    from ....refimpl.light.scenes import CANONICAL
     from ....refimpl.light.transport import Settings
 
-    kinds, shown = names_of("--by", by, measuring.BY), names_of("--scenes", scenes, CANONICAL)
+    kinds, shown = names_of("--by", by, measuring.BY), parse_names(scenes) or [scenes]
     usual = f"1,{len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1}"
     processes = counts_of("--workers", usual if workers is None else workers, "1,2")
     check_size(size)

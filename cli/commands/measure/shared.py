@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from ....refimpl.errors import InputError
-from ...common.options import parse_names
+from ...common.options import SCENES, parse_names
 from ...common.terminal import say
 from ...reports import machine
 
@@ -20,6 +20,7 @@ MOST = 1 << 20
 """Largest count that an option takes: a typing error is refused before anything is measured."""
 
 Repeats = Annotated[int, typer.Option(help="Rounds; in each, all take turns.")]
+SceneShown = Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}) or scene file.")]
 Square = Annotated[int, typer.Option(help="Width and height in pixels.")]
 
 

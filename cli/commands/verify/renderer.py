@@ -112,8 +112,8 @@ def verify_renderer(
     pictures: Pictures = 8,
     seed: options.Seed = 0,
     executor: Annotated[
-        options.Renderer, typer.Option("--executor", help="What traces the paths of --renderer wamnet.")
-    ] = options.Renderer.numpy,
+        options.ExecutorName, typer.Option("--executor", help="What traces the paths of --renderer wamnet.")
+    ] = options.ExecutorName.numpy,
     timeout: Timeout = 300.0,
     as_json: Json = None,
     markdown: Markdown = None,

@@ -1,0 +1,30 @@
+"""The executor that a command runs on: the one that is named, or the fastest that is available here."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from .terminal import say
+
+AUTO = "auto"
+"""The name that leaves the choice to the rule [kernels/devices/registry.py: fastest]."""
+
+
+def chosen(executor: Enum, *, because: str = "", trains: bool = False, work: str = "executor") -> str:
+    """Return the name of an executor; of `auto` the fastest one, which is printed with the reason.
+
+    `because`: why NumPy must do the work, if it must. `trains`: the executor has to train.
+    """
+    name = str(executor.value)
+    return fastest(because=because, trains=trains, work=work) if name == AUTO else name
+
+
+def fastest(*, because: str = "", trains: bool = False, work: str = "executor") -> str:
+    """Return the fastest executor; print it, and why each faster one is passed over."""
+    from ...kernels.devices import registry
+
+    name, passed = ("numpy", []) if because else registry.fastest(trains)
+    for reason in passed:
+        say(f"not {reason}")
+    say(f"{work} {name}: {because or 'the fastest that is available here'}")
+    return name

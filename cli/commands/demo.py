@@ -350,6 +350,7 @@ def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
     """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
     from ...compiler.model_file import load_checkpoint
+    from ...kernels.run.trainer import facts_of
     from ...refimpl.network.train import PRESETS, model_of
 
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)
@@ -366,7 +367,7 @@ def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Mode
         state, seconds = train.fit(recipe, pairs, path, executor=plan.trainer)
     if state.step > done:
         write_text(speed, f"{seconds / (state.step - done)}\n")
-    return model_of(state, train.facts(pairs)), state, _seconds(speed)
+    return model_of(state, facts_of(pairs)), state, _seconds(speed)
 
 
 def _seconds(path: Path) -> float | None:

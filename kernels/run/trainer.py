@@ -228,11 +228,15 @@ def model_of_run(state: TrainState, pairs: Sequence[tuple[Frame, Frame]]) -> Mod
 
     Its facts are those of its training frames, and their domain if they are enough.
     """
-    model = train.model_of(state, facts_of(pairs))
-    if domain := domain_of_frames(model, [noisy for noisy, _ in pairs]):
-        model = replace(model, info={**model.info, DOMAIN: to_json(domain)})
+    model = with_domain(train.model_of(state, facts_of(pairs)), pairs)
     recipe = state.recipe
     return train.whole_of(model, pairs, recipe.whole, recipe.seed) if recipe.whole else model
+
+
+def with_domain(model: Model, pairs: Sequence[tuple[Frame, Frame]]) -> Model:
+    """Return the model with the domain of its training frames among its facts, if they are enough."""
+    domain = domain_of_frames(model, [noisy for noisy, _ in pairs])
+    return replace(model, info={**model.info, DOMAIN: to_json(domain)}) if domain else model
 
 
 def facts_of(pairs: Sequence[tuple[Frame, Frame]]) -> dict[str, str]:

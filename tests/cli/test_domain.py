@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.cli.commands import animate, train
+from wamnet.cli.commands import animate
 from wamnet.cli.common.domain import Watch
 from wamnet.cli.files import exr
 from wamnet.compiler.model_file import load_model, save_model
+from wamnet.kernels.run.trainer import facts_of, with_domain
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
@@ -36,8 +37,8 @@ def stating(samples, tmp_path_factory):
     """Return a folder with a model that states its domain, and with frames inside and outside."""
     folder = tmp_path_factory.mktemp("domain")
     pairs = [(frame, frame) for frame in (shot(0.8 * k) for k in range(LEARNED))]
-    model = train.with_domain(load_model(samples / "model.safetensors"), pairs)
-    save_model(folder / "m.safetensors", replace(model, info={**model.info, **train.facts(pairs)}))
+    model = with_domain(load_model(samples / "model.safetensors"), pairs)
+    save_model(folder / "m.safetensors", replace(model, info={**model.info, **facts_of(pairs)}))
     own, other = shot(0.5), shot(0.5, "cornell")
     exr.write_frame(folder / "own.exr", own)
     exr.write_frame(folder / "cornell.exr", other)

@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 BUDGET = {
-    "refimpl": 1160,
+    "refimpl": 1150,
     "refimpl/light": 4375,
     "refimpl/network": 2750,
     "compiler": 1860,
@@ -24,8 +24,8 @@ BUDGET = {
     "compiler/scenes": 3150,
     "compiler/training": 1200,
     "kernels": 620,
-    "kernels/devices": 2825,
-    "kernels/run": 3575,
+    "kernels/devices": 2800,
+    "kernels/run": 3560,
     "kernels/judge": 1475,
     "kernels/bench": 4850,
     "kernels/blender": 500,
@@ -33,7 +33,7 @@ BUDGET = {
     "kernels/verify": 2925,
     "spec/conformance": 8600,
     "cli": 320,
-    "cli/commands": 6375,
+    "cli/commands": 6325,
     "cli/common": 1400,
     "cli/course": 6150,
     "cli/files": 2200,

@@ -117,7 +117,7 @@ class Plan:
 QUICK = Plan(size_px=24, train_frames=2, test_frames=2, train_spp=8, reference_spp=8, steps=60)
 """Small enough to test the whole way; its pictures are not meant to be looked at."""
 
-VIEWS: dict[str, Limits] = {"yaw_deg": (-24.0, 24.0), "pitch_deg": (-5.0, 10.0), "distance": (0.9, 1.15)}
+VIEWS: dict[str, Any] = {"yaw_deg": (-24.0, 24.0), "pitch_deg": (-5.0, 10.0), "distance": (0.9, 1.15)}
 """Cameras of a static scene: about its own; seldom below a floor, or inside an object."""
 
 REFERENCE_SPP_OF_NUMPY = 32

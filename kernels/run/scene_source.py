@@ -50,7 +50,7 @@ class SceneSource:
 
 
 def scene_source(name: str, parameters: Parameters | None = None) -> SceneSource:
-    """Return the source that a command names; reject a file that is no scene, and names of none."""
+    """Return the source that a command names; reject an unknown name, and a file without a scene."""
     path, parameters = Path(name), parameters or {}
     if path.suffix.lower() != SUFFIX:
         there = os.path.exists(name)  # noqa: PTH110 (Path.exists raises for a name that is too long)

@@ -297,7 +297,7 @@ def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:
 
 
 MINE = ("mine.json", "--frames", 2, "--test", 1, "--size", 12, "--spp", 2)
-"""A small data set of a scene file, but for the ranges."""
+"""A small data set of a scene file, without the ranges."""
 
 
 def test_a_scene_file_is_a_scene(wamnet, refused, tmp_path) -> None:

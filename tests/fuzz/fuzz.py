@@ -147,6 +147,7 @@ def prepare() -> None:
     """Make the good files and the limits of this process."""
     global _good  # noqa: PLW0603 - the pool's initializer has no other way to reach its tasks
     os.environ["WAMNET_CACHE"] = tempfile.mkdtemp(prefix="wamnet-fuzz-cache-")
+    os.environ["WAMNET_EXECUTOR"] = "numpy"  # a kernel of each mutation would be compiled
     os.environ["COLUMNS"] = "200"
     # The log's lines about damaged entries are right, and many.
     logging.getLogger("wamnet").setLevel(logging.CRITICAL)

@@ -28,13 +28,13 @@ from wamnet.kernels.bench.peers.peer_oidn import Kept
 from wamnet.refimpl.encoding import to_8bit, to_display
 from wamnet.refimpl.light.scene import Scene
 
-FRAMES, FRAME_MS, YAW_DEG = 32, 120, 12.0
+FRAMES, FRAME_MS, YAW_DEG = 24, 150, 12.0
 """Frames of the loop, the time that each is shown, and the largest turn of the camera."""
 
 SIZE, REFERENCE_SPP, LABEL_PX = 320, 512, 26
 """Pixels of a panel's edge, paths per pixel of the reference, and the height of a label."""
 
-QUALITY = 45
+QUALITY = 62
 """Quality of the WebP file, which decides its size."""
 
 LABELS = ("1 path per pixel", "wamnet", "Open Image Denoise", f"reference, {REFERENCE_SPP} paths per pixel")
@@ -84,7 +84,14 @@ def main() -> None:
     pages = [sheet(panels(scene, model, other, seed)) for seed, scene in enumerate(scenes(options.period))]
     with replacing(options.output) as path:
         pages[0].save(
-            path, "WEBP", save_all=True, append_images=pages[1:], duration=FRAME_MS, loop=0, quality=QUALITY
+            path,
+            "WEBP",
+            save_all=True,
+            append_images=pages[1:],
+            duration=FRAME_MS,
+            loop=0,
+            quality=QUALITY,
+            method=6,
         )
     print(f"{options.output}: {options.output.stat().st_size / 1e6:.2f} MB, {len(pages)} frames")
 

@@ -109,8 +109,8 @@ class Kernel:
             raise InputError("target", self.target, rule, "save it, and run it in its own host")
         arrays = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
         with open_executor(self.target) as executor:
-            executor.build(self.artifact)
-            return executor.run(self.artifact, arrays)
+            image: NDArray[np.float32] = executor.run(self.artifact, arrays)
+        return image
 
     def save(self, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
         """Write source, weights, manifest and certificate into a folder, and return the files."""

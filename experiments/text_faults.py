@@ -204,6 +204,22 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
 #pragma STDC FP_CONTRACT ON
 #endif
 {CENTRE}"""),
+    ("a constant without a value", ("cuda", "metal"), TAP, "const int once; int tap = "),
+    ("an array whose size is a variable", ("opencl", "cuda"), "float v1[6];", "int n = 6; float v1[n];"),
+    ("a name declared in a loop and its body", ("cuda", "metal"), TAP,
+        "for (int q = 0; q < 1; ++q) { int q = 0; } int tap = "),
+    ("an operator of bits on floats", BUFFERS[:4], TAP, "float q = 1.0f & 1.0f; int tap = "),
+    ("a void variable", BUFFERS[:4], TAP, "void q; int tap = "),
+    ("a float beyond the integers", BUFFERS[:4], TAP, "int q = (int)1e20f; int tap = "),
+    ("ends of a clamp in the wrong order", ("opengl", "glsl-es", "glsl-vulkan", "opencl", "metal"),
+        TAP, "int q = clamp(0, 1, -1); int tap = "),
+    ("a float as an integer without a conversion", ("opengl", "glsl-es", "glsl-vulkan"),
+        TAP, "int q = 1.0f; int tap = "),
+    ("a type's name", C_LIKE, TAP, "int image2D = 0; int tap = "),
+    ("a number of many digits", C_LIKE, TAP, f"float q = 0.{'0' * 99}f; int tap = "),
+    ("an exponent of many digits", C_LIKE, TAP, "float q = 1e-1000000000f; int tap = "),
+    ("a suffix of C", ("wgsl",), "] = 0.0f", "] = 0.0F"),
+    ("a constant of run time", ("opengl", "glsl-es"), TAP, "const int tap = "),
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""
 
@@ -226,6 +242,8 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a copy of less than nothing", "c dot16 whole8", LOAD, LOAD + "memcpy(to->lane, from, -4);"),
     ("weights seen as integers", "c dot16 whole8", LOAD, "const int32_t *w = (const int32_t *)from;\n"
         "    for (int i = 0; i < LANES; ++i) { to->lane[i] = w[i]; }"),
+    ("an address of another type", "c tile8 full", "const float *row", "const int32_t *row"),
+    ("an address of another type", "opencl tile8 full", "const float *row", "const uint *row"),
     ("a row of an array by another", "c tile8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
 )  # fmt: skip
 """What a fault is, in which language, schedule and variant, and what it puts instead of what."""

@@ -38,7 +38,8 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
         place = path.parent / (folder if name == "weights.bin" else "") / name
         files[name] = read_file(place, "file", "restore it", stated=stated)
     for name, data in files.items():
-        same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
+        digests = [held["files"].get(name), manifest["files"][name]]
+        same(f"digest of {name}", digests, [hashlib.sha256(data).hexdigest()] * 2)
     kernel = [manifest["digest"], manifest["profile"]["name"]]
     same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
     if "entry_point" not in held:

@@ -35,7 +35,10 @@ MINIMUM, MAXIMUM = extreme("minimum", -1), extreme("maximum", 1)
 
 
 def clamp(machine: Machine, value: Any, low: Any, high: Any) -> Any:
-    """Return a value between two others."""
+    """Return a value between two others, of which the first is not above the second."""
+    ends = [n.literal if isinstance(n, Number) else getattr(n, "values", n) for n in (low, high)]
+    if all(end is not None for end in ends) and np.any(np.greater(*ends) & machine.running):
+        raise Wrong("it clamps between ends in the wrong order")
     return MINIMUM(machine, MAXIMUM(machine, value, low), high)
 
 

@@ -14,7 +14,7 @@ from ...refimpl.reading import read_file
 from ..proof.evidence import Refused, read
 from .builtins import BUILTINS
 from .claim import Claim
-from .field import add_up_lanes, equal, fold_lanes, literal
+from .field import add_up_lanes, equal, fold_lanes, literal, wide
 from .frame import check_frame, cleaned
 from .frames import TRUE
 from .groups import FLAGS, Group, group_lanes, tile_lanes
@@ -125,6 +125,8 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
         int(manifest["output"]["channels"]),
         manifest["schedule"].get("group"),
     )
+    if any(wide(output) != channels for output in claim.outputs):
+        raise Wrong(f"its manifest has {channels} channels of the output, not the program's")
     result, target = Result(claim, channels), Memory("result", 4, kind="float32")
     given = arguments(claim, language.fragment, result, target)
     group = Group(lanes, size[0] * size[1]) if size else None

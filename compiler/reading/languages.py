@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from .frame import preprocessed
+from .lanes import Unread
 from .syntax import Parser, Text
 from .wgsl_syntax import WgslParser
 
 RESERVED = (
-    "active alignas alignof and asm atomic_uint attribute auto bitand bitor bool break buffer case cast "
-    "catch centroid char class coherent common compl complex concept const const_cast constant constexpr "
-    "continue decltype default delete device discard do double dvec2 dvec3 dvec4 else enum explicit "
-    "export extern external false filter fixed flat float for friend generic global goto half highp hvec2 "
-    "hvec3 hvec4 if inline inout input int interface invariant isampler2D kernel layout local long lowp mat2 "
-    "mat3 mat4 mediump mutable namespace new noexcept noinline noperspective not operator or out output "
-    "partition patch precise precision private protected public quad readonly read_only register restrict "
-    "return sample sampler sampler2D sampler3D samplerCube shared short signed sizeof smooth static "
-    "struct subroutine superp switch template this thread threadgroup throw true try typedef typeid "
-    "typename typeof uint ulong union uniform unsigned using ushort usampler2D varying vec2 vec3 vec4 "
-    "vertex virtual void volatile while write_only writeonly xor"
+    "active alignas alignof and and_eq asm atomic_uint attribute auto bitand bitor blockDim blockIdx "
+    "break buffer case cast catch centroid class co_await co_return co_yield coherent common compl "
+    "complex concept const const_cast constant consteval constexpr constinit continue decltype default "
+    "defined delete device discard do dynamic_cast else enum explicit export extern external false filter "
+    "fixed flat for fpclassify friend generic global goto highp if inline inout input interface "
+    "invariant isfinite isinf isnan isnormal kernel layout linux local lowp math_errhandling mediump "
+    "metal mutable namespace new noexcept noinline noperspective not not_eq nullptr operator or or_eq out "
+    "output partition patch pipe precise precision private protected public quad read_only readonly "
+    "register reinterpret_cast requires resource restrict return sample shared signbit signed sizeof "
+    "smooth static static_assert static_cast struct subroutine superp switch template this thread "
+    "threadIdx thread_local threadgroup throw true try typedef typeid typename typeof typeof_unqual "
+    "uniform union unix unsigned using varying vertex virtual void volatile warpSize while write_only "
+    "writeonly xor xor_eq"
 )
 """Words that no name is in some of C and its children."""
+
+FAMILIES = re.compile(
+    r"\w*__\w*|gl_\w*|_+|_[A-Z]\w*|[bidufh]?vec[234]|d?mat[234](x[234])?|[iu]?sampler\w*|\w+_t|"
+    r"[iu]?(image|texture|subpassInput)(|MS|Cube|Buffer|[123]D)(Rect|Array|MS)*|"
+    r"u?(char|short|int|long|float|double|half|bool|bfloat)\d*(x\d)?|(atomic|packed)_\w+|texture[123]d\w*"
+)
+"""Names that are types of some of the languages, or that they keep for themselves."""
 
 RESERVED_IN_WGSL = (
     "NULL Self abstract active alias alignas alignof as asm asm_fragment async attribute auto await "
@@ -111,6 +122,7 @@ LANGUAGES: Mapping[str, Language] = {
         fragment=True,
         precise=True,
         brings=("gl_FragCoord",),
+        qualifiers="precise",
         mixes=1,
     ),
     "glsl-es": Language(
@@ -119,6 +131,7 @@ LANGUAGES: Mapping[str, Language] = {
         fragment=True,
         precise=True,
         brings=("gl_FragCoord",),
+        qualifiers="precise",
         mixes=0,
     ),
     "glsl-vulkan": Language(
@@ -175,7 +188,11 @@ def parsed(source: str, language: Language, true: Sequence[str]) -> Text:
     """Return a source, cleaned, as a compiler reads it for which these conditions hold."""
     parser = language.parser(*preprocessed(source, true), {*language.calls.split(), *language.brings})
     parser.doubles, parser.precise = language.doubles, language.precise
-    parser.reserved = frozenset(language.reserved.split())
+    parser.reserved, parser.family = frozenset(language.reserved.split()), FAMILIES
+    if language.parser is WgslParser:
+        for _, text, line in parser.tokens:
+            if re.fullmatch(r"(?!0[xX])[\d.].*[FU]", text):
+                raise Unread(f"line {line}: {text}, whose suffix WGSL lacks")
     parser.inside, parser.lists = set(language.qualifiers.split()), language.lists
     if language.types:
         parser.types = {name: parser.types[name] for name in language.types.split()}

@@ -105,10 +105,16 @@ class Machine(Kinds):
 
     def _declare(self, variable: Variable, value: Tree | None) -> None:
         type_, given = variable.type, None if value is None else self.value(value, variable.type)
+        if (type_.kind == "void" and not type_.pointer) or (value is not None and given is None):
+            raise Unread(f"{variable.name}, which is void")
+        if type_.pointer and given is not None:
+            given = self.converted(given, type_)
         count = len(given) if isinstance(given, list) else wide(given)
         if not variable.sizes and type_.kind != "auto" and count not in (1, type_.width):
             raise Wrong(f"{variable.name} is given {count} numbers for {type_.width}")
         if variable.sizes:
+            if any(own in named(variable.sizes) for frame in self.frames[1:] for own in frame):
+                raise Unread(f"{variable.name}, whose size is a variable")
             sizes = tuple(self.value(size) for size in variable.sizes)
             if not all(type(size) is int and 0 < size <= MOST_NUMBERS for size in sizes):
                 raise Wrong(f"{variable.name} is an array of {sizes}")
@@ -164,6 +170,8 @@ class Machine(Kinds):
         function = self.text.functions[name]
         frame: dict[str, Any] = {MASK: self.mask}
         for v, value in zip(function.takes, given, strict=True):
+            if v.type.pointer:
+                self.converted(value, v.type)
             frame |= {v.name: value, f"type of {v.name}": v.type}
         if len(self.returned) > MOST_CALLS:
             raise Wrong(f"{name}() calls itself")
@@ -203,7 +211,11 @@ class Machine(Kinds):
 
     def _run_union(self, name: str, members: list[Variable]) -> None:
         sizes = {v.name: int(self.value(v.sizes[0])) for v in members}
-        memory = Memory(name, max(sizes[v.name] * v.type.width for v in members), self.mask)
+        whole = {(v.type.kind, sizes[v.name] * v.type.width) for v in members}
+        if len(whole) > 1:
+            raise Unread(f"members of union {name} of several kinds or sizes")
+        ((kind, size),) = whole
+        memory = Memory(name, size, self.mask, kind)
         self.frames[-1][name] = {v.name: Pointer(memory, 0, v.type.width, (sizes[v.name],)) for v in members}
 
     def _run_do(self, tree: Tree) -> None:
@@ -463,6 +475,8 @@ class Machine(Kinds):
     def _operate_numbers(self, op: str, a: Any, b: Any) -> Number:
         shift = op in ("<<", ">>")
         a, b = self.both(a, b) if shift else self.alike(a, b)
+        if (shift or op in BITS) and "float32" in (a.kind, b.kind):
+            raise Unread(f"operator {op} of floats")
         if shift and (b.literal is None or not 0 <= b.literal < 32):
             raise Unread("a shift by anything but a constant below 32")
         if (whole := words.operate(op, a, b)) is not None:
@@ -558,6 +572,13 @@ class Machine(Kinds):
         if wide(found) not in (1, type_.width * self.turns):
             raise Wrong(f"{wide(found)} numbers for {type_.width}")
         return self.converted(found, type_)
+
+
+def named(tree: Any) -> set[str]:
+    """Return the names in an expression, or in several."""
+    if isinstance(tree, tuple) and tree[:1] == ("name",):
+        return {tree[1]}
+    return set().union(*map(named, tree)) if isinstance(tree, (list, tuple)) else set()
 
 
 def numbers(value: Any) -> bool:

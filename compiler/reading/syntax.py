@@ -46,6 +46,9 @@ SCALARS = {
 IN_A_FUNCTION = 3
 """How many blocks are open in that of a function: the source, what it takes, its statements."""
 
+LOOP = " loop"
+"""Among the names of a scope that a loop opens."""
+
 BINARY = [
     {"||"}, {"&&"}, {"|"}, {"^"}, {"&"}, {"==", "!="}, {"<", ">", "<=", ">="}, {"<<", ">>"}, {"+", "-"},
     {"*", "/", "%"},
@@ -105,7 +108,7 @@ class Parser:
     def __init__(self, text: str, macros: Macros | None = None, calls: Collection[str] = ()) -> None:
         self.tokens, self.at, self.text = [*tokens(text, macros), ("end", "", 0)], 0, Text()
         self._role, self._binding, self.doubles, self.precise, self.lists = "", -1, False, False, False
-        self._fixed, self.reserved = False, frozenset[str]()
+        self._fixed, self.reserved, self.family = False, frozenset[str](), re.compile("(?!)")
         self.calls, self.scopes, self._inside, self._unset, self._precise = (
             calls,
             [set[str]()],
@@ -236,9 +239,11 @@ class Parser:
 
         A `fixed` one is not assigned to: this is noted by a name with a blank.
         """
-        if name in self.reserved or "__" in name or name.startswith("gl_") or not name.strip("_"):
+        if name in self.reserved or self.family.fullmatch(name):
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {name}, which is reserved")
-        known = name in self.types or name in self.calls or name in self.text.functions
+        # What a loop declares is not declared again in its body: C++ forbids it.
+        loop = self.scopes[-2] if len(self.scopes) > 1 and LOOP in self.scopes[-2] else ()
+        known = name in loop or name in self.types or name in self.calls or name in self.text.functions
         if known or (self._inside and name.upper() == name) or name in self.scopes[-1]:
             raise Unread(f"line {self.tokens[self.at - 1][2]}: another {name}")
         self.scopes[-1] |= {name, f"{name} is fixed"} if fixed else {name}
@@ -468,6 +473,8 @@ class Parser:
             raise Unread(
                 f"line {self.tokens[self.at - 1][2]}: shared memory that is not an array of its kernel"
             )
+        if self._fixed and not type_.pointer and any(value is None and not v.sizes for v, value in found):
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: a constant without a value")
         pairs: list[Tree] = [("declare", variable, value) for variable, value in found]
         return pairs[0] if len(pairs) == 1 else ("declarations", pairs)
 
@@ -481,7 +488,7 @@ class Parser:
 
     def _read_for(self) -> Tree:
         self._take("(")
-        self.scopes.append(set())
+        self.scopes.append({LOOP})
         start = self._branch(begins=True)
         condition = self._expression()
         self._take(";")

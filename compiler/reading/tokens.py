@@ -16,11 +16,14 @@ Token = tuple[str, str, int]
 """Its kind, its text, and its line."""
 
 TOKEN = re.compile(
-    r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+(?=[eE]))(?:[eE][+-]?\d+)?[fF]?|(?!0\d)\d+[uU]?)(?![\w.]))"
+    r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+(?=[eE]))(?:[eE][+-]?\d{1,3})?[fF]?|(?!0\d)\d+[uU]?)(?![\w.]))"
     r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
     r"|(?P<sign>->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^!<>=?:;,.(){}\[\]@])"
 )
 """Numbers, names, texts and signs."""
+
+LONGEST_NUMBER = 64
+"""Most characters of a number."""
 
 MOST_TOKENS = 2**20
 """Most tokens of a source: no kernel comes near."""
@@ -34,6 +37,8 @@ def tokens(text: str, macros: Macros | None = None) -> list[Token]:
         m = TOKEN.match(text, at)
         if not m:
             raise Unread(f"line {line}: {text[at : at + 20]!r}")
+        if m.lastgroup == "number" and len(m[0]) > LONGEST_NUMBER:
+            raise Unread(f"line {line}: a number of {len(m[0])} digits")
         if m.lastgroup:
             result.append((m.lastgroup, m[0], line))
         line += m[0].count("\n")

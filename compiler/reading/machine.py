@@ -113,7 +113,7 @@ class Machine(Kinds):
         if not variable.sizes and type_.kind != "auto" and count not in (1, type_.width):
             raise Wrong(f"{variable.name} is given {count} numbers for {type_.width}")
         if variable.sizes:
-            if any(own in named(variable.sizes) for frame in self.frames[1:] for own in frame):
+            if any(own in _named(variable.sizes) for frame in self.frames[1:] for own in frame):
                 raise Unread(f"{variable.name}, whose size is a variable")
             sizes = tuple(self.value(size) for size in variable.sizes)
             if not all(type(size) is int and 0 < size <= MOST_NUMBERS for size in sizes):
@@ -574,11 +574,11 @@ class Machine(Kinds):
         return self.converted(found, type_)
 
 
-def named(tree: Any) -> set[str]:
+def _named(tree: Any) -> set[str]:
     """Return the names in an expression, or in several."""
     if isinstance(tree, tuple) and tree[:1] == ("name",):
         return {tree[1]}
-    return set().union(*map(named, tree)) if isinstance(tree, (list, tuple)) else set()
+    return set().union(*map(_named, tree)) if isinstance(tree, (list, tuple)) else set()
 
 
 def numbers(value: Any) -> bool:

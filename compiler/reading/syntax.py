@@ -23,25 +23,12 @@ from typing import Any
 
 from .frame import Macros
 from .lanes import Unread
+from .tokens import OUTSIDE, SCALARS, rounds, tokens
 from .tokens import Tree as Tree
 from .tokens import constant as constant
-from .tokens import rounds, tokens
-
-OUTSIDE = {
-    "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
-    "device", "constant", "readonly", "uniform", "in", "out", "__device__", "__global__", "buffer",
-}  # fmt: skip
-"""Qualifiers that change no value: outside of functions frame.py has compared them."""
 
 SHARED = {"__local", "threadgroup", "__shared__", "shared"}
 """Qualifiers of memory that the work items of a group share."""
-
-SCALARS = {
-    "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
-    "int8_t": "int8", "uint8_t": "uint8", "uchar": "uint8", "int32_t": "int32", "uint32_t": "uint32",
-    "i32": "int32", "u32": "uint32", "sampler2D": "image",
-}  # fmt: skip
-"""Names of types of one number."""
 
 IN_A_FUNCTION = 3
 """How many blocks are open in that of a function: the source, what it takes, its statements."""

@@ -22,6 +22,19 @@ TOKEN = re.compile(
 )
 """Numbers, names, texts and signs."""
 
+OUTSIDE = {
+    "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
+    "device", "constant", "readonly", "uniform", "in", "out", "__device__", "__global__", "buffer",
+}  # fmt: skip
+"""Qualifiers that change no value: outside of functions frame.py has compared them."""
+
+SCALARS = {
+    "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
+    "int8_t": "int8", "uint8_t": "uint8", "uchar": "uint8", "int32_t": "int32", "uint32_t": "uint32",
+    "i32": "int32", "u32": "uint32", "sampler2D": "image",
+}  # fmt: skip
+"""Names of types of one number."""
+
 LONGEST_NUMBER = 64
 """Most characters of a number."""
 

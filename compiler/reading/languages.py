@@ -13,6 +13,7 @@ from .syntax import Parser, Text
 from .wgsl_syntax import WgslParser
 
 RESERVED = (
+    "fragment imageblock intersection mem_flags object_data ray_data threadgroup_imageblock visible "
     "active alignas alignof and and_eq asm atomic_uint attribute auto bitand bitor blockDim blockIdx "
     "break buffer case cast catch centroid class co_await co_return co_yield coherent common compl "
     "complex concept const const_cast constant consteval constexpr constinit continue decltype default "

@@ -61,7 +61,8 @@ LIMITS = Limits()
 
 def bubblewrap() -> list[str]:
     """Return the command that runs another one in a sandbox."""
-    parts = (importlib.util.find_spec(f"wamnet.{name}") for name in ("cli", "compiler", "kernels", "refimpl"))
+    names = ("", ".cli", ".compiler", ".kernels", ".models", ".refimpl")
+    parts = (importlib.util.find_spec(f"wamnet{name}") for name in names)
     packages = [place for part in parts if part for place in part.submodule_search_locations or ()]
     folders = ["/usr", "/etc/alternatives", "/etc/ld.so.cache", sys.base_prefix, sys.prefix]
     folders.append(str(Path(sys.executable).resolve().parents[1]))

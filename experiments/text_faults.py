@@ -161,7 +161,8 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("a float without a point", C_LIKE, "3.0f *", "3f *"),
     ("an octal integer", C_LIKE, "< 6;", "< 06;"),
     *(("a reserved word", C_LIKE, "float value = ", f"float {name} = 0.0f, value = ") for name in (
-        "half", "sample", "input", "register", "gl_value", "a__b", "_")),
+        "half", "sample", "input", "register", "gl_value", "a__b", "_", "uvec2", "sampler2DRect", "float4x4",
+        "size_t", "_Bool", "and_eq", "isnan", "linux", "a" * 300)),
     *(("a reserved word", ("wgsl",), "let value", f"let {name} = 0; let value") for name in (
         "ref", "active", "__value", "_")),
     ("a constant that is written", C_LIKE, TAP, f"const int once = 0; once = 1; {TAP}"),
@@ -197,6 +198,25 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("a name that is a word of a language", C_LIKE, TAP, "int short = 0; int tap = "),
     ("a name that is a macro of a header", C_LIKE, TAP, "int NAN = 0; int tap = "),
     ("a declaration for a loop's body", C_LIKE, TAP, "for (int q = 0; q < 1; ++q) float r; int tap = "),
+    ("an address that loses const", BUFFERS[:4], "float v1[6];", "float *p = weights; float v1[6];"),
+    ("a float beyond an integer", ("c", "cuda", "metal", "opencl"), TAP, f"int q = (int)3e9f; {TAP}"),
+    ("a float beyond an integer", (*GLSL, "metal"), TAP, f"int q = int(3e9f); {TAP}"),
+    ("a conversion without a word", GLSL, TAP, f"int q = 1.0f; {TAP}"),
+    ("a conversion without a word", ("wgsl",), "let tap", "let q: i32 = 1.0f; let tap"),
+    ("a cast of C", GLSL, TAP, f"float q = (float)1; {TAP}"),
+    ("bits of a float", C_LIKE, TAP, f"float q = 1.0f & 2.0f; {TAP}"),
+    ("a shift of a float", C_LIKE, TAP, f"float q = 1.0f << 1; {TAP}"),
+    ("a variable of type void", ("c", "cuda", "metal", "opencl"), TAP, f"void q; {TAP}"),
+    ("a value of type void", ("c", "cuda", "metal", "opencl"), TAP, f"int q = (void)0; {TAP}"),
+    ("an array of a variable's size", C_LIKE, TAP, f"int n = 4; float q[n]; {TAP}"),
+    ("a constant without a value", ("cuda", "metal"), TAP, f"const int q; {TAP}"),
+    ("a constant of run time", FRAGMENTS, TAP, f"const {TAP}"),
+    ("a loop's name in its body", C_LIKE, TAP, f"for (int q = 0; q < 1; ++q) {{ int q = 0; }} {TAP}"),
+    ("a value between two in no order", ("metal", "opencl", *GLSL), TAP, f"int q = clamp(0, 2, 1); {TAP}"),
+    ("an exponent of many digits", C_LIKE, "3.0f *", "3e00000000f *"),
+    ("a suffix in upper case", ("wgsl",), "3.0f *", "3.0F *"),
+    ("a namespace before its library", ("metal",), "#include <metal_stdlib>\nusing namespace metal;",
+        "using namespace metal;\n#include <metal_stdlib>"),
     ("a second pragma of fused products", ("c",), CENTRE, f"""#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=fast")
@@ -204,22 +224,6 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
 #pragma STDC FP_CONTRACT ON
 #endif
 {CENTRE}"""),
-    ("a constant without a value", ("cuda", "metal"), TAP, "const int once; int tap = "),
-    ("an array whose size is a variable", ("opencl", "cuda"), "float v1[6];", "int n = 6; float v1[n];"),
-    ("a name declared in a loop and its body", ("cuda", "metal"), TAP,
-        "for (int q = 0; q < 1; ++q) { int q = 0; } int tap = "),
-    ("an operator of bits on floats", BUFFERS[:4], TAP, "float q = 1.0f & 1.0f; int tap = "),
-    ("a void variable", BUFFERS[:4], TAP, "void q; int tap = "),
-    ("a float beyond the integers", BUFFERS[:4], TAP, "int q = (int)1e20f; int tap = "),
-    ("ends of a clamp in the wrong order", ("opengl", "glsl-es", "glsl-vulkan", "opencl", "metal"),
-        TAP, "int q = clamp(0, 1, -1); int tap = "),
-    ("a float as an integer without a conversion", ("opengl", "glsl-es", "glsl-vulkan"),
-        TAP, "int q = 1.0f; int tap = "),
-    ("a type's name", C_LIKE, TAP, "int image2D = 0; int tap = "),
-    ("a number of many digits", C_LIKE, TAP, f"float q = 0.{'0' * 99}f; int tap = "),
-    ("an exponent of many digits", C_LIKE, TAP, "float q = 1e-1000000000f; int tap = "),
-    ("a suffix of C", ("wgsl",), "] = 0.0f", "] = 0.0F"),
-    ("a constant of run time", ("opengl", "glsl-es"), TAP, "const int tap = "),
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""
 
@@ -242,8 +246,17 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a copy of less than nothing", "c dot16 whole8", LOAD, LOAD + "memcpy(to->lane, from, -4);"),
     ("weights seen as integers", "c dot16 whole8", LOAD, "const int32_t *w = (const int32_t *)from;\n"
         "    for (int i = 0; i < LANES; ++i) { to->lane[i] = w[i]; }"),
-    ("an address of another type", "c tile8 full", "const float *row", "const int32_t *row"),
-    ("an address of another type", "opencl tile8 full", "const float *row", "const uint *row"),
+    ("an address of other numbers", "opencl tile8 full", "float *to_color =", "int *to_color ="),
+    ("an address of another space", "opencl group full",
+        "__global const vector *w = (__global const vector *)", "const vector *w = (const vector *)"),
+    ("a cast to integers", "opencl group full",
+        "const vector *w = (__global const vector *)", "const int4 *w = (__global const int4 *)"),
+    ("truths as floats", "opencl group full", "mask t47 =", "vector t47 ="),
+    ("a union of other numbers", "opencl tile8 full", "all[PIXELS * 1]; float number",
+        "all[PIXELS * 1]; int number"),
+    ("a union of other sizes", "opencl tile8 full", "LANES]; } v1;", "LANES / 2]; } v1;"),
+    ("a component of a colour", "cuda group full", "v90_0_0.x;", "v90_0_0.r;"),
+    ("a pragma of no loop", "c tile8 full", "    int top = y", "    WAMNET_UNROLL int top = y"),
     ("a row of an array by another", "c tile8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
 )  # fmt: skip
 """What a fault is, in which language, schedule and variant, and what it puts instead of what."""

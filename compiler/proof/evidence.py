@@ -38,8 +38,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
         place = path.parent / (folder if name == "weights.bin" else "") / name
         files[name] = read_file(place, "file", "restore it", stated=stated)
     for name, data in files.items():
-        digests = [held["files"].get(name), manifest["files"][name]]
-        same(f"digest of {name}", digests, [hashlib.sha256(data).hexdigest()] * 2)
+        same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
     same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
     if "entry_point" not in held:
@@ -70,6 +69,7 @@ def check_manifest(manifest: Any, text: str, count: int) -> None:
     Window, images in their order, ranges and output are the program's, and what counts is an integer.
     Formula: CER-5.
     """
+    same("program: at most 65,536 lines", text.count("\n") <= 2**16, True)
     same("manifest: schema", manifest["schema"], "wamnet-artifact-1")
     window, output, schedule = (manifest[key] for key in ("window", "output", "schedule"))
     given = manifest["images"]

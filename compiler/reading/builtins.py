@@ -11,7 +11,7 @@ from . import words
 from .field import Number, blended, choice, expression, hashed
 from .lanes import Unread, Wrong, chosen, clamped
 from .memory import Pointer, Texel, Weights
-from .syntax import Type
+from .tokens import Type
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -35,10 +35,10 @@ MINIMUM, MAXIMUM = extreme("minimum", -1), extreme("maximum", 1)
 
 
 def clamp(machine: Machine, value: Any, low: Any, high: Any) -> Any:
-    """Return a value between two others, of which the first is not above the second."""
-    ends = [n.literal if isinstance(n, Number) else getattr(n, "values", n) for n in (low, high)]
-    if all(end is not None for end in ends) and np.any(np.greater(*ends) & machine.running):
-        raise Wrong("it clamps between ends in the wrong order")
+    """Return a value between two others; of integers the first is not above the second."""
+    integers = not isinstance(low, Number) and not isinstance(high, Number)
+    if integers and not np.all(machine.operate("<=", low, high) | ~machine.running):
+        raise Wrong("a value between two others in no order")
     return MINIMUM(machine, MAXIMUM(machine, value, low), high)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 import re
 import secrets
 from collections.abc import Mapping, Sequence
@@ -11,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import read_file
-from ..proof.evidence import Refused, read
+from ..proof.evidence import NODE, Refused, read, same
 from .builtins import BUILTINS
 from .claim import Claim
-from .field import add_up_lanes, equal, fold_lanes, literal, wide
+from .field import add_up_lanes, equal, fold_lanes, literal
 from .frame import check_frame, cleaned
 from .frames import TRUE
 from .groups import FLAGS, Group, group_lanes, tile_lanes
@@ -24,8 +26,28 @@ from .limits import limited
 from .machine import Machine
 from .memory import Image, Memory, Pointer, Result
 from .spectra import Tiles
-from .syntax import Text, Type, Variable
+from .tokens import Text, Type, Variable
 from .words import Stored, pointed
+
+KEYS = {
+    "": "schema digest program target language entry_point profile sine passes window images output "
+    "arguments bound certificate sine_arguments info files file_bytes private_bytes schedule "
+    "weights variant factored",
+    "window": "size border centre rows columns",
+    "images": "name channels encoding low high whole",
+    "output": "name channels encoding",
+    "bound": "output against",
+    "profile": "name text",
+    "schedule": "name idea pixels rows group shared_bytes weights_a_texel asked reason",
+    "weights": "count layout order folder",
+}
+"""All that a manifest, and each of its parts, may state."""
+
+AGAINST = re.compile(
+    r"float64 reference, same float32 weights and images(, where weights below \S+ are 0)?"
+    r"|reference in integers, the same bits"
+)
+"""What a certified bound is against."""
 
 MEANINGLESS = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, AssertionError)
 """What Python raises where a text does with its values what no text of a kernel does."""
@@ -44,7 +66,12 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     if not is_read(manifest):
         kind = f"schedule {manifest['schedule']['name']}, profile {manifest['profile']['name']}"
         raise Unread(f"texts of target {manifest['target']} with {kind}")
-    text = read_file(source or path.parent / sources[0], "kernel", "name a text in the kernel's language")
+    own = read_file(path.parent / sources[0], "kernel", "restore it")
+    try:
+        check_facts(manifest, held, own + weights.tobytes())
+    except MEANINGLESS as error:
+        raise Refused(f"manifest: a fact is of another form ({error})") from error
+    text = read_file(source, "kernel", "name a text in the kernel's language") if source else own
     read_files = text.decode(errors="replace"), held, manifest, weights
     answers = limited(run_text, [(*read_files, k) for k in range(len(TRUE.get(manifest["target"], ((),))))])
     return answers[0]  # type: ignore[no-any-return]
@@ -102,8 +129,66 @@ def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
     items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
     if own != found or len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
         raise Wrong("its manifest has other images, another window or other work items than its program")
+    name, grouped = schedule["name"], re.fullmatch(r"group(\d*)", schedule["name"])
+    right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
+    if not right or (grouped and items[0] != int(grouped[1] or 1)):
+        raise Wrong(f"its manifest has other work items than schedule {name}")
+    if not manifest["language"].startswith(LANGUAGES[manifest["target"]].title):
+        raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")
     if items[1] != 1 and not tiles:
         raise Wrong("its manifest gives a work item several rows")
+
+
+def check_facts(manifest: Any, held: Any, kernel: bytes) -> None:
+    """Reject a manifest that states more than its schema has, or another fact than certificate and program.
+
+    What a host reads in words, such as `arguments`, is a string: what it says is not checked. `kernel`: the
+    bytes of source and weights.
+    """
+    same("manifest: digests of its files", manifest["files"], held["files"])
+    same("manifest: digest of the kernel", manifest["digest"], hashlib.sha256(kernel).hexdigest())
+    same("manifest: certificate", manifest["certificate"], "denoise.certificate.json")
+    for at, names in KEYS.items():
+        parts = [manifest] if not at else manifest[at] if at == "images" else [manifest[at]]
+        same(f"manifest: unknown keys{at and f' of {at}'}", set().union(*parts) - {*names.split()}, set())
+    words = [
+        manifest["language"],
+        manifest["arguments"],
+        manifest["profile"]["text"],
+        manifest["schedule"]["idea"],
+    ]
+    words += [one["encoding"] for one in (*manifest["images"], manifest["output"])]
+    words += [manifest["weights"]["order"]]
+    same("manifest: descriptions are strings", {type(word) for word in words}, {str})
+    same("manifest: private_bytes is a count", type(manifest["private_bytes"]) is int, True)
+    against = held["bound"]["against"]
+    same("manifest: what its bound is against", manifest["bound"]["against"], against)
+    same("bound: against a reference", bool(AGAINST.fullmatch(against)), True)
+    text = str(held["program"])
+    nodes = {m[1]: m for m in map(NODE.match, text.splitlines()) if m}
+    own = [int(nodes[n][5] or 1) for n in re.findall(r"(?m)^  output \w+ = %(\d+)$", text)]
+    same("manifest: channels of the output", [manifest["output"]["channels"]], own)
+    sines = manifest["sine_arguments"]
+    same("manifest: sine_arguments", len(sines), sum(m[2] == "sin" for m in nodes.values()))
+    most = manifest["sine"]["domain"] if sines else 0
+    right = all(-most <= low <= high <= most for low, high in sines)
+    same("manifest: sine_arguments are ranges in the sine's domain", right, True)
+    degree = re.search(r"of degree (\d+)", (held.get("sine") or {}).get("text", ""))
+    name = manifest["profile"]["name"].partition("-sine")[2] or "11"
+    same("profile: degree of its sine", name, degree[1] if degree else name)
+    # Older manifests state no lengths [refimpl/reading.py: stated_bytes].
+    lengths = manifest.get("file_bytes", dict.fromkeys(manifest["files"], 0))
+    same("manifest: names in file_bytes", set(lengths), set(manifest["files"]))
+    same("manifest: lengths in file_bytes are integers", {type(n) for n in lengths.values()}, {int})
+    for slot in manifest["weights"]["layout"]:
+        sides, first = slot["shape"], slot["offset"]
+        right = bool(sides) and all(type(n) is int and n > 0 for n in [*sides, first + 1])
+        within = right and first + math.prod(sides) <= manifest["weights"]["count"]
+        same(f"manifest: layout of {slot['name']} lies in the weights", within, True)
+    layout = {slot["name"]: slot["offset"] for slot in manifest["weights"]["layout"]}
+    places = {} if "spectra" in held else held["parameters"]
+    stated = {name: place["offset"] for name, place in places.items() if "offset" in place}
+    same("manifest: layout of the weights", {name: layout.get(name) for name in stated}, stated)
 
 
 def different(source: str, language: Language, manifest: Any, exact: bool) -> list[Text]:
@@ -125,8 +210,6 @@ def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> Non
         int(manifest["output"]["channels"]),
         manifest["schedule"].get("group"),
     )
-    if any(wide(output) != channels for output in claim.outputs):
-        raise Wrong(f"its manifest has {channels} channels of the output, not the program's")
     result, target = Result(claim, channels), Memory("result", 4, kind="float32")
     given = arguments(claim, language.fragment, result, target)
     group = Group(lanes, size[0] * size[1]) if size else None
@@ -203,7 +286,7 @@ def sized(value: Any, variable: Variable) -> Any:
     return (
         pointed(value, variable.type)
         if isinstance(value.memory, Stored)
-        else Pointer(value.memory, 0, variable.type.width)
+        else Pointer(value.memory, 0, variable.type.width, of=variable.type)
     )
 
 

@@ -167,6 +167,8 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
         behind = [one for one in own[:k] if one.startswith(("uniform", "layout"))]
         if (item.startswith("# version") and k) or (item.startswith("precision") and behind):
             raise Unread(f"{item[:100]!r} behind {own[k - 1][:100]!r}")
+        if item.startswith("using") and not any("include" in one for one in own[:k]):
+            raise Unread(f"{item[:100]!r} before its library")
     if target == "glsl-es" and not source.startswith("#version"):
         raise Unread("a source that does not begin with its version")
     _check_together(own, source)
@@ -205,6 +207,8 @@ def preprocessed(source: str, true: Sequence[str]) -> tuple[str, Macros]:
             branches[-1] = [not branches[-1][1] and (word == "else" or rest in holds), True]
         elif word == "endif":
             branches.pop()
+        elif (word, rest) == ("pragma", "unroll") and all(b[0] for b in branches):
+            lines[-1] = UNROLLED
         elif word == "define" and all(b[0] for b in branches):
             name, takes, body = DEFINE.findall(line.strip())[0]
             if name not in BROUGHT:
@@ -218,9 +222,12 @@ GUARD = re.compile(r"\s*#ifndef WAMNET_DENOISE_H\n#define WAMNET_DENOISE_H\n(.*)
 DEFINE = re.compile(r"#define\s+(\w+)(\([\w, ]*\))?(.*)")
 """A macro: its name, what it takes, and what it is."""
 
+UNROLLED = "\x01"
+"""What stands for a pragma on the loop behind it: no source has this character."""
+
 BROUGHT: Macros = {
     "CONVERT": (["a", "kind"], "((kind)(a))"), "FLOOR": (["a"], "floor(a)"), "PRECISE": (None, "precise"),
     "restrict": (None, ""),
-    "WAMNET_UNROLL": (None, ""), "WAMNET_ROLLED": (None, ""),
+    "WAMNET_UNROLL": (None, UNROLLED), "WAMNET_ROLLED": (None, UNROLLED),
 }  # fmt: skip
 """Macros by what they mean, whichever way a compiler has for it."""

@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 
 from . import words
-from .field import ZERO, Number, expression, literal
+from .field import ZERO, Number, expression, literal, wide
 from .lanes import Lanes, Place, Raw, Unread, Wrong
 from .memory import Pointer
-from .syntax import Type
-
-WIDENED = {("int32", "uint32"), ("int32", "float32"), ("uint32", "float32")}
-"""Kinds of numbers, and what desktop GLSL makes of them without a word."""
+from .tokens import Type
 
 PROMOTED = {"int8": "int32", "uint8": "int32"}
 """Kinds of integers that operators take for larger ones."""
+
+
+WIDENED = {("int32", "uint32"), ("int32", "float32"), ("uint32", "float32")}
+"""Conversions that GLSL makes without a word."""
 
 
 class Kinds:
@@ -37,14 +38,14 @@ class Kinds:
         if plain and not type_.pointer and (kind != "int32" or type_.width <= 2):
             return value
         if isinstance(value, list):
-            return [self.converted(one, type_) for one in value]
-        self._check_address(value, type_)
-        if isinstance(value, (Pointer, dict)) or value is None or kind == "auto":
-            return value
+            return [self.converted(one, type_, stated) for one in value]
+        address = isinstance(value, Pointer) and value.sizes != ()
+        if type_.pointer != address and kind != "auto" and not type_.reference:
+            raise Unread(f"an address, or none, as {kind}")
+        if kind == "auto" or value is None or isinstance(value, (Pointer, dict)):
+            return value.declared(type_) if address and kind != "auto" else value
         if isinstance(value, Number):
-            if "bool" in (kind, value.kind) and self._is_truth(value, kind, type_.width):
-                return value
-            return self.cast(value, kind, stated)
+            return self._becomes(value, type_, stated)
         if kind == "bool" or (isinstance(value, np.ndarray) and not isinstance(value, Place)):
             if kind != "bool" or not isinstance(value, (bool, np.ndarray)):
                 raise Unread(f"a truth, or an integer, as {kind}")
@@ -58,34 +59,33 @@ class Kinds:
             raise Unread(f"a coordinate, or {value!r}, as {kind}")
         return literal(value, kind)
 
-    def _check_address(self, value: Any, type_: Type) -> None:
-        """Refuse an address where none is, none where one is, and one of another type."""
-        kind, address = type_.kind, isinstance(value, Pointer) and value.sizes != ()
-        if type_.pointer != address and kind != "auto" and not type_.reference:
-            raise Unread(f"an address, or none, as {kind}")
-        if type_.pointer and address:
-            own = getattr(value.memory, "kind", "") or "float32"
-            if (own, value.width) != (kind, type_.width):
-                raise Unread(f"an address of {value.width} x {own} as one of {type_.width} x {kind}")
+    def _becomes(self, value: Number, type_: Type, stated: bool) -> Number:
+        """Return a number as one of a type; of vectors no language makes others without a word."""
+        kind = type_.kind
+        if "bool" in (kind, value.kind) and self._is_truth(value, kind, type_.width):
+            return value
+        implied = value.kind == kind or (self.mixes == 2 and 1 in (type_.width, wide(value)))
+        if not stated and not implied and not (self.mixes == 1 and (value.kind, kind) in WIDENED):
+            raise Unread(f"{value.kind} as {kind} without a conversion")
+        return self.cast(value, kind)
 
     def _is_truth(self, value: Number, kind: str, width: int) -> bool:
         """Refuse a truth as a number, and a number as a truth; vectors of truths are vectors of integers."""
-        if width == 1 and (kind == "bool") != (value.kind in ("bool", ZERO)):
+        alike = (kind == "bool") == (value.kind in ("bool", ZERO))
+        if not alike and (width == 1 or kind != "int32"):
             raise Unread(f"{value.kind} as {kind}")
         return True
 
-    def cast(self, value: Number, kind: str, stated: bool = True) -> Number:
-        """Return a number as one of another kind; `stated`: a conversion is written."""
-        mixed = value.kind != kind and not stated and self.mixes < 2
-        if mixed and (self.mixes == 0 or (value.kind, kind) not in WIDENED):
-            raise Unread(f"{value.kind} as {kind} without a conversion")
+    def cast(self, value: Number, kind: str) -> Number:
+        """Return a number as one of another kind: `Wrong` for a constant that it does not hold."""
+        limits = words.LIMITS.get(kind)
+        whole = int(value.literal) if value.literal is not None and value.kind == "float32" else 0
+        if limits and not limits[0] <= whole <= limits[1]:
+            raise Wrong(f"{value.literal} as {kind}")
         if value.kind != kind and (other := words.cast(value, kind, self)) is not None:  # type: ignore[arg-type]
             return other
         if kind not in ("float32", "int32", "uint32") or value.kind == kind:
             return value
-        ends = words.LIMITS.get(kind)
-        if ends and value.literal is not None and not ends[0] - 1 < value.literal < ends[1] + 1:
-            raise Wrong(f"{value.literal} is no {kind}")
         return (
             expression("convert", value, kind=kind) if value.literal is None else literal(value.literal, kind)
         )

@@ -8,34 +8,30 @@ from dataclasses import dataclass
 from typing import Any
 
 from .frame import preprocessed
-from .lanes import Unread
-from .syntax import Parser, Text
+from .syntax import Parser
+from .tokens import Text
 from .wgsl_syntax import WgslParser
 
 RESERVED = (
-    "fragment imageblock intersection mem_flags object_data ray_data threadgroup_imageblock visible "
-    "active alignas alignof and and_eq asm atomic_uint attribute auto bitand bitor blockDim blockIdx "
-    "break buffer case cast catch centroid class co_await co_return co_yield coherent common compl "
-    "complex concept const const_cast constant consteval constexpr constinit continue decltype default "
-    "defined delete device discard do dynamic_cast else enum explicit export extern external false filter "
-    "fixed flat for fpclassify friend generic global goto highp if inline inout input interface "
-    "invariant isfinite isinf isnan isnormal kernel layout linux local lowp math_errhandling mediump "
-    "metal mutable namespace new noexcept noinline noperspective not not_eq nullptr operator or or_eq out "
-    "output partition patch pipe precise precision private protected public quad read_only readonly "
-    "register reinterpret_cast requires resource restrict return sample shared signbit signed sizeof "
-    "smooth static static_assert static_cast struct subroutine superp switch template this thread "
-    "threadIdx thread_local threadgroup throw true try typedef typeid typename typeof typeof_unqual "
-    "uniform union unix unsigned using varying vertex virtual void volatile warpSize while write_only "
-    "writeonly xor xor_eq"
+    r"active alignas alignof and asm attribute auto bitand bitor break buffer case cast catch centroid "
+    r"class coherent common compl complex concept const constant constexpr continue decltype default "
+    r"delete device discard do else enum explicit export extern external false filter fixed flat for "
+    r"friend global goto highp if inline inout input interface invariant kernel layout local lowp "
+    r"mediump mutable namespace new noexcept noinline noperspective not operator or out output partition "
+    r"patch precise precision private protected public quad read_only readonly register restrict return "
+    r"sample shared signed sizeof smooth static struct subroutine superp switch template this thread "
+    r"threadgroup throw true try typedef typeid typename typeof uniform union unsigned using varying "
+    r"vertex virtual void volatile while write_only writeonly xor [biudfh]?vec[234] "
+    r"(u?(char|short|int|long|longlong)|b?float|double|half|bool|d?mat)([1-9]+(x[1-9]+)?)? "
+    r"[iu]?(sampler|image|texture)([123][Dd]|Cube|cube|Buffer|block|_)? "
+    r"[iu]?(sampler|image|texture)([123][Dd]|[Cc]ube|[Bb]uffer)\w+ subpassInput\w* resource \w+_t \w+_eq "
+    r"\w+_cast \w+_data _[A-Z]\w* (packed|atomic|simd|co|threadgroup|math|mem)_\w+ const(eval|init) "
+    r"nullptr thread_local static_assert pipe generic linux unix defined "
+    r"is(nan|inf|finite|normal|greater|less|unordered)\w* signbit fpclassify "
+    r"(thread|block|grid)(Idx|Dim) warpSize metal fragment intersection visible mesh object "
+    r"nonuniformEXT"
 )
-"""Words that no name is in some of C and its children."""
-
-FAMILIES = re.compile(
-    r"\w*__\w*|gl_\w*|_+|_[A-Z]\w*|[bidufh]?vec[234]|d?mat[234](x[234])?|[iu]?sampler\w*|\w+_t|"
-    r"[iu]?(image|texture|subpassInput)(|MS|Cube|Buffer|[123]D)(Rect|Array|MS)*|"
-    r"u?(char|short|int|long|float|double|half|bool|bfloat)\d*(x\d)?|(atomic|packed)_\w+|texture[123]d\w*"
-)
-"""Names that are types of some of the languages, or that they keep for themselves."""
+"""Words that no name is in some of C and its children, and patterns of their families."""
 
 RESERVED_IN_WGSL = (
     "NULL Self abstract active alias alignas alignof as asm asm_fragment async attribute auto await "
@@ -56,21 +52,27 @@ RESERVED_IN_WGSL = (
 """Words that no name is in WGSL (16.1, 16.2)."""
 
 
+MOST_LETTERS = 256
+"""No name has so many letters."""
+
+
 @dataclass(frozen=True)
 class Language:
     """How sources of a target are read.
 
-    `calls`: the functions and types' names that kernels call. `within`: the host calls the kernel for
-    pixels of the image only. `fragment`: one pixel's result is a variable. `brings`: names that the source
-    does not declare. `host`: a function of the source that calls the kernel for every work item. `doubles`:
-    a constant without a suffix is one. `aligned`: a vector is at a multiple of its size. `precise`: what
-    rounds is declared so. `types`, `qualifiers`: words for them in functions; all types where there are
-    none. `lists`: a cast of several values is a vector. `mixes`: 2 if kinds of numbers become others
-    without a word, 1 if integers become floats. `of_floats`, `of_integers`: what the names of other
-    schedules than plain begin with that are read, of networks of floats and of integers.
+    `calls`: the functions and types' names that kernels call. `title`: what its name in manifests begins
+    with. `within`: the host calls the kernel for pixels of the image only. `fragment`: one pixel's result
+    is a variable. `brings`: names that the source does not declare. `host`: a function of the source that
+    calls the kernel for every work item. `doubles`: a constant without a suffix is one. `aligned`: a vector
+    is at a multiple of its size. `precise`: what rounds is declared so. `types`, `qualifiers`: words for
+    them in functions; all types where there are none. `lists`: a cast of several values is a vector.
+    `mixes`: 2 if kinds of numbers become others without a word, 1 if integers become floats. `of_floats`,
+    `of_integers`: what the names of other schedules than plain begin with that are read, of networks of
+    floats and of integers.
     """
 
     calls: str
+    title: str
     parser: type[Parser] = Parser
     within: bool = False
     fragment: bool = False
@@ -96,6 +98,7 @@ LANGUAGES: Mapping[str, Language] = {
         "as_float4 as_float8 as_float16 as_int as_int4 as_int8 as_int16 as_uint barrier clamp convert_float "
         "convert_int convert_uint dot_acc_sat_4x8packed_ss_int fabs floor fmax fmin get_global_id "
         "get_group_id get_local_id max min __builtin_ia32_vpdpbusd512",
+        "OpenCL C",
         doubles=True,
         lists=True,
         types="void bool float float4 float8 float16 int int4 int8 int16 uint uint4 uint8 uint16 uchar "
@@ -108,6 +111,7 @@ LANGUAGES: Mapping[str, Language] = {
     "c": Language(
         "fabsf floorf memcpy _mm512_cvtepi32_ps _mm512_dpbusd_epi32 _mm512_loadu_si512 "
         "_mm512_set1_epi32 _mm512_storeu_ps",
+        "C99",
         within=True,
         host="wamnet_image",
         doubles=True,
@@ -119,6 +123,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "opengl": Language(
         GLSL + "ivec2 texelFetch textureSize vec4",
+        "GLSL 3.30",
         within=True,
         fragment=True,
         precise=True,
@@ -128,6 +133,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "glsl-es": Language(
         GLSL + "ivec2 texelFetch textureSize vec4",
+        "GLSL ES 3.00",
         within=True,
         fragment=True,
         precise=True,
@@ -137,6 +143,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "glsl-vulkan": Language(
         GLSL + "barrier dotPacked4x8EXT intBitsToFloat ivec4 vec4",
+        "GLSL 4.50",
         precise=True,
         brings=("gl_GlobalInvocationID", "gl_LocalInvocationID", "gl_WorkGroupID"),
         of_floats=("group",),
@@ -145,6 +152,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "wgsl": Language(
         "abs bitcast clamp dot4I8Packed f32 floor i32 max min pack4xI8 select u32 vec4 workgroupBarrier",
+        "WGSL",
         WgslParser,
         of_floats=("group",),
         of_integers=("group",),
@@ -153,6 +161,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "metal": Language(
         "clamp fabs float4 floor int max min threadgroup_barrier",
+        "Metal",
         types="void bool float float4 int int4 uint uint2",
         qualifiers="const device threadgroup",
         brings=("mem_flags::mem_threadgroup",),
@@ -161,6 +170,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "cuda": Language(
         "__dp4a __int_as_float __syncthreads fabsf floorf fmaxf fminf make_int4 max min",
+        "CUDA C",
         doubles=True,
         types="void bool float int int4 uint",
         qualifiers="const __shared__",
@@ -189,11 +199,7 @@ def parsed(source: str, language: Language, true: Sequence[str]) -> Text:
     """Return a source, cleaned, as a compiler reads it for which these conditions hold."""
     parser = language.parser(*preprocessed(source, true), {*language.calls.split(), *language.brings})
     parser.doubles, parser.precise = language.doubles, language.precise
-    parser.reserved, parser.family = frozenset(language.reserved.split()), FAMILIES
-    if language.parser is WgslParser:
-        for _, text, line in parser.tokens:
-            if re.fullmatch(r"(?!0[xX])[\d.].*[FU]", text):
-                raise Unread(f"line {line}: {text}, whose suffix WGSL lacks")
+    parser.reserved = re.compile("|".join((*language.reserved.split(), rf"\w{{{MOST_LETTERS},}}")))
     parser.inside, parser.lists = set(language.qualifiers.split()), language.lists
     if language.types:
         parser.types = {name: parser.types[name] for name in language.types.split()}

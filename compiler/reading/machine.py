@@ -35,7 +35,8 @@ from .groups import Group
 from .kinds import Kinds
 from .lanes import Lanes, Mask, Place, Raw, Unread, Wrong, plus, times
 from .memory import Every, Memory, Pointer
-from .syntax import Text, Tree, Type, Variable
+from .syntax import Tree
+from .tokens import Text, Type, Variable
 
 COMPARES: dict[str, Callable[[Any], Any]] = {
     "<": lambda d: d < 0, ">": lambda d: d > 0, "<=": lambda d: d <= 0,
@@ -105,28 +106,22 @@ class Machine(Kinds):
 
     def _declare(self, variable: Variable, value: Tree | None) -> None:
         type_, given = variable.type, None if value is None else self.value(value, variable.type)
-        if (type_.kind == "void" and not type_.pointer) or (value is not None and given is None):
-            raise Unread(f"{variable.name}, which is void")
-        if type_.pointer and given is not None:
-            given = self.converted(given, type_)
         count = len(given) if isinstance(given, list) else wide(given)
         if not variable.sizes and type_.kind != "auto" and count not in (1, type_.width):
             raise Wrong(f"{variable.name} is given {count} numbers for {type_.width}")
         if variable.sizes:
-            if any(own in _named(variable.sizes) for frame in self.frames[1:] for own in frame):
-                raise Unread(f"{variable.name}, whose size is a variable")
             sizes = tuple(self.value(size) for size in variable.sizes)
             if not all(type(size) is int and 0 < size <= MOST_NUMBERS for size in sizes):
                 raise Wrong(f"{variable.name} is an array of {sizes}")
             memory = self._memory(variable, int(np.prod(sizes)) * type_.width)
             if given is not None:
                 raise Unread("an array with a value")
-            given = Pointer(memory, 0, type_.width, sizes)
+            given = Pointer(memory, 0, type_.width, sizes, type_)
         elif type_.width > 1 and not type_.pointer and not (isinstance(given, list) and not numbers(given)):
             memory = Memory(variable.name, type_.width, self.mask, type_.kind)
             if given is not None:
                 memory.store(0, type_.width, stacked(given) if numbers(given) else given, self)
-            given = Pointer(memory, 0, type_.width, ())
+            given = Pointer(memory, 0, type_.width, (), type_)
         self.frames[-1][variable.name] = given
         self.frames[-1][f"type of {variable.name}"] = type_
 
@@ -170,8 +165,6 @@ class Machine(Kinds):
         function = self.text.functions[name]
         frame: dict[str, Any] = {MASK: self.mask}
         for v, value in zip(function.takes, given, strict=True):
-            if v.type.pointer:
-                self.converted(value, v.type)
             frame |= {v.name: value, f"type of {v.name}": v.type}
         if len(self.returned) > MOST_CALLS:
             raise Wrong(f"{name}() calls itself")
@@ -211,15 +204,17 @@ class Machine(Kinds):
 
     def _run_union(self, name: str, members: list[Variable]) -> None:
         sizes = {v.name: int(self.value(v.sizes[0])) for v in members}
-        whole = {(v.type.kind, sizes[v.name] * v.type.width) for v in members}
-        if len(whole) > 1:
-            raise Unread(f"members of union {name} of several kinds or sizes")
-        ((kind, size),) = whole
+        alike = {(v.type.kind, sizes[v.name] * v.type.width, len(v.sizes)) for v in members}
+        if len(alike) != 1:
+            raise Unread(f"{name}, a union of other numbers, or of arrays of other sizes")
+        ((kind, size, _),) = alike
         memory = Memory(name, size, self.mask, kind)
-        self.frames[-1][name] = {v.name: Pointer(memory, 0, v.type.width, (sizes[v.name],)) for v in members}
+        self.frames[-1][name] = {
+            v.name: Pointer(memory, 0, v.type.width, (sizes[v.name],), v.type) for v in members
+        }
 
     def _run_do(self, tree: Tree) -> None:
-        self.value(tree)
+        self.forms[tree[0]](*tree[1:])
 
     def _run_return(self, value: Tree | None) -> bool:
         if value is not None:
@@ -303,6 +298,8 @@ class Machine(Kinds):
         found = self.forms[tree[0]](*tree[1:])
         if type(found) is Pointer and found.sizes == ():
             found = found.load(self)
+        if found is None:
+            raise Unread("a value of type void")
         return found if type_ is None else self.converted(found, type_)
 
     def _value_number(self, text: str) -> Any:
@@ -337,7 +334,7 @@ class Machine(Kinds):
         found = self.forms[tree[0]](*tree[1:])
         if not isinstance(found, Pointer):
             raise Unread("a reference to what has no address")
-        return found
+        return found.declared(type_)
 
     def _value_at(self, array: Tree, index: Tree) -> Any:
         at, found = self.value(index), self.forms[array[0]](*array[1:])
@@ -359,7 +356,7 @@ class Machine(Kinds):
         if type(at) is not int or not 0 <= at < count or (count == 1 and not isinstance(found, tuple)):
             raise Wrong(f"component {at} of {count}")
         if isinstance(found, Pointer):
-            return Pointer(found.memory, plus(found.offset, at), 1, ())
+            return Pointer(found.memory, plus(found.offset, at), 1, (), found.of)
         return found[at] if isinstance(found, (list, tuple)) else part_of(found, at)
 
     def _value_of(self, whole: Tree, member: str) -> Any:
@@ -370,9 +367,8 @@ class Machine(Kinds):
         own = any(member == v.name for members in self.text.structs.values() for v in members)
         if isinstance(found, Pointer) and found.sizes in ((), (None,)) and at is None and own:
             vector = member in self.text.vectors
-            return Pointer(
-                found.memory, found.offset, *((found.width, ()) if vector else (1, (found.width,)))
-            )
+            width, sizes = (found.width, ()) if vector else (1, (found.width,))
+            return Pointer(found.memory, found.offset, width, sizes, found.of)
         if isinstance(found, Pointer):
             found = found.load(self)
         if at is None:
@@ -387,7 +383,7 @@ class Machine(Kinds):
             found = self.forms[tree[0]](*tree[1:])
             if not isinstance(found, Pointer):
                 raise Wrong("it takes the address of what has none")
-            return Pointer(found.memory, found.offset, found.width)
+            return Pointer(found.memory, found.offset, found.width, of=found.of)
         found = self.value(tree)
         if op == "*":
             return found.at(0)
@@ -475,10 +471,10 @@ class Machine(Kinds):
     def _operate_numbers(self, op: str, a: Any, b: Any) -> Number:
         shift = op in ("<<", ">>")
         a, b = self.both(a, b) if shift else self.alike(a, b)
-        if (shift or op in BITS) and "float32" in (a.kind, b.kind):
-            raise Unread(f"operator {op} of floats")
         if shift and (b.literal is None or not 0 <= b.literal < 32):
             raise Unread("a shift by anything but a constant below 32")
+        if op in BITS and a.kind not in words.LIMITS:
+            raise Unread(f"operator {op} of numbers of {a.kind}")
         if (whole := words.operate(op, a, b)) is not None:
             return whole
         if op == "+":
@@ -559,26 +555,25 @@ class Machine(Kinds):
         found = self.value(tree)
         if type_.kind == "void":
             return None
+        if self.mixes < 2:
+            raise Unread("a cast of C")
         if type_.pointer:
             kind = getattr(found.memory, "kind", "")
+            if found.of.space != type_.space:
+                raise Unread(
+                    f"an address of {found.of.space or 'no'} space as one of {type_.space or 'none'}"
+                )
             if not self.aligned and kind not in ("", type_.kind):
                 raise Unread(f"{kind} seen as {type_.kind}, which C leaves undefined")
             return words.pointed(found, type_, self.aligned)
         if isinstance(found, list):
             if found != [0] and len(found) != type_.width:
                 raise Wrong(f"{len(found)} numbers for {type_.width}")
-            found = self.converted(found, type_)
+            found = self.converted(found, type_, stated=True)
             return found[0] if len(found) == 1 else stacked(found)
         if wide(found) not in (1, type_.width * self.turns):
             raise Wrong(f"{wide(found)} numbers for {type_.width}")
-        return self.converted(found, type_)
-
-
-def _named(tree: Any) -> set[str]:
-    """Return the names in an expression, or in several."""
-    if isinstance(tree, tuple) and tree[:1] == ("name",):
-        return {tree[1]}
-    return set().union(*map(_named, tree)) if isinstance(tree, (list, tuple)) else set()
+        return self.converted(found, type_, stated=True)
 
 
 def numbers(value: Any) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
 from .lanes import Mask, Place, Unread, Wrong, plus, times
+from .tokens import Type
 
 if TYPE_CHECKING:
     from .claim import Claim
@@ -22,25 +23,34 @@ class Every:
     turns: int
 
 
+OWN = Type("")
+"""The type of an address that no source declares."""
+
+
 @dataclass(slots=True)
 class Pointer:
-    """A place of `width` numbers in a memory; `sizes` of an array, (None,) of a pointer, () of a variable."""
+    """A place of `width` numbers in a memory; `sizes` of an array, (None,) of a pointer, () of a variable.
+
+    `of`: the type that it is declared with, of no kind where it has none.
+    """
 
     memory: Any
     offset: Any
     width: int = 1
     sizes: tuple[int | None, ...] = (None,)
+    of: Type = OWN
 
     def at(self, index: Any) -> Pointer:
         """Return the place of an element, within the array's own size where that is known."""
         if isinstance(index, Every):
-            return Pointer(self.memory, self.offset, self.width * index.turns, ())
+            return Pointer(self.memory, self.offset, self.width * index.turns, (), self.of)
         if isinstance(index, int) and self.sizes[0] is not None and not 0 <= index < self.sizes[0]:
             raise Wrong(f"element {index} of an array of {self.sizes[0]}")
         step = self.width
         for size in self.sizes[1:]:
             step *= size or 1
-        return Pointer(self.memory, plus(self.offset, times(index, step)), self.width, self.sizes[1:])
+        offset = plus(self.offset, times(index, step))
+        return Pointer(self.memory, offset, self.width, self.sizes[1:], self.of)
 
     def moved(self, index: Any, machine: Machine) -> Pointer:
         """Return the place of an element, or of the end, as a pointer; `Wrong` outside of the array."""
@@ -50,7 +60,18 @@ class Pointer:
         beyond = (at.values < 0)[machine.running].any() if isinstance(at, Place) else at < 0
         if beyond or (isinstance(at, int) and isinstance(end, int) and at > end):
             raise Wrong("an address outside of its array")
-        return Pointer(self.memory, offset, self.width)
+        return Pointer(self.memory, offset, self.width, of=self.of)
+
+    def declared(self, type_: Type) -> Pointer:
+        """Return it as a pointer, or a reference, of a type, to which nothing is converted without a cast."""
+        own = self.of
+        if own.kind and (
+            (own.kind, self.width, own.space) != (type_.kind, type_.width, type_.space)
+            or own.fixed > type_.fixed
+            or len(self.sizes) > 1
+        ):
+            raise Unread(f"an address of {own.fixed * 'const '}{own.kind} as one of {type_.kind}")
+        return replace(self, of=type_)
 
     def load(self, machine: Machine) -> Any:
         """Return what is there."""
@@ -58,6 +79,8 @@ class Pointer:
 
     def store(self, value: Any, machine: Machine) -> None:
         """Write a number, or a vector."""
+        if self.of.fixed:
+            raise Wrong("it writes what is const")
         self.memory.store(self.offset, self.width, value, machine)
 
 
@@ -141,6 +164,8 @@ class Memory:
 class Image:
     """An image: every number of it is an unknown of the claim."""
 
+    kind = "float32"
+
     def __init__(self, name: str, channels: int, size: tuple[Place, Place], span: Span | None = None) -> None:
         self.name, self.channels, self.size, self.lanes, self.span = name, channels, size, size[0].lanes, span
 
@@ -184,7 +209,7 @@ class Texel:
 class Weights:
     """The weights, as a buffer; a texture of them has rows of `TEXELS`. Of `spectra` no sums are made."""
 
-    TEXELS = 1024
+    TEXELS, kind = 1024, "float32"
 
     def __init__(self, numbers: Number, spectra: range = range(0)) -> None:
         self.numbers, self.spectra, self.size = numbers, spectra, int(numbers.value.shape[2])
@@ -204,6 +229,8 @@ class Weights:
 
 class Result:
     """The picture that a text writes: its own pixels, with what the claim says, and all of them."""
+
+    kind = "float32"
 
     def __init__(self, claim: Claim, channels: int) -> None:
         self.claim, self.channels = claim, channels

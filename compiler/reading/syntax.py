@@ -18,23 +18,36 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any
 
-from .frame import Macros
+from .frame import UNROLLED, Macros
 from .lanes import Unread
-from .tokens import OUTSIDE, SCALARS, rounds, tokens
+from .tokens import Function, Text, Type, Variable, rounds, tokens
 from .tokens import Tree as Tree
 from .tokens import constant as constant
+
+OUTSIDE = {
+    "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
+    "device", "constant", "readonly", "uniform", "in", "out", "__device__", "__global__", "buffer",
+}  # fmt: skip
+"""Qualifiers that change no value: outside of functions frame.py has compared them."""
 
 SHARED = {"__local", "threadgroup", "__shared__", "shared"}
 """Qualifiers of memory that the work items of a group share."""
 
+SPACES = {"__global", "__local", "device", "threadgroup", "constant"}
+"""Qualifiers that are address spaces, which a pointer keeps."""
+
+SCALARS = {
+    "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
+    "int8_t": "int8", "uint8_t": "uint8", "uchar": "uint8", "int32_t": "int32", "uint32_t": "uint32",
+    "i32": "int32", "u32": "uint32", "sampler2D": "image",
+}  # fmt: skip
+"""Names of types of one number."""
+
 IN_A_FUNCTION = 3
 """How many blocks are open in that of a function: the source, what it takes, its statements."""
-
-LOOP = " loop"
-"""Among the names of a scope that a loop opens."""
 
 BINARY = [
     {"||"}, {"&&"}, {"|"}, {"^"}, {"&"}, {"==", "!="}, {"<", ">", "<=", ">="}, {"<<", ">>"}, {"+", "-"},
@@ -43,59 +56,13 @@ BINARY = [
 """Operators of two operands, from those that bind least."""
 
 
-@dataclass(frozen=True)
-class Type:
-    """A type: of one number, or of `width` of them; a pointer to them; a struct by its name."""
-
-    kind: str
-    width: int = 1
-    pointer: bool = False
-    reference: bool = False
-
-
-@dataclass
-class Variable:
-    """A name with its type; `sizes` of an array, expressions; `shared` by a group; `role`: what brings it."""
-
-    name: str
-    type: Type
-    sizes: list[Any] = field(default_factory=list)
-    shared: bool = False
-    role: str = ""
-
-
-@dataclass
-class Function:
-    """A function: what it takes, its statements, and the type that it returns."""
-
-    name: str
-    takes: list[Variable]
-    body: Tree
-    type: Type
-
-
-@dataclass
-class Text:
-    """A parsed text: functions and variables outside them by name, structs' members, sizes of work groups.
-
-    `vectors`: names of members that are all of a struct.
-    """
-
-    functions: dict[str, Function] = field(default_factory=dict)
-    outside: list[tuple[Variable, Any]] = field(default_factory=list)
-    structs: dict[str, list[Variable]] = field(default_factory=dict)
-    group: list[Tree] = field(default_factory=list)
-    bindings: dict[str, int] = field(default_factory=dict)
-    vectors: set[str] = field(default_factory=set)
-
-
 class Parser:
     """Reads one text: `parse()`."""
 
     def __init__(self, text: str, macros: Macros | None = None, calls: Collection[str] = ()) -> None:
         self.tokens, self.at, self.text = [*tokens(text, macros), ("end", "", 0)], 0, Text()
         self._role, self._binding, self.doubles, self.precise, self.lists = "", -1, False, False, False
-        self._fixed, self.reserved, self.family = False, frozenset[str](), re.compile("(?!)")
+        self._fixed, self._space, self.reserved = False, "", re.compile("")
         self.calls, self.scopes, self._inside, self._unset, self._precise = (
             calls,
             [set[str]()],
@@ -222,16 +189,15 @@ class Parser:
         return found
 
     def _declared(self, name: str, fixed: bool = False) -> str:
-        """Note the name of a variable, which no type or function has, nor another one of its block.
+        """Note the name of a variable: no type or function has it, nor its block or the one around that.
 
         A `fixed` one is not assigned to: this is noted by a name with a blank.
         """
-        if name in self.reserved or self.family.fullmatch(name):
+        if self.reserved.fullmatch(name) or "__" in name or name.startswith("gl_") or not name.strip("_"):
             raise Unread(f"line {self.tokens[self.at - 1][2]}: {name}, which is reserved")
-        # What a loop declares is not declared again in its body: C++ forbids it.
-        loop = self.scopes[-2] if len(self.scopes) > 1 and LOOP in self.scopes[-2] else ()
-        known = name in loop or name in self.types or name in self.calls or name in self.text.functions
-        if known or (self._inside and name.upper() == name) or name in self.scopes[-1]:
+        known = name in self.types or name in self.calls or name in self.text.functions
+        known = known or (self._inside and name.upper() == name)
+        if known or any(name in scope for scope in (self.scopes[-1], *self.scopes[1:][-2:])):
             raise Unread(f"line {self.tokens[self.at - 1][2]}: another {name}")
         self.scopes[-1] |= {name, f"{name} is fixed"} if fixed else {name}
         return name
@@ -252,6 +218,7 @@ class Parser:
         while True:
             if self._inside and self._now not in self.inside:
                 return shared
+            self._space = self._now if self._now in SPACES else self._space
             if self._now in SHARED:
                 shared = True
                 self._take()
@@ -292,15 +259,17 @@ class Parser:
 
     def _qualified(self) -> tuple[bool, Type]:
         """Read a type with qualifiers before, between and behind."""
+        self._fixed, self._space = False, ""
         shared = self._qualifiers()
         found = self._type()
         while True:
             shared |= self._qualifiers()
-            if self._now in ("*", "&"):
-                pointer = self._take() == "*"
-                found = Type(found.kind, found.width, pointer, not pointer)
-            else:
+            found = replace(found, space=self._space) if self._space else found
+            if self._now not in ("*", "&"):
                 return shared, found
+            pointer = self._take() == "*"
+            found = replace(found, pointer=pointer, reference=not pointer, fixed=self._fixed)
+            self._fixed = False
 
     def _is_type(self) -> bool:
         """Return whether a type begins here."""
@@ -317,10 +286,13 @@ class Parser:
         """Read the name, `of` a member or a variable, and the sizes of an array."""
         found = Variable(self._take(), type_, shared=shared)
         if not of:
-            self._declared(found.name, self._fixed and not type_.pointer)
+            self._declared(found.name, self._fixed)
+        if type_.kind == "void":
+            raise Unread(f"line {self.tokens[self.at - 1][2]}: {found.name} of type void")
         while self._now == "[" and self._ahead() != "[":
             self._take()
             found.sizes.append(None if self._now == "]" else self._expression())
+            constant(found.sizes[-1] or ("number", "0"))
             self._take("]")
         self._role = ""
         self._qualifiers()
@@ -372,7 +344,6 @@ class Parser:
         while not self._has(")"):
             if found:
                 self._take(",")
-            self._fixed = False
             shared, type_ = self._qualified()
             if type_.kind == "void" and self._now == ")":
                 continue
@@ -383,13 +354,17 @@ class Parser:
 
     def _variables(self, type_: Type, shared: bool, into: list[tuple[Variable, Any]]) -> None:
         """Read declared names with their values, up to the semicolon."""
+        fixed = self._fixed
         while True:
-            own = Type(type_.kind, type_.width, pointer=True) if self._has("*") else type_
+            self._fixed = fixed
+            own = replace(type_, pointer=True, fixed=fixed or type_.fixed) if self._has("*") else type_
             self._qualifiers()
             found = self._variable(own, shared)
             self._unset = found.name
             into.append((found, self._value() if self._has("=") else None))
             self._unset = ""
+            if self._inside and fixed and into[-1][1] is None:
+                raise Unread(f"line {self.tokens[self.at - 1][2]}: {found.name}, a constant without a value")
             if self.precise and self._inside and not self._precise:
                 self._check_precise(*into[-1])
             if not self._has(","):
@@ -422,6 +397,8 @@ class Parser:
             return self._block()
         if self._has(";"):
             return ("block", [])
+        if self._has(UNROLLED) and self._now != "for":
+            raise Unread(f"line {self.tokens[self.at][2]}: a pragma for a loop before {self._now!r}")
         if self._now in ("for", "if", "return"):
             found: Tree = getattr(self, f"_read_{self._take()}")()
             return found
@@ -452,7 +429,7 @@ class Parser:
     def _declare(self) -> Tree:
         if self._now == "union":
             return self._union()
-        self._precise = self._fixed = False
+        self._precise = False
         shared, type_ = self._qualified()
         found: list[tuple[Variable, Any]] = []
         self._variables(type_, shared, found)
@@ -460,8 +437,6 @@ class Parser:
             raise Unread(
                 f"line {self.tokens[self.at - 1][2]}: shared memory that is not an array of its kernel"
             )
-        if self._fixed and not type_.pointer and any(value is None and not v.sizes for v, value in found):
-            raise Unread(f"line {self.tokens[self.at - 1][2]}: a constant without a value")
         pairs: list[Tree] = [("declare", variable, value) for variable, value in found]
         return pairs[0] if len(pairs) == 1 else ("declarations", pairs)
 
@@ -475,7 +450,7 @@ class Parser:
 
     def _read_for(self) -> Tree:
         self._take("(")
-        self.scopes.append({LOOP})
+        self.scopes.append(set())
         start = self._branch(begins=True)
         condition = self._expression()
         self._take(";")
@@ -590,5 +565,7 @@ class Parser:
                 self._take("]")
             elif self._has(".") or self._has("->"):
                 found = ("of", found, self._take())
+                if self.doubles and found[2] in "rgba":  # C and its children but Metal
+                    raise Unread(f"line {self.tokens[self.at - 1][2]}: component {found[2]}")
             else:
                 return found

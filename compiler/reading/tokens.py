@@ -1,9 +1,10 @@
-"""The words of a source without its comments and directives, macros replaced: `tokens`."""
+"""The words of a source without its comments and directives, macros replaced: `tokens`; and its types."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from .frame import Macros
@@ -18,25 +19,12 @@ Token = tuple[str, str, int]
 TOKEN = re.compile(
     r"\s+|(?P<number>(?:0[xX][0-9a-fA-F]+[uU]?|(?:\d+\.\d*|\.\d+|\d+(?=[eE]))(?:[eE][+-]?\d{1,3})?[fF]?|(?!0\d)\d+[uU]?)(?![\w.]))"
     r"|(?P<name>[A-Za-z_]\w*)|(?P<text>\"[^\"]*\")"
-    r"|(?P<sign>->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^!<>=?:;,.(){}\[\]@])"
+    r"|(?P<sign>->|\+\+|--|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^]=|::|[-+*/%&|^!<>=?:;,.(){}\[\]@\x01])"
 )
 """Numbers, names, texts and signs."""
 
-OUTSIDE = {
-    "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",
-    "device", "constant", "readonly", "uniform", "in", "out", "__device__", "__global__", "buffer",
-}  # fmt: skip
-"""Qualifiers that change no value: outside of functions frame.py has compared them."""
-
-SCALARS = {
-    "void": "void", "bool": "bool", "float": "float32", "int": "int32", "uint": "uint32", "f32": "float32",
-    "int8_t": "int8", "uint8_t": "uint8", "uchar": "uint8", "int32_t": "int32", "uint32_t": "uint32",
-    "i32": "int32", "u32": "uint32", "sampler2D": "image",
-}  # fmt: skip
-"""Names of types of one number."""
-
-LONGEST_NUMBER = 64
-"""Most characters of a number."""
+MOST_DIGITS = 64
+"""Most characters of a number, so that none takes long to read."""
 
 MOST_TOKENS = 2**20
 """Most tokens of a source: no kernel comes near."""
@@ -48,10 +36,8 @@ def tokens(text: str, macros: Macros | None = None) -> list[Token]:
     result, at, line = [], 0, 1
     while at < len(text):
         m = TOKEN.match(text, at)
-        if not m:
+        if not m or (m["number"] and len(m[0]) > MOST_DIGITS):
             raise Unread(f"line {line}: {text[at : at + 20]!r}")
-        if m.lastgroup == "number" and len(m[0]) > LONGEST_NUMBER:
-            raise Unread(f"line {line}: a number of {len(m[0])} digits")
         if m.lastgroup:
             result.append((m.lastgroup, m[0], line))
         line += m[0].count("\n")
@@ -112,3 +98,54 @@ def rounds(tree: Tree) -> bool:
     if form in ("binary", "call"):
         return given[0] in ("+", "-", "*", "/") or given[0] in [("name", n) for n in ("min", "max", "floor")]
     return form in ("unary", "cast") and rounds(given[1])
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type: of one number, or of `width` of them; a struct by its name.
+
+    A pointer or reference to them has their address `space`, in its language's word; `fixed`: they are const.
+    """
+
+    kind: str
+    width: int = 1
+    pointer: bool = False
+    reference: bool = False
+    space: str = ""
+    fixed: bool = False
+
+
+@dataclass
+class Variable:
+    """A name with its type; `sizes` of an array, expressions; `shared` by a group; `role`: what brings it."""
+
+    name: str
+    type: Type
+    sizes: list[Any] = field(default_factory=list)
+    shared: bool = False
+    role: str = ""
+
+
+@dataclass
+class Function:
+    """A function: what it takes, its statements, and the type that it returns."""
+
+    name: str
+    takes: list[Variable]
+    body: Tree
+    type: Type
+
+
+@dataclass
+class Text:
+    """A parsed text: functions and variables outside them by name, structs' members, sizes of work groups.
+
+    `vectors`: names of members that are all of a struct.
+    """
+
+    functions: dict[str, Function] = field(default_factory=dict)
+    outside: list[tuple[Variable, Any]] = field(default_factory=list)
+    structs: dict[str, list[Variable]] = field(default_factory=dict)
+    group: list[Tree] = field(default_factory=list)
+    bindings: dict[str, int] = field(default_factory=dict)
+    vectors: set[str] = field(default_factory=set)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .lanes import Unread
-from .syntax import SCALARS, Parser, Tree, Type, Variable, constant
+from .syntax import SCALARS, Parser, Tree, constant
+from .tokens import Type, Variable
 
 MADE = {"float32": "vec4", "int32": "ivec4", "uint32": "uvec4"}
 """Functions that make vectors of four, by the kind of number."""
@@ -189,6 +190,9 @@ class WgslParser(Parser):
             if found.kind not in made or found.width != (4 if made is MADE else found.width):
                 raise Unread(f"line {line}: vectors of other numbers")
             return ("name", made[found.kind])
+        number = self.tokens[self.at][0] == "number" and self._now[:2].lower() != "0x"
+        if self._now[-1:] == "U" or (number and self._now[-1] == "F"):
+            raise Unread(f"line {self.tokens[self.at][2]}: {self._now}: suffixes are lower case")
         bracket = self._now == "("
         made_of = super()._primary()
         self._brackets |= {id(made_of)} if bracket else set()

@@ -31,7 +31,7 @@ from ..proof.integer_checker import check_integers
 from .field import Number, P, Span, expression, hashed, leaf, literal, part_of, stacked, wide
 from .lanes import Unread, Wrong
 from .memory import Pointer, Weights
-from .syntax import Type
+from .tokens import Type
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -368,10 +368,10 @@ def pointed(found: Pointer, type_: Type, aligned: bool = False) -> Pointer:
     if aligned and type_.width > 1 and not own:
         raise Wrong(f"a vector of {type_.width} numbers at another place than a multiple of them")
     if isinstance(found.memory, Stored) and size_of(type_.kind) == size_of(kind):
-        return Pointer(found.memory.seen_as(type_.kind), found.offset, type_.width)
+        return Pointer(found.memory.seen_as(type_.kind), found.offset, type_.width, of=type_)
     if kind not in ("", type_.kind):
         raise Unread(f"an address of {kind} as one of {type_.kind}")
-    return Pointer(found.memory, found.offset, type_.width)
+    return Pointer(found.memory, found.offset, type_.width, of=type_)
 
 
 @cache
@@ -407,8 +407,8 @@ def copy(machine: Machine, to: Any, source: Any, count: int) -> None:
         memory = memory.seen_as(own)
     elif kind != own:
         raise Unread(f"a copy of {kind} to {own}")
-    if rest or count % size_of(own):
-        raise Wrong("it copies a part of a number")
+    if to.of.fixed or rest or count % size_of(own):
+        raise Wrong("it copies a part of a number, or to what is const")
     to.memory.store(
         to.offset, count // size_of(own), memory.load(at, count // size_of(own), machine), machine
     )

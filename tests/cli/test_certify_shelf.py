@@ -67,9 +67,11 @@ def test_a_text_of_the_shelf_that_is_changed_is_refused(wamnet, tmp_path):
     wrong = source.replace(b"+ j]", b"+ j + 1]", 1)
     assert wrong != source
     (tmp_path / "kernel/denoise.wgsl").write_bytes(wrong)
-    for file in (CERTIFICATE_NAME, MANIFEST_NAME):
+    digest = hashlib.sha256(wrong + (tmp_path / "weights.bin").read_bytes()).hexdigest()
+    for file, key in ((CERTIFICATE_NAME, "manifest_digest"), (MANIFEST_NAME, "digest")):
         told = json.loads((tmp_path / "kernel" / file).read_text())
         told["files"]["denoise.wgsl"] = hashlib.sha256(wrong).hexdigest()
+        told[key] = digest
         told |= (
             {"file_bytes": {**told["file_bytes"], "denoise.wgsl": len(wrong)}} if "file_bytes" in told else {}
         )

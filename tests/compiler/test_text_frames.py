@@ -1,19 +1,22 @@
 """The language around a kernel's arithmetic: what no source may have is rejected, by class (spec/text.md)."""
 
 import functools
+import json
 
 import pytest
 import text_faults
 from texts import kernel, parts, planned
 
 from wamnet.compiler.core import sine
+from wamnet.compiler.proof import checker
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading import frame
-from wamnet.compiler.reading.check import check_text, run_text
+from wamnet.compiler.reading.check import check_facts, check_text, run_text
 from wamnet.compiler.reading.frames import FRAMES
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.languages import LANGUAGES
 from wamnet.compiler.reading.limits import limited
+from wamnet.refimpl.errors import InputError
 
 CASES = [(what, target, old, new) for what, targets, old, new in text_faults.CLASSES for target in targets]
 """Every class of faults, in every language that it is one of."""
@@ -56,6 +59,7 @@ def test_faults_of_the_language_of_schedules_are_rejected(what, of, old, new, tm
         ("output", "name", "normal"),
         ("schedule", "rows", 2),
         ("schedule", "pixels", 1.5),
+        ("schedule", "name", "group"),
         ("images", "channels", 4),
         ("images", "name", "albedo"),
         ("images", "high", 2.0),
@@ -71,6 +75,49 @@ def test_a_manifest_of_other_images_or_work_items_is_rejected(plain, of, key, va
         turned = [first, *manifest["images"][1:]]
     with pytest.raises(Refused, match="its manifest"):
         run_text(source, held, {**manifest, of: turned if of == "images" else first}, weights)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "match"),
+    [
+        ("digest", "0" * 64, "digest of the kernel"),
+        ("files", {"weights.bin": "0" * 64}, "digests"),
+        ("certificate", None, "certificate"),
+        ("output", {"name": "color", "channels": 2, "encoding": ""}, "channels"),
+        ("output", {"name": "color", "channels": 3, "encoding": None}, "strings"),
+        ("profile", {"name": "ieee-sine7", "text": ""}, "degree"),
+        ("profile", {"name": "ieee", "text": "", "order": 1}, "unknown keys of profile"),
+        ("stride", 4, "unknown keys"),
+        ("language", [], "strings"),
+        ("private_bytes", "x", "count"),
+        ("bound", {"output": [0.0], "against": "float32"}, "against"),
+        ("sine_arguments", [], "sine_arguments"),
+        ("sine_arguments", [[-1e300, 0.0], [0.0, 1.0]], "ranges"),
+        ("file_bytes", {"weights.bin": 1.0}, "file_bytes"),
+        ("weights", {"layout": [], "order": "", "count": 1}, "layout"),
+        ("weights", {"order": "", "layout": [{"name": "W0", "offset": 0, "shape": [9]}], "count": 8}, "in"),
+    ],
+)
+def test_a_manifest_of_other_facts_is_rejected(plain, key, value, match):
+    """TXT-8: what a host acts on is the certificate's."""
+    source, held, manifest, weights = plain("opencl")
+    data = source.encode() + weights.tobytes()
+    check_facts(manifest, held, data)
+    with pytest.raises(Refused, match=match):
+        check_facts({**manifest, key: value}, held, data)
+
+
+def test_a_manifest_of_another_form_is_rejected(tmp_path):
+    """The mirror of the facts: none may be nothing, a number, a string or a list of nothing."""
+    path = kernel(tmp_path, "opencl")
+    manifest = json.loads((path.parent / "manifest.json").read_text())
+    for key in manifest.keys() - {"info", "passes"}:
+        for value in (None, -1e300, "x", [], [None]):
+            if (key, value) == ("arguments", "x"):  # words for readers
+                continue
+            (path.parent / "manifest.json").write_text(json.dumps({**manifest, key: value}))
+            with pytest.raises((Refused, InputError, Unread), match=r"\S"):
+                checker.check(path) and check_text(path)
 
 
 @pytest.mark.parametrize("target", sorted(LANGUAGES))

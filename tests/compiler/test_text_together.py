@@ -52,7 +52,6 @@ LOOP = "for (int i = 0; i < 4; ++i) {{ {} }}"
         ("y[i] = f(x[i]);", False),
         ("b = x[i]; y[i] = b;", False),
         ("float a = x[i];  { y[i] = a; }", False),
-        ("float y = x[i]; y[i] = 1.0f;", False),
     ],
 )
 def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, read):

@@ -20,7 +20,7 @@ BUDGET = {
     "compiler/importing": 1560,
     "compiler/languages": 2725,
     "compiler/proof": 3190,
-    "compiler/reading": 5200,
+    "compiler/reading": 5330,
     "compiler/schedules": 4650,
     "compiler/scenes": 3150,
     "compiler/training": 1200,

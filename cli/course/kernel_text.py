@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...compiler.reading.lanes import Unread
-from ...compiler.reading.syntax import Function, Parser, Text, Type
+from ...compiler.reading.syntax import Parser
+from ...compiler.reading.tokens import Function, Text, Type
 
 
 class TextError(Exception):

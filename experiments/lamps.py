@@ -14,7 +14,7 @@
 
     python experiments/lamps.py
 
-It needs PyTorch, `pip install torch`. A renderer that keeps lamps apart would give T_k for one
+It needs PyTorch, `pip install torch`. A renderer that keeps lights apart would give T_k for one
 sum more, and none does here yet: this measures whether that would pay.
 """
 

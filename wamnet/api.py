@@ -2,7 +2,7 @@
 
 Images are arrays (height, width, channels) of floats, row 0 at the top. Colour is linear radiance in Rec. 709
 primaries unless it is said to be display-encoded: then it is sRGB in [0, 1]. All errors that a caller can
-cause are a [`WamnetError`]; its subclass InputError is a ValueError, and its message names the value and the
+cause are a `WamnetError`; its subclass InputError is a ValueError, and its message names the value and the
 remedy.
 """
 
@@ -44,7 +44,7 @@ def load(
     """Load a model: a bundled one by name, a file, or a network in ONNX's form.
 
     `model` is one of the names of `wamnet.models.names()`, the path of a `.safetensors` file that
-    `wamnet train` or [`train`] made, or of an `.onnx` file, whose inputs then have these `ranges`
+    `wamnet train` or `train` made, or of an `.onnx` file, whose inputs then have these `ranges`
     ([0, 1] by default; the key "" stands for all others) and this `border` ("zero", "clamp", or the
     network's own margins). A model is returned as it is.
 
@@ -94,7 +94,7 @@ def render(
     own unit. `seen` adds the layers of what is seen through mirrors and glass. `max_depth` is the largest
     number of bounces. The same arguments give the same frame, on every executor up to rounding.
 
-    Returns a [`Frame`] of float32 layers (height, width, channels): `frame["color"]`, linear radiance;
+    Returns a `Frame` of float32 layers (height, width, channels): `frame["color"]`, linear radiance;
     `"albedo"` in [0, 1]; `"normal"`, unit length; `"position"` and `"depth"` in scene units, and others.
 
     Raises InputError for an unknown scene or parameter, ExecutorUnavailable for a missing device.
@@ -124,7 +124,7 @@ def train(
 ) -> Model:
     """Train a denoiser on noisy frames and their references, and return the model.
 
-    `noisy` and `clean` are a frame each, or as many of both; a frame is a [`Frame`] or a mapping from layers
+    `noisy` and `clean` are a frame each, or as many of both; a frame is a `Frame` or a mapping from layers
     to arrays (H, W, C). Noisy frames have the layers of `features` (those of the `preset` by default), clean
     ones `"color"`. `steps` replaces the preset's number of steps. `on_progress` is called with the number of
     steps and the loss. Presets are short, best, mirrors, sky and paper.
@@ -224,7 +224,7 @@ def compile(  # noqa: A001 - what it does
 def certify(kernel: Kernel | Paths) -> Certificate:
     """Check the proof of a kernel's error bound, and that its source computes the proven program.
 
-    `kernel` is a [`Kernel`] of profile "ieee", or the folder that it was saved to. The checker shares no code
+    `kernel` is a `Kernel` of profile "ieee", or the folder that it was saved to. The checker shares no code
     with the compiler. It assumes that compiler and device keep to the language's standard and to IEEE 754's
     float32, rounded to nearest.
 

@@ -128,7 +128,7 @@ class Function:
         return ir.text(self.program)
 
     def compile(self, target: str, *, profile: str = "ieee", schedule: str = PLAIN) -> Kernel:
-        """Compile to a kernel; `target`, `profile` and `schedule` are those of [`wamnet.compile`]."""
+        """Compile to a kernel; `target`, `profile` and `schedule` are those of `wamnet.compile`."""
         from .compiler.compile import compile_program
 
         return Kernel(compile_program(self.program, target_of(target), profile, schedule))

@@ -223,8 +223,8 @@ def _request(
         options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
     factors = None if power is None else options.parse_limits("--power", power)
-    found = Request(source.name, source.parameters, *numbers, *ranges)
-    return replace(found, seen=seen, power=factors, before=before, still=source.still)
+    request = Request(source.name, source.parameters, *numbers, *ranges)
+    return replace(request, seen=seen, power=factors, before=before, still=source.still)
 
 
 def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:

@@ -66,13 +66,13 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
 
 
 def learned_scene(model: Model) -> str:
-    """Return the canonical scene that a model has learned, minicubes if it names none; refuse others."""
+    """Return the canonical scene that a model was trained on, minicubes if it names none; reject others."""
     names = model.info.get("trained_on_scene", "")
-    found = trained_scene(model) if names else "minicubes"
-    if found is None:
+    name = trained_scene(model) if names else "minicubes"
+    if name is None:
         rule = "it must be one canonical scene, or one must be chosen"
-        raise InputError("scene that the model has learned", names, rule, "name one with --scene, or a file")
-    return found
+        raise InputError("scene that the model was trained on", names, rule, "name one with --scene")
+    return name
 
 
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:

@@ -107,8 +107,8 @@ def read(path: Path) -> Graph:
     try:
         import onnx
     except ImportError as error:
-        told = f"package {error.name} cannot be imported: pip install 'wamnet[full]'"
-        raise ExecutorUnavailable(told) from None
+        missing = f"package {error.name} cannot be imported: pip install 'wamnet[full]'"
+        raise ExecutorUnavailable(missing) from None
     way_out = "export the network again, all of it in one file"
     try:
         model = onnx.load_model_from_string(content)

@@ -19,9 +19,9 @@ BYTES = 2**30
 
 
 def limited(check: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
-    """Return what a function returns for each of some arguments, each in a process of its own, all at once.
+    """Return the results of parallel calls of a check, each in a separate process.
 
-    Raises `Unread` if one takes too much. Where there is no fork, as on Windows, there are no limits either.
+    Raises `Unread` if one exceeds its limits. Where there is no fork, as on Windows, there are none.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
         return [check(*arguments) for arguments in calls]

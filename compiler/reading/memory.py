@@ -53,13 +53,13 @@ class Pointer:
         return Pointer(self.memory, offset, self.width, self.sizes[1:], self.of)
 
     def moved(self, index: Any, machine: Machine) -> Pointer:
-        """Return the place of an element, or of the end, as a pointer; `Wrong` outside of the array."""
+        """Return the place of an element, or of the end, as a pointer; `Wrong` outside the array."""
         offset = plus(self.offset, times(index, self.width))
         own = self.sizes[0]
         at, end = (offset, getattr(self.memory, "size", None)) if own is None else (index, own)
         beyond = (at.values < 0)[machine.running].any() if isinstance(at, Place) else at < 0
         if beyond or (isinstance(at, int) and isinstance(end, int) and at > end):
-            raise Wrong("an address outside of its array")
+            raise Wrong("an address outside its array")
         return Pointer(self.memory, offset, self.width, of=self.of)
 
     def declared(self, type_: Type) -> Pointer:

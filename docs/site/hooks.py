@@ -80,7 +80,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Results": ["results.md", "speed.md", "listing.md"]},
         {"Spec": parts},
         {"API": ["reference.md"]},
-        "limits.md",
+        {"Limits": ["limits.md"]},
         "recipes.md",
     ]
     return config

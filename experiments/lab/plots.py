@@ -45,7 +45,7 @@ def digest(plot: Plot, records: Records) -> str:
     made = hashlib.sha256()
     for path in (records.folder / f"{name}.json" for name in plot.records):
         made.update(path.read_bytes())
-    for path in (Path(__file__), Path(__file__).with_name("shown.py")):
+    for path in (Path(__file__), *map(Path(__file__).with_name, ("shown.py", "speeds.py"))):
         made.update(path.read_bytes())
     return made.hexdigest()
 

@@ -42,8 +42,8 @@ def speed_readme(record: str) -> TableOf:
 SPEED_SHORT = {
     ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
     ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
-    ("whole", "opencl fft32"): "wamnet, first layer by FFT (`fft32`)",
-    ("whole", "c fft32"): "wamnet, the same in C, by GCC",
+    ("whole", "opencl fft32"): "wamnet, FFT (`fft32`)",
+    ("whole", "c fft32"): "wamnet, FFT (`fft32`) in C, by GCC",
     ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
     ("exact", "opencl tile16"): "wamnet, bit-identical everywhere (profile `exact`)",
     ("whole", "opencl plain"): "wamnet, the human-readable kernel (`plain`)",

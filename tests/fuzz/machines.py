@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -29,6 +30,9 @@ STRANGER = 54321
 
 LIMIT_S = 0.5
 """Seconds that a renderer may take."""
+
+GRACE_S = 5.0
+"""Seconds within which a killed process has gone: on a busy machine it is listed for a moment more."""
 
 COMMANDS = (
     "denoise {good}/model.safetensors {good}/frame.exr --anyway -o out.exr --executor {executor}",
@@ -166,7 +170,9 @@ def _renderer(content: bytes, folder: Path) -> None:
     assert isinstance(found, Missing) or len(found) == 2, lines
     assert not list(own.iterdir()), f"a folder is left by {lines}"
     for group in map(int, (folder / "group").read_text().split()):
-        left = members(group)
+        end = time.monotonic() + GRACE_S
+        while (left := members(group)) and time.monotonic() < end:
+            time.sleep(0.02)
         for pid in left:
             os.kill(pid, signal.SIGKILL)
         assert not left, f"a process is left by {lines}"

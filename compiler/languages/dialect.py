@@ -17,13 +17,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ir import LEAST, Node
 from ..core.profiles import SineContract
+if TYPE_CHECKING:
+    from ..kernel.kernel import Kernel, Type
+
 from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
 
 LONG_TABLE, TABLE_ROW = 200, 8
@@ -41,6 +44,7 @@ class Parts:
     top: str = ""
     bounded: bool = False
     max_depth: int = 0
+    kernel: Kernel | None = None
 
 
 class Dialect:
@@ -104,6 +108,12 @@ class Dialect:
     load: str = "float {name} = sums[{plane} * plane + at];"
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     painted: str = ""
+    unroll: str = ""
+    widens: bool = True
+    calls_vectors: bool = False
+    vector_operations: Mapping[str, str] = {}
+    weight_vector: str = "w[{index}]"
+    wait: str = ""
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -223,6 +233,41 @@ class Dialect:
     def single(self, name: str, value: str) -> str:
         """Return the declaration of one number, also in a language whose values are vectors."""
         return f"float {name} = {value};"
+
+    # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type."""
+        return f"{self.scalars[dtype]}{lanes}"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of values, or of one in all lanes."""
+        return f"{kind}({', '.join(values)})"
+
+    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
+        """Return the first lines of a function of values."""
+        return f"{result} {name}({', '.join(f'{kind} {each}' for each, kind in takes)})\n{{"
+
+    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
+        """Return the declaration of an array of vectors whose components are read by their own index."""
+        return f"{kind} {name}[{count}];"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of such an array, or a vector."""
+        return f"{name}[({index}) / 4][({index}) % 4]" if number else f"{name}[{index}]"
+
+    def let_value(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value that never changes."""
+        return f"{kind} {name} = {value};"
+
+    def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
+        """Return the declaration of an array, or of a variable."""
+        return f"{kind} {name}{''.join(f'[{size}]' for size in sizes)}{f' = {value}' if value else ''};"
+
+    def for_loop(self, name: str, start: str, end: str, step: str) -> str:
+        """Return the line that opens a loop."""
+        turn = f"++{name}" if step == "1" else f"{name} += {step}"
+        return f"for (int {name} = {start}; {name} < {end}; {turn}) {{"
 
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""

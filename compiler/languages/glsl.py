@@ -91,7 +91,7 @@ class GLSL(Dialect):
         ENCODE: ("sample_count",),
     }
     preamble = PREAMBLE
-    pixel = "texelFetch(image_{image}, ivec2(column, row), 0)[c]"
+    pixel = "texelFetch(image_{image}, ivec2({column}, {row}), 0)[{c}]"
     weight = "weights({index})"
     store = "{result}[{i}] = {value};"
     said = {

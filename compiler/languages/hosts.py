@@ -101,7 +101,7 @@ class GodotDenoise(GLSL):
     max_output_channels = 4
     first = ("shader_type canvas_item;", "render_mode unshaded, blend_disabled;")
     indexes_results = False
-    pixel = "channel_of(texelFetch(image_{image}, ivec2(column, row), 0), c)"
+    pixel = "channel_of(texelFetch(image_{image}, ivec2({column}, {row}), 0), {c})"
     said = {
         DENOISE: (
             "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"

@@ -9,9 +9,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.profiles import OPENCL_SINE
+from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
 from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
+
+
+BUILTINS = """\
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif"""
+"""Operations on vectors that no operator means. PoCL's library may be compiled for another processor than the
+kernel: LLVM then inlines none of its functions, and each call saves all vector registers. clang has names for
+the instructions; other compilers get the functions."""
 
 
 class OpenCL(Arguments):
@@ -29,9 +50,9 @@ class OpenCL(Arguments):
     reads = "__global const float *restrict {name}"
     writes = "__global float *restrict {name}"
     item = ("get_global_id(0)", "get_global_id(1)")
-    pixel = "image_{image}[(row * width + column) * {channels} + c]"
+    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
-    store = "result[(y * width + x) * {channels} + {i}] = {value};"
+    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
     image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
     painted = "image_{image}[place * {channels} + {channel}]"
     said = {
@@ -67,6 +88,38 @@ class OpenCL(Arguments):
         "convert": "convert_{type}({0})",
     }
 
+    unroll = "#pragma unroll"
+    wait = "barrier(CLK_LOCAL_MEM_FENCE);"
+    vector_operations = {
+        "absolute": "as_{type}(as_int{lanes}({0}) & 0x7fffffff)",
+        "minimum": "{1} < {0} ? {1} : {0}",
+        "maximum": "{1} > {0} ? {1} : {0}",
+        "floor": "FLOOR({0})",
+        "convert": "CONVERT({0}, {type})",
+    }
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type; truth is an integer with all bits set."""
+        return f"{'int' if dtype == 'bool' else self.scalars[dtype]}{lanes}"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of values, or of one in all lanes."""
+        return f"({kind})({', '.join(values)})"
+
+    def weights_as_vectors(self, kind: Type) -> list[str]:
+        """Return the declaration of the weights as vectors."""
+        vector = f"{self.scalars[kind.dtype]}{kind.lanes}"
+        line = f"    __global const {vector} *w = (__global const {vector} *)weights;"
+        return [line] if kind.lanes > 1 else []
+
+    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
+        """Return the declaration of an array of vectors whose components are read by their own index."""
+        return f"union {{ {kind} all[{count}]; float number[{count} * {lanes}]; }} {name};"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of such an array, or a vector."""
+        return f"{name}.{'number' if number else 'all'}[{index}]"
+
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""
         if array.home == BLOCK:
@@ -76,6 +129,8 @@ class OpenCL(Arguments):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
+        if parts.kernel is not None and parts.kernel.weights.lanes > 1:
+            return [*super().top(kernel, parts), BUILTINS]
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
         return [*lanes, *super().top(kernel, parts)]
 

@@ -6,6 +6,8 @@ a compiler reorder operations and round results up or down; a bound rests on one
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..core.profiles import SineContract
 from .dialect import Dialect, Parts
 from .glsl_buffers import GROUP, SAID, Declared
@@ -95,6 +97,21 @@ class WGSL(Declared):
     def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
         """Return the declaration of an array."""
         return f"var {name}: array<{self.types[dtype]}, {count}>;"
+
+    def let_value(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value that never changes."""
+        return f"let {name}: {kind} = {value};"
+
+    def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
+        """Return the declaration of an array, or of a variable."""
+        for size in reversed(sizes):
+            kind = f"array<{kind}, {size}>"
+        return f"var {name}: {kind}{f' = {value}' if value else ''};"
+
+    def for_loop(self, name: str, start: str, end: str, step: str) -> str:
+        """Return the line that opens a loop."""
+        turn = f"{name}++" if step == "1" else f"{name} += {step}"
+        return f"for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
 
     def single(self, name: str, value: str) -> str:
         """Return the declaration of one number."""

@@ -12,7 +12,6 @@ The layout of the weights belongs to the schedule: kernels walk through them in 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -26,12 +25,17 @@ from ..core import ir, weights
 from ..core.ir import Gather, Program
 from ..core.profiles import SineContract
 from ..core.weights import Slot
+from ..kernel.kernel import Kernel
+from ..kernel.sizes import integer, item_bytes
+from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
 from ..languages.interface import PLAIN as PLAIN
+from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..proof.spectra import Spectra
-from .emit import emit, kernel_gather, private_bytes
+from .common import kernel_gather, output_channels
+from .plain import plain
 
 Images = Mapping[str, NDArray[np.float32]]
 
@@ -48,20 +52,17 @@ def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.flo
     return found
 
 
-class Schedule(ABC):
-    """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
+class Schedule:
+    """One way to order a kernel's work; `idea` is the sentence that sets it apart from the one before.
 
-    `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix is stored among the weights; `language` and `suffix` are set where they are its own;
-    `instead` names the schedule of programs that it refuses. `bytewise`: its array of weights holds bytes.
+    `instead` names the schedule of programs that it refuses; `order` says how a matrix is stored among the
+    weights. `bytewise`: its array of weights holds bytes. A schedule of kernels builds them as data, and prints
+    them in its language [`kernel`].
     """
 
     name: str
     idea: str
-    arguments: str
-    pixels: int = 1
-    language: str = ""
-    suffix: str = ""
+    dialect: Dialect
     instead: str = PLAIN
     bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
@@ -70,9 +71,30 @@ class Schedule(ABC):
         """Return why this schedule cannot hold the program, or nothing."""
         return ""
 
+    def kernel(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        raise NotImplementedError
+
+    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
+        """Return the kernel's source; `header` are the lines of the comment at its top.
+
+        `bounded`: an error bound is stated, and the language must keep the order of operations.
+        """
+        _check_channels(program, self.dialect)
+        return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program)).source(header)
+
     def extent(self, program: Program) -> tuple[int, int]:
         """Return the columns and rows of pixels that a work item computes."""
-        return self.pixels, 1
+        kernel = self.kernel(program)
+        across, down = (integer(kernel, each) for each in kernel.step)
+        return across, down
+
+    def arguments(self, program: Program) -> str:
+        """Return how the kernel is called."""
+        kernel, channels = self.kernel(program), output_channels(program)
+        columns, rows = self.extent(program)
+        stack = stack_bytes(item_bytes(kernel))
+        return self.dialect.called(kernel).format(columns=columns, rows=rows, channels=channels, stack=stack)
 
     def enclosures(
         self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
@@ -85,17 +107,9 @@ class Schedule(ABC):
         box = bounds.window_box(gather) if images is None else (windows(gather, images, rows),) * 2
         return bounds.enclose(program, {"window": box}, sine)
 
-    @abstractmethod
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the kernel's source; see emit.py."""
-
-    @abstractmethod
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the arrays that a work item declares."""
-
-    def called(self) -> Mapping[str, str]:
-        """Return the further numbers of the text about its arguments, by name."""
-        return {}
+        return item_bytes(self.kernel(program))
 
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return what else a caller must know, for the manifest."""
@@ -118,23 +132,31 @@ class Schedule(ABC):
         return None
 
 
+def _check_channels(program: Program, dialect: Dialect) -> None:
+    """Refuse an output that the language cannot write at once."""
+    kind = program.nodes[program.outputs[0][1]].type
+    if kind.dtype != "float32":
+        raise CompileError(f"the output has type {kind}: a kernel writes float32; convert it with astype")
+    channels = output_channels(program)
+    if channels > dialect.max_output_channels:
+        raise CompileError(
+            f"the output has {channels} channels: {dialect.language} writes at most "
+            f"{dialect.max_output_channels}; compile for another target"
+        )
+
+
 class Plain(Schedule):
-    """One pixel a work item, loops over taps and neurons [emit.py]."""
+    """One pixel a work item, loops over taps and neurons [plain.py]."""
 
     name = PLAIN
     idea = "one pixel after another, loops over taps and neurons"
 
     def __init__(self, dialect: Dialect) -> None:
         self.dialect = dialect
-        self.arguments = dialect.arguments
 
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the kernel's source."""
-        return emit(program, self.dialect, header, bounded)
-
-    def private_bytes(self, program: Program) -> int:
-        """Return the bytes of a pixel's arrays."""
-        return private_bytes(program)
+    def kernel(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return plain(program)
 
 
 class Printed(Schedule):
@@ -142,15 +164,18 @@ class Printed(Schedule):
 
     name = PLAIN
     idea = "one operation after another, all pixels at once"
-    arguments = "the program's inputs and parameters, by name"
+
+    def arguments(self, program: Program) -> str:
+        """Return how it is called."""
+        return "the program's inputs and parameters, by name"
 
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
         """Return the text, under the header as comments."""
         return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
 
-    def private_bytes(self, program: Program) -> int:
-        """Return what a kernel for one pixel would take."""
-        return private_bytes(program)
+    def kernel(self, program: Program) -> Kernel:
+        """Return the kernel that a language would have."""
+        return plain(program)
 
 
 @dataclass(frozen=True)

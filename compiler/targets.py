@@ -115,10 +115,10 @@ def groups(dialect: Dialect, name: str = "group") -> tuple[Schedule, ...]:
     """Return the schedules for graphics processors; none of them has been measured on one."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
     four = "the same with 4 pixels an item, which share each weight"
-    found: list[Schedule] = [Grouped(name, one, dialect, 1), Grouped(f"{name}4", four, dialect, 4, name)]
+    found: list[Schedule] = [Grouped(name, one, dialect, 1), Grouped(f"{name}4", four, dialect, 4, instead=name)]
     if dialect.words:
         idea = f"group4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
-        found.append(GroupDot("groupdot", idea, dialect, 4, "group4"))
+        found.append(GroupDot("groupdot", idea, dialect, 4, instead="group4"))
     return tuple(found)
 
 

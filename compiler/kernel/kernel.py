@@ -62,6 +62,9 @@ class Expr:
     def __sub__(self, other: Expr | int) -> Expr:
         return apply("subtract", self, other)
 
+    def __rsub__(self, other: int) -> Expr:
+        return apply("subtract", other, self)
+
     def __mul__(self, other: Expr | int) -> Expr:
         return apply("multiply", self, other)
 
@@ -112,7 +115,10 @@ class Let:
 
 @dataclass(frozen=True)
 class Array:
-    """Memory of an item, or of its group; without `sizes` it is one variable, with its first value."""
+    """Memory of an item, or of its group; without `sizes` it is one variable, with its first value.
+
+    `register`: all of its indices are known once its loops are unrolled, so that compilers keep it in registers.
+    """
 
     name: str
     type: Type
@@ -120,6 +126,7 @@ class Array:
     space: Literal["item", "group"] = "item"
     kept: bool = False
     value: Expr | None = None
+    register: bool = False
 
 
 @dataclass(frozen=True)

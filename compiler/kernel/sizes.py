@@ -28,8 +28,10 @@ def bytes_of(kernel: Kernel, array: Array) -> int:
 
 
 def item_bytes(kernel: Kernel) -> int:
-    """Return the bytes of an item's arrays, those of blocks side by side too: compilers may keep all of them."""
-    return sum(bytes_of(kernel, s) for s in walk(kernel.body) if isinstance(s, Array) and s.space == "item")
+    """Return the bytes of an item's arrays in memory; those in registers, and single values, do not count."""
+    arrays = [s for s in walk(kernel.body) if isinstance(s, Array) and s.space == "item"]
+    held = [s for s in arrays if not s.register and (s.sizes or s.type.lanes > 1)]
+    return sum(bytes_of(kernel, s) for s in held)
 
 
 def shared_bytes(kernel: Kernel) -> int:

@@ -371,8 +371,7 @@ class C(Arguments):
         sizes, functions = parts.top.split("\nstatic void", 1) if kernel.functions else (parts.top, "")
         functions = f"static void{functions}" if functions else ""
         if kernel.weights.dtype == "int32":
-            head = [*includes(DENOISE, *names, "string"), sizes, STRAIGHT, C_TILE]
-            top = [*head]
+            top = [*includes(DENOISE, *names, "string"), FUSED, sizes, STRAIGHT, C_TILE]
         elif kernel.weights.lanes == 1:
             top = [*head, UNFUSED, parts.top]
         elif kernel.functions:

@@ -132,7 +132,7 @@ HEAD = re.compile(r"(?!typedef|struct|layout)[^{}]*\)( -> [\w<> ]+)? {$")
 def allowed(target: str) -> list[tuple[re.Pattern[str], bool]]:
     """Return patterns of the items of a target's list, and whether there may be several of each."""
     images = IMAGES.get(target, "IMAGE")
-    vector = {"opencl": "vector", "cuda": "wamnet_vector", "metal": "float4"}.get(target, "vec4")
+    vector = {"opencl": "float4", "cuda": "wamnet_vector", "metal": "float4"}.get(target, "vec4")
     patterns = []
     for item in items(cleaned(FRAMES[target]), target == "wgsl"):
         words = [

@@ -151,29 +151,6 @@ static inline int wamnet_clamp(int value, int low, int high) { }
 #undef WINDOW_SIZE
 #undef restrict
 
-== opencl-types ==
-typedef float4 vector;
-typedef int4 mask;
-#ifndef CONVERT
-#define vector float4
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-typedef float8 vector;
-typedef int8 mask;
-#ifndef CONVERT
-#define vector float8
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-typedef float16 vector;
-typedef int16 mask;
-#ifndef CONVERT
-#define vector float16
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-
 == opencl-kernel ==
 void wamnet_denoise(
     IMAGES, __global const float *restrict weights, __global float *restrict result,
@@ -181,23 +158,20 @@ void wamnet_denoise(
 
 == opencl ==
 #pragma OPENCL FP_CONTRACT OFF
-%window%%pixels%%tiles%%group%%opencl-types%
-#define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
-#define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
-#define LEAST(kind, a, b) ((kind)(b) < (kind)(a) ? (kind)(b) : (kind)(a))
-#define MOST(kind, a, b) ((kind)(b) > (kind)(a) ? (kind)(b) : (kind)(a))
+%window%%pixels%%tiles%%group%
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
 #endif
 #endif
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
 #endif
-#ifdef __has_builtin
-#if __has_builtin(__builtin_convertvector)
-#define CONVERT(a, kind) __builtin_convertvector(a, kind)
-#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
 #endif
 typedef int16 sums;
 typedef struct __attribute__((packed)) { uchar4 bytes; } fours;
@@ -212,19 +186,23 @@ typedef struct __attribute__((packed)) { uchar4 bytes; } fours;
     ((sum) + PRODUCT(weight, (four).s0, 24) + PRODUCT(weight, (four).s1, 16) \
         + PRODUCT(weight, (four).s2, 8) + PRODUCT(weight, (four).s3, 0))
 #endif
-void forward(const vector *from, int step, vector *to, int leap) {
+void forward(const float4 *from, int step, float4 *to, int leap) {
 #pragma unroll
 }
-void backward(const vector *from, int step, vector *to, int leap) { }
-vector ELEMENTWISE(VECTORS) { }
+void backward(const float4 *from, int step, float4 *to, int leap) { }
+void forward(const float8 *from, int step, float8 *to, int leap) { }
+void backward(const float8 *from, int step, float8 *to, int leap) { }
+void forward(const float16 *from, int step, float16 *to, int leap) { }
+void backward(const float16 *from, int step, float16 *to, int leap) { }
+float4 ELEMENTWISE(VECTORS) { }
 int wamnet_packed(float a, float b, float c, float d) { }
 int4 wamnet_dots(int4 sums, int4 weights, int word) {
 #ifdef __opencl_c_integer_dot_product_input_4x8bit_packed
 #else
 #endif
 }
-vector wamnet_floats(int4 sums) { }
-vector wamnet_numbers(int4 bits) { }
+float4 wamnet_floats(int4 sums) { }
+float4 wamnet_numbers(int4 bits) { }
 __kernel %opencl-kernel%
 __kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1))) %opencl-kernel%
 

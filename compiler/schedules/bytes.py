@@ -284,7 +284,7 @@ class GroupBytes(Group):
         source, first = node.args[0], self.offset(node["weight"]) // 4
         zero = splat(const(0), FOUR)
         found: list[Statement] = [self.mapped(index, node)]
-        found += [Array(f"s{index}_{p}_{j}", self.weights, value=zero) for p, j in self.places(index)]
+        found += [Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True) for p, j in self.places(index)]
         if self.program.nodes[source].op == "input":
             found += self.of_window(index, first)
         else:

@@ -257,17 +257,17 @@ class Spectral(Tiled):
                     value = apply("subtract", value, const(centre))
                 lane, at = TILE * PAIRS + pair, name("dx") * 2 + part
                 place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
-                lines.append(Store("patch", (place,), value))
+                lines.append(Store("gathered", (place,), value))
             first += image.channels
         start, count = I * POINTS * 2, INPUTS * POINTS * 2
         to = View("rows", ((I * POINTS + name("dy")) * STRIDE,), const(1))
-        call = self.transform("forward", View("patch", (start,), const(1)), to)
+        call = self.transform("forward", View("gathered", (start,), const(1)), to)
         gather = loop("tile", TILES, loop("dx", POINTS, *lines))
         return [
             Comment("rows of the images around the tiles, transformed"),
-            Array("patch", self.vector, (count,)),
+            Array("gathered", self.vector, (count,)),
             Array("rows", self.vector, (INPUTS * POINTS * STRIDE,)),
-            loop("i", count, Store("patch", (I,), self.zero)),
+            loop("i", count, Store("gathered", (I,), self.zero)),
             loop(
                 "dy",
                 POINTS,
@@ -373,7 +373,7 @@ class Spectral(Tiled):
 
     def zeros(self, names: tuple[str, ...]) -> list[Statement]:
         """Return the sums of all tiles, which start with zeros."""
-        arrays = [Array(part, self.vector, (TILES, 2)) for part in names]
+        arrays = [Array(part, self.vector, (TILES, 2), register=True) for part in names]
         return [*arrays, self.each_tile([Store(part, (T, const(v)), self.zero) for part in names for v in range(2)])]
 
     def each_tile(self, lines: list[Statement]) -> For:

@@ -248,10 +248,11 @@ class Grouped(Stored):
         "channel by channel"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, pixels: int, instead: str = PLAIN) -> None:
+    def __init__(self, name: str, idea: str, dialect: Dialect, pixels: int, size: tuple[int, int] | None = None, instead: str = PLAIN) -> None:
         self.name, self.idea, self.dialect, self.instead = name, idea, dialect, instead
-        assert dialect.group is not None, f"{dialect.language} has no work groups"
-        self.pixels, self.group = pixels, dialect.group
+        size = size or dialect.group
+        assert size is not None, f"{dialect.language} has no work groups"
+        self.pixels, self.group = pixels, size
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""

@@ -312,7 +312,7 @@ class Tiled(Nest):
         block = BLOCK if blocks.count > 1 else const(0)
         at, n_in = block * blocks.vectors, source.type.shape[0]
         first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
-        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors))]
+        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors), register=True)]
         starts = [Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
         if source.op == "input":
             products = self.windowed(blocks, first)
@@ -363,7 +363,7 @@ class Tiled(Nest):
                 zero = self.each_pixel(*(Store("part", (P, const(j)), self.zero) for j in each))
                 part = [load("part", P, const(j), kind=self.vector) for j in each]
                 add = self.each_pixel(*(Store("sum", (P, const(j)), part[j], add=True) for j in each))
-                lines = [Array("part", self.vector, (PIXELS, blocks.vectors)), zero, *lines, add]
+                lines = [Array("part", self.vector, (PIXELS, blocks.vectors), register=True), zero, *lines, add]
             found.append(loop("dy", self.rows, *lines))
             rows += self.gather.rows * inputs
         return found

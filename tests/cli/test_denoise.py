@@ -192,7 +192,7 @@ def test_a_schedule_by_name(wamnet, refused, here) -> None:
 
 def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> None:
     """The plain kernel is written, and the reason is said."""
-    monkeypatch.setattr("wamnet.compiler.schedules.emit_tiled.LARGEST_PRIVATE", 100)
+    monkeypatch.setattr("wamnet.compiler.schedules.schedules.LARGEST_PRIVATE", 100)
     outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile8")
     assert outcome.status == 0
     assert "schedule plain, not tile8: its arrays take" in outcome.out

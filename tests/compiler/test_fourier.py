@@ -17,10 +17,12 @@ from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds, spectra
-from wamnet.compiler.schedules import emit_fourier, fourier
-from wamnet.compiler.schedules.c_fourier import CFourier
-from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, OpenCLFourier
+from wamnet.compiler.kernel.kernel import FLOAT, Let, parts
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.schedules import fft, fourier, schedules
+from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -28,7 +30,7 @@ from wamnet.refimpl.network.denoise import denoise_pixel
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
-FFT32 = OPENCL_FOURIER[0]
+FFT32 = schedule_named("opencl", "fft32")
 CONTRACT = sine_contract("ieee", "opencl")
 
 
@@ -359,9 +361,9 @@ def test_golden_spectra(golden) -> None:
     first, last = network.weights
     function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
-    idea = emit_fourier.IDEA.format(points=4)
-    for dialect in (OpenCLFourier(4), CFourier(4)):
-        tiny = emit_fourier.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
+    idea = "small tiles"
+    for dialect in (OpenCL(), C()):
+        tiny = schedules.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
         golden(f"fft4.denoise{dialect.suffix}", tiny.emit(analysed(traced), ["a tiny kernel"], True))
 
 
@@ -389,9 +391,10 @@ def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) 
 
 def test_operations_are_those_of_the_text() -> None:
     """The count by which a schedule is chosen: 456 sums and products of a transform of 32 numbers."""
-    lines = emit_fourier.codelet(FFT32.dialect, "f", 32, 32, 1)
-    computed = [line for line in lines if "vector t" in line and "from[" not in line]
-    assert sum(line.count(f" {sign} ") for line in computed for sign in "+-*") == 456
+    function = fft.codelet("f", 32, 32, 1, FLOAT.of(16))
+    computed = [let.value for let in function.body if isinstance(let, Let)]
+    operations = ("add", "subtract", "multiply")
+    assert sum(part.op in operations for value in computed if value.op != "load" for part in parts(value)) == 456
     one, spectra = FFT32.operations(emitted(paper()))
     assert one == 864 * 2
     assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

@@ -13,12 +13,10 @@ from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.schedules.c_tiled import C_LADDER
-from wamnet.compiler.schedules.emit_inlined import LARGEST_WEIGHTS
-from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.schedules.opencl_group import OPENCL_GROUPS
-from wamnet.compiler.schedules.opencl_tiled import OPENCL_LADDER
-from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.schedules.inlined import LARGEST_WEIGHTS
+from wamnet.compiler.schedules.schedules import Tile
+from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.targets import TARGETS, schedule_named, target_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -127,7 +125,7 @@ def test_groups_find_every_weight(channels, size, hidden):
     """Read the array as the kernel's loops do: image, four channels, tap, channel."""
     network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    group = next(s for s in OPENCL_GROUPS if s.name == "group4")
+    group = schedule_named("opencl", "group4")
     packed, layout = group.pack(program), group.layout(program)
     for name, slot in layout.items():
         assert slot.offset % 4 == 0
@@ -219,7 +217,7 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
 
 
 @given(
-    schedule=st.sampled_from([*OPENCL_LADDER, *C_LADDER]),
+    schedule=st.sampled_from([s for t in ("opencl", "c") for s in target_named(t).schedules if type(s) is Tile]),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),
     hidden=st.integers(1, 70),

@@ -15,9 +15,9 @@ from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
-from wamnet.compiler.schedules import emit_fourier
-from wamnet.compiler.schedules.c_fourier import CFourier
-from wamnet.compiler.schedules.opencl_fourier import OpenCLFourier
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.schedules import schedules
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -34,11 +34,11 @@ def model(border="zero", activation="sine", images=("color", "normal", "albedo",
 
 def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
-    dialect = OpenCLFourier(4) if target == "opencl" else CFourier(4)
-    tiny = emit_fourier.Fourier("fft8", emit_fourier.IDEA, dialect, 4, 6, points, tiles)
+    dialect = OpenCL() if target == "opencl" else C()
+    tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
     whole = targets.DENOISERS[target]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(emit_fourier, "COST", 0.0)
+        patch.setattr(schedules, "COST", 0.0)
         patch.setitem(targets.DENOISERS, target, replace(whole, schedules=(*whole.schedules, tiny)))
         made = compile_program(lower(model(**kwargs)), target, schedule="fft8")
     assert made.manifest["schedule"]["name"] == "fft8"

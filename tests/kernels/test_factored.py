@@ -14,8 +14,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
-from wamnet.compiler.schedules.emit_dot import Dot, GroupDot
-from wamnet.compiler.schedules.emit_fourier import Fourier
+from wamnet.compiler.schedules.schedules import Dot, Fourier, GroupDot
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on
 from wamnet.kernels.devices import opencl_executor

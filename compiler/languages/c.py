@@ -149,7 +149,6 @@ class C(Arguments):
     }
     max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
-    magnitude = "fabsf({0})"
     clamp = "wamnet_clamp"
     unordered = (
         "",

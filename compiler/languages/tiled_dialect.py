@@ -4,7 +4,7 @@ A vector is `LANES` numbers; sums are `PIXELS` x `vectors` of them, `sum[p][j]`.
 vector, `unroll` the line before a loop that must become straight code, so that its sums are registers.
 An array of vectors can be read number by number [`held`, `at`]; a loop over elements goes through it in the
 language's own steps: vectors where operations have words on vectors, else numbers [`elements`, `element`].
-`contraction` are the lines that allow a compiler to fuse products with sums, and those that forbid it.
+`contraction` are the lines that allow a compiler to fuse products with sums.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class TiledDialect(Dialect):
 
     kind: str
     unroll: str = ""
-    contraction: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    contraction: tuple[str, ...] = ()
 
     # ---- numbers and branches ----------------------------------------------------------------------------
 

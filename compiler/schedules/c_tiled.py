@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from ..languages.c import STACK, UNFUSED, C, includes
+from ..languages.c import STACK, C, includes
 from ..languages.dialect import Parts
 from ..languages.interface import DENOISE, Interface
 from ..languages.openings import IMAGES, WEIGHTS_RESULT
@@ -154,7 +154,7 @@ class CTiled(C, TiledDialect):
 
     kind = "wamnet_vector"
     unroll = "WAMNET_UNROLL"
-    contraction = (tuple(FUSED.splitlines()), tuple(UNFUSED.splitlines()))
+    contraction = tuple(FUSED.splitlines())
     pixels = (
         "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written "
         "to\n   `result`, the whole picture's array."

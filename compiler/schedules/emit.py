@@ -70,7 +70,7 @@ def emit(
     gather = kernel_gather(program)
     _check_channels(program, dialect)
     body = body or Body(program, dialect, gather)
-    defines = [*(dialect.exact if program.exact else ()), *_window_defines(gather, dialect), *body.defines()]
+    defines = [*_window_defines(gather, dialect), *body.defines()]
     declared = [dialect.table_declaration(name, array) for name, array in tables(program).items()]
     packed = pack(program)
     if dialect.home == interface.TABLE:
@@ -82,7 +82,7 @@ def emit(
         dialect.home,
         dialect.integers[interface.DENOISE],
     )
-    parts = Parts(top="\n".join([*defines, *declared]), bounded=bounded or program.exact)
+    parts = Parts(top="\n".join([*defines, *declared]), bounded=bounded)
     return framed(dialect, kernel, parts, header, body.text())
 
 
@@ -294,24 +294,20 @@ class Body(Lines):
         self._comment(f"output {self.program.outputs[0][0]}")
         store, results = self.dialect.store, self.dialect.results(channels)
         if not self.program.nodes[index].type.shape:
-            value = self._written(self._read(index, ""))
+            value = self._read(index, "")
             self._line(store.format(result=results[0], channels=1, i="0", value=value))
             return
         each = self.dialect.channels_per_result or channels
         for first, result in zip(range(0, channels, each), results, strict=True):
             count = min(each, channels - first)
             if self.dialect.indexes_results:
-                value = self._written(self._read(index, _plus(first, "i")))
+                value = self._read(index, _plus(first, "i"))
                 line = store.format(result=result, channels=channels, i="i", value=value)
                 self._nest([self.dialect.loop("i", count)], [line])
                 continue
             for i in range(count):
-                value = self._written(self._read(index, str(first + i)))
+                value = self._read(index, str(first + i))
                 self._line(store.format(result=result, channels=channels, i=i, value=value))
-
-    def _written(self, value: str) -> str:
-        """Return the text of a number as it is written: an exact program has one zero."""
-        return self.dialect.select(f"{value} == 0.0f", "0.0f", value) if self.program.exact else value
 
     # ---- the window --------------------------------------------------------------------------------------
 
@@ -359,9 +355,8 @@ class Body(Lines):
         dialect = self.dialect
         pixel = dialect.pixel.format(image=image.name, channels=image.channels)
         value = self._bordered(pixel)
-        kept = [f"value = {dialect.kept('value')};"] if self.program.exact else []
-        declared = (dialect.var if self.program.exact else dialect.let)("float32", "value", value)
-        self._nest([dialect.loop("c", image.channels)], [declared, *kept, *lines])
+        declared = dialect.let("float32", "value", value)
+        self._nest([dialect.loop("c", image.channels)], [declared, *lines])
 
     # ---- values ------------------------------------------------------------------------------------------
 
@@ -387,8 +382,7 @@ class Body(Lines):
     def _declaration(self, index: int) -> str:
         """Return the declaration of the array of a value."""
         node = self.program.nodes[index]
-        # Sums of an exact program have one order too.
-        return self.dialect.array(node.type.dtype, f"v{index}", node.type.shape[0], self.program.exact)
+        return self.dialect.array(node.type.dtype, f"v{index}", node.type.shape[0])
 
     def declares(self, index: int) -> bool:
         """Return whether the kernel has an array for this value."""

@@ -129,8 +129,6 @@ class Fourier(Tiled):
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         gather, readers = kernel_gather(program), readers_of_window(program)
-        if program.exact:
-            return "sums from spectra are rounded in another order than profile exact states"
         if gather.whole:
             return "sums from spectra are rounded, those of integers are not"
         if reason := refused_by_vectors(program, self.dialect):

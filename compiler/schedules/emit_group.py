@@ -181,8 +181,6 @@ class Grouped(Tiled):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        if program.exact:
-            return "the order of its sums is not pinned as profile exact states"
         if reason := refused_by_vectors(program, self.dialect) or self._shared_matrix(program):
             return reason
         if reason := self._beyond_tile(kernel_gather(program)):

@@ -98,13 +98,11 @@ class InlinedBody(Body):
         """Return the function that reads a pixel under the border rule."""
         kind, border = _vector(channels), self.gather.window.border
         value = {"clamp": "texel", "zero": f"at == nearest ? texel : {kind}(0.0f)"}[border]
-        kept = [f"    texel{i} = {self.dialect.kept(f'texel{i}')};" for i in _components(channels)]
         return [
             f"{kind} tap_{name}(ivec2 at)",
             "{",
             f"    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_{name}, 0) - 1);",
             f"    {kind} texel = texelFetch(image_{name}, nearest, 0).{'rgba'[:channels]};",
-            *(kept if self.program.exact else []),
             f"    return {value};",
             "}",
         ]
@@ -160,8 +158,7 @@ class InlinedBody(Body):
         self._comment(f"%{index}: affine map {node['weight']} from {matrix.shape[1]} to {numbers}")
         for vector in range(self.vectors(index)):
             start = self._numbers(self.program.parameters[str(bias)], vector) if bias else "vec4(0.0f)"
-            qualifier = self.dialect.qualifiers["float32"] if self.program.exact else ""
-            self._line(f"{qualifier}vec4 v{index}_{vector} = {start};")
+            self._line(f"vec4 v{index}_{vector} = {start};")
         if source.op == "input":
             self._windowed(index, matrix)
         else:
@@ -193,17 +190,8 @@ class InlinedBody(Body):
                     self._line(f"v{index}_{vector} += part{index}_{vector};")
 
     def _multiply(self, sums: str, columns: NDArray[np.float32], value: str, operator: str = "+=") -> None:
-        """Write the additions of columns (D_out, k) times `value` with k components to all vectors.
-
-        A product of a matrix and a vector adds up in an order of its own: an exact program has one column
-        after another.
-        """
+        """Write the additions of columns (D_out, k) times `value` with k components to all vectors."""
         count = columns.shape[1]
-        if self.program.exact and count > 1:
-            for i, part in enumerate(_components(count)):
-                each = columns[:, i : i + 1], f"{value.partition('.')[0]}{part}"
-                self._multiply(sums, *each, operator if i == 0 else "+=")
-            return
         kind = "vec4" if count == 1 else f"mat{count}x4"
         for vector in range(-(-columns.shape[0] // 4)):
             numbers = [n for column in columns.T for n in _filled(column, vector)]
@@ -217,8 +205,7 @@ class InlinedBody(Body):
         channels = self.program.nodes[index].type.shape[0]
         for vector, result in enumerate(self.dialect.results(channels)):
             components = COMPONENTS[min(4, channels - 4 * vector) - 1]
-            for part in components if self.program.exact else (components,):
-                self._line(f"{result}.{part} = {self._written(f'v{index}_{vector}.{part}')};")
+            self._line(f"{result}.{components} = v{index}_{vector}.{components};")
 
     def _element(self, index: int, lane: str) -> str:
         """Return the name of a value inside a function."""

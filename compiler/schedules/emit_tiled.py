@@ -214,7 +214,7 @@ class TiledBody(Body):
             "PATCH_WIDTH": (f"({self.sides.columns} + PIXELS - 1)", "columns that all windows touch"),
         }
         sizes = [f"{define.format(name=name, value=n)} /* {what} */" for name, (n, what) in values.items()]
-        return [*self.words.contraction[self.program.exact], *self.integers(), *sizes]
+        return [*self.words.contraction, *self.integers(), *sizes]
 
     def _prepare(self) -> None:
         """Write the copies of the images around the pixels, under the border rule."""
@@ -261,9 +261,7 @@ class TiledBody(Body):
 
     def _put(self, place: str, value: str) -> list[str]:
         """Return the lines that copy one number of an image."""
-        if not self.program.exact:
-            return [f"{place} = {value};"]
-        return [self.words.single("value", value), f"{place} = {self.words.kept('value')};"]
+        return [f"{place} = {value};"]
 
     def _affine(self, index: int, node: Node) -> None:
         """Write v = W x + b for all pixels, block by block."""
@@ -347,7 +345,7 @@ class TiledBody(Body):
         held = self.tile.blocks(channels).total
         self._comment(f"output {name}")
         value = words.at(f"v{index}", f"p * {held} * LANES + i")
-        line = words.store.format(channels=channels, i="i", value=self._written(value))
+        line = words.store.format(channels=channels, i="i", value=value)
         loops = [words.loop_while("p", "PIXELS", "x + p < width"), words.loop("i", channels)]
         self._nest(loops, [line])
 

@@ -55,7 +55,7 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
         ("opencl", "ieee", "vector16", "clamp"),
         ("opencl", "ieee", "tile16", "zero"),
         ("c", "ieee", "tile16", "zero"),
-        ("c", "exact", "tile4", "clamp"),
+        ("c", "ieee", "tile4", "clamp"),
     ],
 )
 def test_golden_tiles(golden, target, profile, name, border):
@@ -110,12 +110,6 @@ def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
     assert found["asked"] == "group4"
     assert re.match(reason, found["reason"])
     assert ("group" in found) == (found["name"] == "group")
-
-
-def test_an_exact_program_is_plain():
-    found = compile_program(small(), "opencl", "exact", "group4").manifest["schedule"]
-    assert (found["name"], found["asked"]) == ("plain", "group4")
-    assert found["reason"] == "the order of its sums is not pinned as profile exact states"
 
 
 @given(
@@ -266,9 +260,9 @@ def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
     assert artifact.manifest["private_bytes"] == 4 * sum(numbers)
 
 
-def test_only_profiles_that_allow_it_let_products_be_fused_in_c():
-    """PRO-1, PRO-11: the tiled header says so itself, whatever the compiler's default is."""
-    for profile, word in (("ieee", "fast"), ("native", "fast"), ("exact", "off")):
-        source = compile_program(small(), "c", profile, "tile8").source
+def test_products_may_be_fused_in_tiles_of_c_only():
+    """KER-16, KER-22: the header states it, whatever the compiler's default is."""
+    for schedule, word in (("tile8", "fast"), ("plain", "off")):
+        source = compile_program(small(), "c", schedule=schedule).source
         assert f'#pragma GCC optimize("fp-contract={word}")' in source
         assert f"#pragma STDC FP_CONTRACT {'ON' if word == 'fast' else 'OFF'}" in source

@@ -23,7 +23,7 @@ from . import artifact
 from .artifact import Artifact, schedule_text
 from .core import ir
 from .core.enclosure import round_up as round_up
-from .core.ir import LEAST, OUTPUT_ENCODING, Gather, Program
+from .core.ir import OUTPUT_ENCODING, Gather, Program
 from .core.passes import pipeline
 from .core.profiles import SineContract
 from .core.sums import is_split
@@ -44,9 +44,6 @@ JSON_INFO = ("normalization", "recipe")
 
 AGAINST = "float64 reference, same float32 weights and images"
 """What a bound compares a kernel with."""
-
-AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
-"""The same for an exact kernel."""
 
 AGAINST_WHOLE = "reference in integers, the same bits"
 """The same for a kernel in which nothing rounds."""
@@ -221,7 +218,7 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
         "entry_point": entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(plan.sine),
-        "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
+        "passes": [*pipeline.COMMON, *profile.passes],
         "window": _window(gather),
         "images": [image.facts for image in gather.images],
         "output": {
@@ -232,7 +229,7 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
         "arguments": _arguments(plan),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": AGAINST_WHOLE if bound.exact else AGAINST_PINNED if emitted.exact else AGAINST,
+            "against": AGAINST_WHOLE if bound.exact else AGAINST,
         },
         "certificate": artifact.CERTIFICATE_NAME if bound.proof or bound.exact else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],

@@ -42,7 +42,7 @@ wamnet compile model.safetensors --target opencl --variant window8+rank16 -o ker
 
 wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
 
-wamnet compile model.safetensors --target c --profile exact -o kernel-c
+wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
 
 wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
 

@@ -48,7 +48,7 @@ wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.p
 
 wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
 
-wamnet denoise model.safetensors noisy.exr --executor c --profile exact
+wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
 
 wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
 
@@ -161,9 +161,10 @@ def denoise(
 ) -> None:
     """Denoise frames with a trained model.
 
-    The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
-    result is the same to the last bit on every executor; its digest is printed, to be compared. Kernels are
-    kept: a second command compiles nothing. Of a sequence, results that are there are not made again.
+    The kernel's schedule is the one that suits the device, unless another is named. An
+    integer network (variant whole8) gives the same bits on every executor; their digest is printed, to be
+    compared. Kernels are kept: a second command compiles nothing. Of a sequence, results that are there are
+    not made again.
     """
     from ...kernels import open_executor
     from ...kernels.run.denoise_on import Denoiser
@@ -206,7 +207,7 @@ def _denoise_one(job: Job, path: Path, output: Path) -> None:
         say(result.variant)
     before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
-    if denoiser.profile == "exact":
+    if denoiser.model.is_whole:
         say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 
 

@@ -42,7 +42,7 @@ EXAMPLES = """Examples:
 
 wamnet triage model.safetensors noisy.exr
 
-wamnet triage model.safetensors noisy.exr --schedules all --profile exact
+wamnet triage model.safetensors noisy.exr --schedules all
 
 wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
 """Shown below the help of `wamnet triage`."""
@@ -286,7 +286,7 @@ def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str
         "conclusion": conclusion(verdicts),
         "profile": task.profile,
         "schedules": task.schedules,
-        "program": ir.digest(analysed(lower(task.model), task.profile)),
+        "program": ir.digest(analysed(lower(task.model))),
         "frame": {"height": task.frame.height, "width": task.frame.width},
         "verdicts": [_entry(verdict) for verdict in verdicts],
         "part": {**asdict(found.box), "verdicts": [_entry(verdict) for verdict in found.verdicts]},
@@ -322,7 +322,6 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
         "found": _number(verdict.found),
         "expected": _number(verdict.expected),
         "bound": _number(verdict.bound),
-        "other_bits": verdict.bits,
     }
 
 
@@ -414,7 +413,7 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
         wanted, name = manifest["program"], str(manifest["profile"]["name"])
         target, schedule = str(manifest["target"]), str(manifest["schedule"]["name"])
     program = lower(model)
-    if wanted != ir.digest(analysed(program, profile)) or name != profile:
+    if wanted != ir.digest(analysed(program)) or name != profile:
         rule = f"its kernel is of another model or profile ({name})"
         raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
     made = compile_program(program, target, profile, schedule)

@@ -180,7 +180,7 @@ Profile = Annotated[
     typer.Option(
         "--profile",
         help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
-        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]exact[/] gives the same bits everywhere, "
+        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), "
         "[bold]native[/] uses the target's sine.",
     ),
 ]

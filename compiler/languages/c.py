@@ -298,7 +298,6 @@ class C(Arguments):
         "",
     )
     unroll = "WAMNET_UNROLL"
-    magnitude = "fabsf({0})"
     clamp = "wamnet_clamp"
     unordered = (
         "",

@@ -77,7 +77,6 @@ class CUDA(Arguments):
     writes = "float *__restrict__ {name}"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     types = scalars = {**Dialect.types, "uint32": "unsigned int"}
-    magnitude = C.magnitude
     clamp = "wamnet_clamp"
     max_output_channels = 2**16
     group = (16, 8)

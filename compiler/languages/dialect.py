@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import LEAST, Node
+from ..core.ir import Node
 from ..core.profiles import SineContract
 if TYPE_CHECKING:
     from ..kernel.kernel import Kernel, Type
@@ -51,9 +51,9 @@ class Parts:
 class Dialect:
     """One language; a subclass sets every attribute that has no value here.
 
-    `exact`: lines that an exact kernel needs at its top. `unordered`: lines for a compiler that may reorder
-    operations, without a bound and with one. `assumes`: what a bound rests on that the language does not
-    promise. `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
+    `unordered`: lines for a compiler that may reorder operations, without a bound and with one.
+    `assumes`: what a bound rests on that the language does not promise.
+    `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
     for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
@@ -86,8 +86,6 @@ class Dialect:
     stepped: str = "for (int {i} = 0; {i} < {count};) {{"
     define: str = "#define {name} {value}"
     choice: str = "{0} ? {1} : {2}"
-    exact: tuple[str, ...] = ()
-    magnitude: str = "fabs({0})"
     clamp: str = "clamp"
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
     byte: str = "uchar"
@@ -370,10 +368,6 @@ class Dialect:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
         return template.format(*operands, type=self.types[node.type.dtype], table=node.get("table"))
-
-    def kept(self, value: str) -> str:
-        """Return the text of a number as an exact program reads it."""
-        return self.select(f"{self.magnitude.format(value)} < {self.literal(LEAST)}", "0.0f", value)
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""

@@ -141,7 +141,6 @@ class GLSL(Dialect):
     sum_store = "sums_{buffer}[{component}] = {value};"
     load = "PRECISE float {name} = texelFetch(sums_{buffer}, at, 0)[{component}];"
     image_store = "image_{image}[{channel}] = {value};"
-    magnitude = "abs({0})"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"

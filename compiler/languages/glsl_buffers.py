@@ -113,7 +113,6 @@ class Vulkan(Declared):
         "sin() of Vulkan, which promises 2^-11 on [-pi, pi] alone, and that absolutely", None
     )
     qualifiers = GLSL.qualifiers
-    magnitude = GLSL.magnitude
     table = GLSL.table
     operations = GLSL.operations
     group_size: tuple[int | str, int | str] = GROUP

@@ -73,7 +73,6 @@ class OpenCL(Arguments):
         ),
     }
     max_output_channels = 2**16
-    exact = ("#pragma OPENCL FP_CONTRACT OFF /* every operation is rounded */",)
     native_sine = OPENCL_SINE
     table = "__constant {type} {name}[{count}] = {{{values}}};"
     operations = {

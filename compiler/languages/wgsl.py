@@ -53,7 +53,6 @@ class WGSL(Declared):
         ENCODE: ("width", "height"),
     }
     types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
-    magnitude = "abs({0})"
     counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
     define = "const {name}: i32 = {value};"
     choice = "select({2}, {1}, {0})"

@@ -157,7 +157,6 @@ void wamnet_denoise(
     int width, int height) { }
 
 == opencl ==
-#pragma OPENCL FP_CONTRACT OFF
 %window%%pixels%%tiles%%group%
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
@@ -372,15 +371,13 @@ NEEDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "c": {
         "all": ("FP_CONTRACT", "pop_options", "float .h", "math .h", "stdbool .h", "stdint .h"),
         "floats": ("__FAST_MATH__",),
-        "exact": ("fp-contract=off",),
     },
-    "opencl": {"exact": ("FP_CONTRACT OFF",)},
     "opengl": {"all": ("330 core", "extension", "define PRECISE"), "floats": ("error",)},
     "glsl-es": {"all": ("300 es", "highp float", "highp int", "highp sampler2D", "define PRECISE")},
     "glsl-vulkan": {"all": ("version 450", "define PRECISE precise", "local_size_x")},
     "metal": {"all": ("metal_stdlib", "using namespace metal")},
 }
-"""What some item must have: in all sources, in those with a bound that is not 0, and of profile exact."""
+"""What some item must have: in all sources, and in those with a bound that is not 0."""
 
 TRUE: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "c": (

@@ -76,7 +76,7 @@ def compile_encode(
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
     images are those of a network of integers. `rays`: those of features [lower_encode].
     """
-    chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
+    chosen, promised = target_named(target), profiles.profile_named(profile)
     encoding = encoding_of(features, normalization, profile, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))

@@ -65,7 +65,7 @@ LANES = 1
 @lru_cache
 def compile_history(target: str, profile: str = "ieee") -> PlaneArtifact:
     """Return the kernel that adds a picture to a history."""
-    promised = profiles.unpinned(profile, "histories")
+    promised = profiles.profile_named(profile)
     dialect = plane_kernel.dialect_of(target, LANES, *SAID)
     programs = _of_profile(lower_history(), promised.passes)
     integers = plane_kernel.integers_of(dialect, FOLLOW)

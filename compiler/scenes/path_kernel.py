@@ -134,7 +134,7 @@ def compile_path(
 
     With an encoding of these planes it writes its images, at their places in the whole picture.
     """
-    chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
+    chosen, promised = target_named(target), profiles.profile_named(profile)
     if not chosen.paths:
         raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
     if lanes not in chosen.paths:

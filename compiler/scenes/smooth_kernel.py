@@ -75,7 +75,7 @@ def compile_smoothing(
     normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    promised = profiles.unpinned(profile, "smoothed features")
+    promised = profiles.profile_named(profile)
     plane_kernel.dialect_of(target, lanes, *SAID)
     programs = _of_profile(lower_smooth(normalization), promised.passes)
     pair = [_compiled(programs, role, target, profile, lanes) for role in (GUIDE, SMOOTH)]

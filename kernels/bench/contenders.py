@@ -27,15 +27,11 @@ from .cost import fused, sines_of
 from .peers import peer_halide, peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .workload import Given
 
-EXACT = "exact"
-"""Profile whose sums have one order: spectra cannot have it."""
-
 VARIANTS: tuple[Variant, ...] = (
     Variant("sine7", "sines of degree 7", profile="ieee-sine7"),
     Variant("sine9", "sines of degree 9", profile="ieee-sine9"),
     Variant("sine5", "sines of degree 5", profile="ieee-sine5"),
     Variant("native", "the target's own sine", profile="native"),
-    Variant("exact", "the same bits on every executor", profile="exact"),
 )
 """Forms of the network that need no training; what is cut away is trained first [`of_machine`]."""
 
@@ -142,12 +138,12 @@ def _of_integers(executor: str, suits: str) -> list[Contender]:
 def _varied(executor: str, suits: str, variants: Sequence[Variant]) -> list[Contender]:
     """Return the kernels of variants: with the schedule that suits, and the direct one where that is another.
 
-    A first layer in two passes, and sums in one order, have the direct one only.
+    A first layer in two passes has the direct one only.
     """
     direct, found = _of_two_passes(executor, suits), []
     for variant in variants:
-        both = not variant.rank and variant.profile != EXACT
-        found += [kernel(executor, each, variant) for each in dict.fromkeys([suits] * both + [direct])]
+        both = [] if variant.rank else [suits]
+        found += [kernel(executor, each, variant) for each in dict.fromkeys([*both, direct])]
     return found
 
 

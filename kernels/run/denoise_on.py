@@ -96,14 +96,10 @@ def filter_of(
     """Return the kernels, built, that smooth a frame's features on a device; None: the reference does.
 
     The reference smooths where a device would take longer, where a picture has the same bits on all devices
-    (integers, profile `exact`), and layers with more digits than a kernel reads.
+    (integers), and layers with more digits than a kernel reads.
     """
     layers = [layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers]
     if not layers or not executor.smooths or model.is_whole:
-        return None
-    from ...compiler.core.profiles import profile_named
-
-    if profile_named(profile).common:
         return None
     if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
         return None

@@ -203,14 +203,6 @@ def test_nothing_is_half_written(here, fault, monkeypatch, wamnet) -> None:
     assert sorted(path.name for path in here.iterdir()) == ["model.safetensors", "noisy.exr"]
 
 
-def test_exact_prints_bits(wamnet, here) -> None:
-    """The same bits: nothing to report."""
-    outcome = wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "--profile", "exact")
-    assert outcome.status == 0
-    assert "profile exact" in outcome.out
-    assert "2 kernels within their bounds" in outcome.out
-
-
 def test_one_that_is_not_here_is_told(wamnet, here, monkeypatch, refused) -> None:
     """Unless it was requested by name."""
     monkeypatch.setenv("WAMNET_OPENCL_DEVICE", "abacus")

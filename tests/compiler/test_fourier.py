@@ -342,15 +342,15 @@ def test_private_bytes_are_those_of_its_arrays() -> None:
     sizes = dict(re.findall(r"#define ([A-Z_]+) (\d+)", source))
     sizes |= {"OUT": "21", "STRIDE": "66"}
     body = source[source.index("__kernel") :]
-    found = re.findall(r"vector (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
+    found = re.findall(r"float16 (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
     kept = [
         f"({a}) * ({b or 1})"
         for name, a, b in found
         if "real" not in name and "imaginary" not in name and name != "sum"
     ]
     numbers = [eval(re.sub("[A-Z_]+", lambda word: sizes[word[0]], text), {}) for text in kept]
-    # Row, rows, column, mirror, spectra, product, back, sums, and an array between two layers each.
-    assert len(numbers) == 8 + 6
+    # The pixels of a row, rows, columns, spectra, product, back, sums, and an array between two layers each.
+    assert len(numbers) == 7 + 6
     assert FFT32.private_bytes(made) == 64 * sum(numbers)
 
 

@@ -1,4 +1,4 @@
-"""Reading products of bytes: words, their bytes, ranges of integers; and profile exact (spec/text.md)."""
+"""Reading products of bytes: words, their bytes, ranges of integers (spec/text.md)."""
 
 import json
 
@@ -136,14 +136,3 @@ def test_shifts_of_known_words_wrap():
     moved = words.moved("left_shift", word, field.literal(16, "int32"))
     assert words.known(moved).tolist() == [-(2**17), 0x7F800000]
     assert words.known(words.moved("right_shift", moved, field.literal(24, "int32"))).tolist() == [-1, 127]
-
-
-@pytest.mark.parametrize(
-    ("target", "schedule"), [("opencl", "plain"), ("opencl", "tile8"), ("c", "plain"), ("c", "tile8")]
-)
-def test_texts_of_profile_exact_compute_what_is_certified(target, schedule, tmp_path):
-    """TXT-7: numbers that its program reads as 0, its sine, and one zero of a result."""
-    given = parts(planned(tmp_path, target, schedule, variant="full", profile="exact"))
-    assert run_text(*given)
-    with pytest.raises(Refused, match="never made"):
-        run_text(*changed(given, "9.09494702e-13f", "9.09494702e-12f"))

@@ -158,12 +158,11 @@ def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
 
 
 def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch):
-    """SMO-7: other executors, `exact`, integers, layers of float64, and models without such features."""
+    """SMO-7: other executors, integers, layers of float64, and models without such features."""
     device, frame = executor_named("opencl"), whole_frame(rough_layers(4, 5))
     model = model_of(kit, ("color", "smoothed"))
     assert filter_of(device, model, frame, "ieee") is not None
     assert filter_of(executor_named("numpy"), model, frame, "ieee") is None
-    assert filter_of(device, model, frame, "exact") is None
     assert filter_of(device, model, whole_frame(rough_layers(4, 5), np.float64), "ieee") is None
     assert filter_of(device, model_of(kit, ("color",)), frame, "ieee") is None
     monkeypatch.setattr(Model, "is_whole", True)

@@ -206,32 +206,6 @@ def test_names_of_odd_ones():
     assert every[-1].state == "refused: too large"
 
 
-# ---- bits ------------------------------------------------------------------------------------------------
-
-
-def last_bit(runner):
-    """Let a runner write the next float32 in one number."""
-
-    def run(artifact, images):
-        picture = Inside.run(runner, artifact, images).image.copy()
-        picture[5, 3, 0] = np.nextafter(picture[5, 3, 0], np.float32(2))
-        return Outcome(picture)
-
-    return run
-
-
-def test_exact_kernels_are_compared_by_bits(executor_named, model, images, monkeypatch):
-    """The same change is within the bound of profile ieee."""
-    ways = runners(executor_named, *WAYS)
-    assert triage.conclusion(verdicts_of(ways, model, images, "exact")) == "5 kernels within their bounds"
-    monkeypatch.setattr(ways[-1], "run", last_bit(ways[-1]))
-    assert not triage.odd_ones(verdicts_of(ways, model, images))
-    (odd,) = triage.odd_ones(verdicts_of(ways, model, images, "exact"))
-    assert (odd.kernel.runner.way, odd.pixel, odd.bits) == (ways[-1].way, (5, 3, 0), 1)
-    assert odd.ratio <= 1
-    assert odd.state == "DEVIATES: 1 numbers have other bits"
-
-
 # ---- crashes ---------------------------------------------------------------------------------------------
 
 

@@ -123,6 +123,8 @@ def test_a_kernel_is_compiled_saved_and_certified(tmp_path):
         wamnet.certify(tmp_path)
     with pytest.raises(wamnet.WamnetError, match="must be one of glsl, numpy, opencl"):
         wamnet.compile(model, "fortran")
+    with pytest.raises(wamnet.WamnetError, match=r"exact was removed; use .* whole8"):
+        wamnet.compile("minicubes", "c", profile="exact")
 
 
 def test_an_export_is_a_folder(model, tmp_path):

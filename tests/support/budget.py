@@ -16,7 +16,7 @@ BUDGET = {
     "refimpl/light": 4375,
     "refimpl/network": 2750,
     "compiler": 1860,
-    "compiler/core": 3500,
+    "compiler/core": 3250,
     "compiler/importing": 1560,
     "compiler/languages": 2725,
     "compiler/proof": 3190,

@@ -15,7 +15,6 @@ from .expand_sine import expand_sine
 from .expand_tables import expand_tables
 from .fold import fold, fold_float32
 from .fuse_bias import fuse_bias
-from .pin import pin
 from .scalarize import scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
@@ -24,7 +23,6 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "scalarize": scalarize,
     "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
-    "pin": pin,
     EXPAND_SINE: expand_sine,
     **{f"{EXPAND_SINE}_{degree}": partial(expand_sine, degree=degree) for degree in POLYNOMIALS},
     "eliminate_dead": eliminate_dead,

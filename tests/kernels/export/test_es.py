@@ -53,11 +53,6 @@ def test_the_bound_says_what_it_assumes(case):
     assert "assumes" not in compile_program(case[0], "opengl").source
 
 
-def test_a_profile_that_needs_an_order_is_refused(case):
-    with pytest.raises(CompileError, match=r"exact: kernels in GLSL ES .* their text does not demand"):
-        compile_program(case[0], "glsl-es", "exact")
-
-
 def test_paths_are_those_of_the_reference(runner):
     """No path of this picture passes an edge within rounding: the sums are the interpreter's to 1e-4."""
     programs = lower_scene(canonical("minicubes", time=1.0), Settings())

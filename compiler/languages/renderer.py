@@ -62,6 +62,9 @@ CHOICE, UNARY, ATOM = 1, 12, 13
 INFIX = re.compile(r"^\{\d\} (\S+) \{\d\}$|^1\.0f (/) \{0\}$")
 """A template of an operator of two operands."""
 
+SIMPLE = re.compile(r"[^(]*\((\{\d\})(, \{\w+\})*\)")
+"""A template of a function whose arguments stand alone."""
+
 
 def binding(template: str) -> int:
     """Return how strongly a template binds."""
@@ -216,7 +219,7 @@ class Renderer(Lines):
     def _operation(self, value: Expr) -> tuple[str, int]:
         """Return an operation of the program."""
         dialect, kind = self.dialect, value.args[-1].type
-        if kind.lanes > 1 and (vectors := dialect.vector_operations):
+        if min(kind.lanes, value.args[0].type.lanes) > 1 and (vectors := dialect.vector_operations):
             for key in (f"{value.op}.{kind.dtype}", value.op):
                 if key in vectors:
                     return self._filled(vectors[key], value)
@@ -225,19 +228,23 @@ class Renderer(Lines):
 
     def _filled(self, template: str, value: Expr) -> tuple[str, int]:
         """Return a template with operands as strongly bound as their places need."""
-        binds = binding(template)
-        args, infix = list(value.args), bool(INFIX.match(template))
+        binds, infix = binding(template), bool(INFIX.match(template))
+        args = list(value.args)
         if infix and self.dialect.widens:  # a language with such operators widens a single value by itself
-            args = [a.args[0] if a.op == "splat" else a for a in args]
-        if infix and all(a.type.lanes == 1 for a in args):
-            args = list(value.args) if value.type.lanes > 1 else args
-        exact = value.op == "add" and value.type.dtype == "int32"  # sums of integers need no order
-        places = [binds, binds + (not exact)] if infix else [2 if binds == CHOICE else 0 if binds == ATOM else UNARY] * 3
-        if binds == ATOM and any(f"{{{k}}} " in template or f" {{{k}}}" in template for k in range(len(args))):
-            simple = re.fullmatch(r"[^(]*\((\{\d\})(, \{\d\})*\)", template)
-            places = [0 if simple else UNARY] * 3
-        texts = [self.text(a, place) for a, place in zip(args, places * 2, strict=False)]
+            single = [a.args[0] if a.op == "splat" else a for a in args]
+            args = single if any(a.type.lanes > 1 for a in single) else args
+        texts = [self.text(a, place) for a, place in zip(args, self._places(template, value), strict=False)]
         return template.format(*texts, type=self.kind(value.type), lanes=value.type.lanes), binds
+
+    def _places(self, template: str, value: Expr) -> list[int]:
+        """Return how strongly each operand of a template must bind."""
+        binds = binding(template)
+        if INFIX.match(template):
+            in_any_order = value.op == "add" and value.type.dtype == "int32"
+            return [binds, binds + (not in_any_order), 0]
+        if binds in (CHOICE, UNARY):
+            return [2 if binds == CHOICE else ATOM] * 3  # two signs side by side would be another operator
+        return [0 if SIMPLE.fullmatch(template) else UNARY] * 3
 
     # ---- memory ------------------------------------------------------------------------------------------
 
@@ -350,11 +357,13 @@ class Renderer(Lines):
 
     def _bits(self, value: Expr) -> tuple[str, int]:
         """Return words of weights read as floats."""
-        return f"wamnet_numbers({self.text(value.args[0])})", ATOM
+        function = "wamnet_numbers" if self.kernel.group else f"as_{self.kind(value.type)}"
+        return f"{function}({self.text(value.args[0])})", ATOM
 
     def _convert(self, value: Expr) -> tuple[str, int]:
         """Return values of another kind."""
-        if self.kernel.group and self.kernel.weights.dtype == "int32" and value.type.lanes > 1:
+        sums = value.args[0].type.dtype == "int32" and value.type == FLOAT.of(4)
+        if self.kernel.group and self.kernel.weights.dtype == "int32" and sums:
             return f"wamnet_floats({self.text(value.args[0])})", ATOM
         if value.type.lanes == 1 and self.dialect.casts:
             return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY

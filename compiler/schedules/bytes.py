@@ -40,6 +40,7 @@ from ..kernel.kernel import (
     name,
     splat,
 )
+from ..languages.interface import WEIGHTS
 from ..proof import whole
 from .common import kernel_gather, loop, weight
 from .group import MOST_CHANNELS, Group
@@ -157,6 +158,13 @@ class Bytes(Tiled):
     def weight_type(self) -> Type:
         """Return the type of an element of the weights."""
         return self.sum_type
+
+    def read(self, index: int) -> Expr:
+        """Return element `i` of another group's value; the weights are words, whose bits may be floats."""
+        found = super().read(index)
+        if found.value != WEIGHTS or not self.wide:
+            return found
+        return Expr("bits", (weight(found.args[0], self.sum_type),), self.vector)
 
     def patch(self, image: Image, size: Expr) -> Array:
         """Return the declaration of an image's patch; a last step may read three bytes beyond."""

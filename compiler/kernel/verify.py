@@ -39,6 +39,12 @@ from .kernel import (
 )
 from .sizes import BYTES
 
+LIMITS = {
+    dtype: (int(np.iinfo(dtype).min), int(np.iinfo(dtype).max))
+    for dtype in ("int32", "uint32", "uint8", "int8")
+}
+"""The least and the largest integer of each kind."""
+
 
 class KernelError(Exception):
     """A kernel that no device runs as it is meant."""

@@ -90,8 +90,8 @@ LANGUAGES: Mapping[str, Language] = {
 }
 """The languages by target."""
 
-CONSTANTS = frozenset(
-    ("WINDOW_SIZE", "WINDOW_CENTRE", "WINDOW_ROWS", "WINDOW_COLUMNS", "CENTRE_ROW", "CENTRE_COLUMN", "PIXELS")
-    + ("LANES", "PATCH_WIDTH", "GROUP_WIDTH", "GROUP_HEIGHT", "TILE_WIDTH", "TILE_HEIGHT", "PLANE", "TILE_NUMBERS")
-)  # fmt: skip
+CONSTANT = re.compile(
+    "WINDOW_(SIZE|CENTRE|ROWS|COLUMNS)|CENTRE_(ROW|COLUMN)|PIXELS|LANES|PATCH_WIDTH|GROUP_(WIDTH|HEIGHT)|"
+    "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE"
+)
 """The names of constants; no macro has another name, so that none changes what surrounds the statements."""

@@ -20,7 +20,7 @@ from ..core.ir import Image
 from ..languages.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
 from .canonical import canonical, terms
 from .frames import frame, lines_of
-from .grammar import BINARY, CONSTANTS, LANGUAGES, PRODUCTS, TOKEN, Language
+from .grammar import BINARY, CONSTANT, LANGUAGES, PRODUCTS, TOKEN, Language
 from .kernel import (
     FLOAT,
     INT,
@@ -124,7 +124,7 @@ class Parser:
         """Return a named integer: of a macro whose text is one number or in parentheses."""
         match = re.fullmatch(r"#define (\w+) (\d+|\(.*\))|const (\w+): i32 = (\d+|\(.*\));", line)
         key = match and (match[1] or match[3])
-        if match is None or key not in CONSTANTS:
+        if match is None or not CONSTANT.fullmatch(str(key)):
             raise Unread(f"{line!r} is no constant")
         self._read(match[2] or match[4])
         value = self._expression()

@@ -336,11 +336,9 @@ class Verifier:
         """Return the type of a constant, whose value it must hold."""
         kind, number = value.type, value.value
         fits = {"bool": (bool,), "float32": (int, float)}.get(kind.dtype, (int,))
-        if (
-            kind.lanes != 1
-            or not isinstance(number, fits)
-            or (kind.dtype != "bool" and isinstance(number, bool))
-        ):
+        truth = isinstance(number, bool) != (kind.dtype == "bool")
+        least, most = LIMITS.get(kind.dtype, (-np.inf, np.inf))
+        if kind.lanes != 1 or not isinstance(number, fits) or truth or not least <= number <= most:
             raise KernelError(f"{number!r} is no constant of type {shown(kind)}")
         return kind
 

@@ -31,10 +31,11 @@ from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
+from .languages.dialect import Dialect
 from .proof import bounds, certificate, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
-from .schedules.emit import kernel_gather, output_channels
+from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
@@ -125,6 +126,11 @@ class Plan:
     def schedule(self) -> Schedule:
         """Return the schedule."""
         return self.picked.schedule
+
+    @property
+    def language(self) -> Dialect | None:
+        """Return the language of the source, which the interpreter has none of."""
+        return None if self.target.dialect is None else self.schedule.dialect
 
     @cached_property
     def passes(self) -> tuple[Plan, ...]:

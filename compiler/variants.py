@@ -42,7 +42,7 @@ from .languages.interface import FULL as FULL
 from .plan import Plan, analysed, plan_program
 from .proof import bounds
 from .proof.bounds import Enclosure
-from .schedules.emit import kernel_gather
+from .schedules.common import kernel_gather
 from .schedules.schedules import PLAIN
 
 Array = NDArray[np.float64]

@@ -133,6 +133,15 @@ class Store:
 
 
 @dataclass(frozen=True)
+class Write:
+    """All channels of a pixel of the result."""
+
+    row: Expr
+    column: Expr
+    values: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
 class For:
     """A counted loop; `how`: `loop` as it stands, `unroll` as a demand on the compiler.
 
@@ -186,7 +195,7 @@ class Call:
     views: tuple[View, ...]
 
 
-Statement = Comment | Let | Array | Store | For | If | Block | Barrier | Call
+Statement = Comment | Let | Array | Store | Write | For | If | Block | Barrier | Call
 Body = tuple[Statement, ...]
 
 
@@ -335,6 +344,8 @@ def values(statement: Statement) -> list[Expr]:
         return [statement.value]
     if isinstance(statement, Store):
         return [*statement.index, statement.value]
+    if isinstance(statement, Write):
+        return [statement.row, statement.column, *statement.values]
     if isinstance(statement, Array):
         sizes = [size for size in statement.sizes if isinstance(size, Expr)]
         return [*sizes, *([statement.value] if statement.value else [])]
@@ -364,6 +375,8 @@ def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
         if isinstance(statement, Store):
             index = tuple(map(change, statement.index))
             return replace(statement, index=index, value=change(statement.value))
+        if isinstance(statement, Write):
+            return Write(change(statement.row), change(statement.column), tuple(map(change, statement.values)))
         if isinstance(statement, Array):
             return replace(statement, value=statement.value and change(statement.value))
         if isinstance(statement, For):

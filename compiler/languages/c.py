@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from ..core.profiles import SineContract
 from ..kernel.kernel import Kernel
 from .dialect import Dialect, Parts
+from .instructions import C_TILE
 from .interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
@@ -202,6 +203,12 @@ VECTORS = f"""\
 """The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
 
 
+REFUSED = """\
+#if !defined(__GNUC__)
+#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
+#endif"""
+"""What other compilers say: C99 has no vector type with operators."""
+
 STACK = "stack: {stack} bytes at most, without optimisation too"
 """What a denoiser's text says of the thread that calls it."""
 
@@ -276,6 +283,20 @@ class C(Arguments):
     max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
     calls_vectors = True
+    casts = True
+    byte = "uint8_t"
+    own = "wamnet_"
+    transforms = True
+    tiles = (16, 8, 4)
+    dot_of_bytes = "wamnet_dot(&{total}, &{weights}, {place});"
+    weight_vector = "*(const wamnet_vector *)(weights + ({index}) * LANES)"
+    wide = False
+    launches = (
+        "wamnet_pixel one pixel: call that from your own loops",
+        "wamnet_pixel {columns} x {rows} pixels from (x, y) on:\n"
+        "call that from your own loops, for each x that is a multiple of {columns} and each y of {rows}",
+        "",
+    )
     unroll = "WAMNET_UNROLL"
     magnitude = "fabsf({0})"
     clamp = "wamnet_clamp"
@@ -347,8 +368,18 @@ class C(Arguments):
         """Return the lines of a kernel that is data, up to its first statement."""
         names = ("float", "math", "stdbool", "stdint")
         head = [*includes(DENOISE, *names), self.unordered[parts.bounded]]
-        vectors = [STRAIGHT, VECTORS] if kernel.weights.lanes > 1 else []
-        top = [*head, FUSED if vectors else UNFUSED, parts.top, *vectors]
+        sizes, functions = parts.top.split("\nstatic void", 1) if kernel.functions else (parts.top, "")
+        functions = f"static void{functions}" if functions else ""
+        if kernel.weights.dtype == "int32":
+            head = [*includes(DENOISE, *names, "string"), sizes, STRAIGHT, C_TILE]
+            top = [*head]
+        elif kernel.weights.lanes == 1:
+            top = [*head, UNFUSED, parts.top]
+        elif kernel.functions:
+            vectors = gnu_vectors(str(kernel.weights.lanes))
+            top = [*head, REFUSED, FUSED, STRAIGHT, vectors, sizes, functions]
+        else:
+            top = [*head, FUSED, sizes, STRAIGHT, VECTORS]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
         if kernel.step[0].value != 1:
             said = "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written\n   to `result`, the whole picture's array."
@@ -382,9 +413,27 @@ class C(Arguments):
             "{",
         ]
 
+    def fitted(self, kernel: Kernel) -> Dialect:
+        """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have."""
+        found = super().fitted(kernel)
+        found.calls_vectors = not kernel.functions
+        return found
+
+    def transform_head(self, name: str, kind: str) -> str:
+        """Return the first lines of a transform."""
+        return f"static {super().transform_head(name, kind)}"
+
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"({kind} *)({name} + {index} * LANES)"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of one value in all lanes."""
+        return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
+
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of the vector type."""
-        return "wamnet_vector"
+        return {"float32": "wamnet_vector", "int32": "wamnet_sums"}[dtype]
 
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""
@@ -392,7 +441,10 @@ class C(Arguments):
 
     def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
         """Return a component of such an array, or the address of a vector."""
-        return f"{name}[{index}]" if number else f"{name} + ({index}) * LANES"
+        if number:
+            return f"{name}[{index}]"
+        address = f"{name} + ({index}) * LANES"
+        return address if self.calls_vectors else f"*(wamnet_vector *)({address})"
 
     def _of_paths(self, kernel: Interface) -> list[str]:
         """Return the functions of a path kernel up to the statements of a pixel."""

@@ -16,6 +16,7 @@ A dialect is all that the emitters know of a language, for every role of a kerne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +90,7 @@ class Dialect:
     magnitude: str = "fabs({0})"
     clamp: str = "clamp"
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    byte: str = "uchar"
     scalars: Mapping[str, str] = types
     qualifiers: Mapping[str, str] = {}
     table: str
@@ -109,11 +111,31 @@ class Dialect:
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     painted: str = ""
     unroll: str = ""
+    casts: bool = False
+    dot_of_bytes: str = ""
+    instructions: str = ""
+    own: str = ""
+    transforms: bool = False
+    tiles: tuple[int, ...] = (4,)
+    words: str = ""
     widens: bool = True
+    wide: bool = True
     calls_vectors: bool = False
     vector_operations: Mapping[str, str] = {}
     weight_vector: str = "w[{index}]"
     wait: str = ""
+    texel: str = ""
+    pixel_begin: tuple[str, ...] = ()
+    pixel_end: tuple[str, ...] = ()
+    shared_array: str = ""
+    group: tuple[int, int] | None = None
+    largest_shared: int = 2**15
+    grouped: Mapping[str, Any] = {}
+    vectors: Type | None = None
+    launches: tuple[str, str, str] = ("", "", "")
+    aligned: tuple[str, str] = ("", "")
+    local_place: tuple[str, str] = ("", "")
+    group_place: tuple[str, str] = ("", "")
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -148,10 +170,24 @@ class Dialect:
         """Return the text of a kernel up to its first statement."""
         raise NotImplementedError
 
-    @property
-    def arguments(self) -> str:
-        """Return how a denoiser is called."""
-        return self.said[DENOISE]
+    def called(self, kernel: Kernel) -> str:
+        """Return how a denoiser is called: what its arguments are, and how many items are started."""
+        said, (one, row, group) = self.said[DENOISE], self.launches
+        if kernel.weights.lanes > 1:
+            said = said.replace(*self.aligned)
+        if not one:
+            one = row = group = said
+        if kernel.group:
+            across, down = kernel.group
+            return said.replace(one, group).replace("{group}", f"{across} x {down}")
+        return said if kernel.step[0].value == 1 else said.replace(one, row)
+
+    def placed(self, home: str, weight: str, where: str) -> Dialect:
+        """Return the dialect of a target whose weights are elsewhere."""
+        found = copy(self)
+        said = {DENOISE: f"{self.said[DENOISE]}.\nWeights {where}, whatever stands above"}
+        vars(found).update(target=f"{self.target}:{home}", home=home, weight=weight, said=said)
+        return found
 
     def cast(self, dtype: str, text: str) -> str:
         """Return the text of a number converted to another kind."""
@@ -236,6 +272,34 @@ class Dialect:
 
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
+    def fitted(self, kernel: Kernel) -> Dialect:
+        """Return the dialect for a kernel: with other words where it has work groups."""
+        found = copy(self)
+        vars(found).update(self.grouped if kernel.group else {}, vectors=kernel.weights)
+        if kernel.weights.dtype == "int32":
+            found.first = (*self.first, *self.extensions)
+        return found
+
+    extensions: tuple[str, ...] = ()
+
+    def group_memory(self, kernel: Kernel) -> list[str]:
+        """Return the declarations of memory that a group shares."""
+        arrays = [s for s in kernel.body if getattr(s, "space", "") == "group"]
+        return [self.shared_array.format(kind=self.scalars[a.type.dtype], name=a.name, count=a.sizes[0].value) for a in arrays]
+
+    def item_place(self) -> list[str]:
+        """Return the declarations of where an item is in its group, and of its first pixel."""
+        inside = [self.cast("int32", text) for text in self.local_place]
+        column, row = (self.cast("int32", text) for text in self.group_place)
+        places = {
+            "local_x": inside[0],
+            "local_y": inside[1],
+            "item": "local_y * GROUP_WIDTH + local_x",
+            "x": f"{column} * (GROUP_WIDTH * PIXELS) + local_x",
+            "y": f"{row} * GROUP_HEIGHT + local_y",
+        }
+        return [f"    {self.index(name, text)}" for name, text in places.items()]
+
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type."""
         return f"{self.scalars[dtype]}{lanes}"
@@ -255,6 +319,14 @@ class Dialect:
     def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
         """Return a component of such an array, or a vector."""
         return f"{name}[({index}) / 4][({index}) % 4]" if number else f"{name}[{index}]"
+
+    def transform_head(self, name: str, kind: str) -> str:
+        """Return the first lines of a transform: `from` in steps of `step`, `to` in those of `leap`."""
+        return f"void {self.own}{name}(const {kind} *from, int step, {kind} *to, int leap)\n{{"
+
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"{name} + {index}"
 
     def let_value(self, kind: str, name: str, value: str) -> str:
         """Return the declaration of a value that never changes."""

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from ..core.profiles import OPENCL_SINE
 from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
+from .instructions import OPENCL_GROUP, OPENCL_TILE
 from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
 
@@ -89,6 +90,24 @@ class OpenCL(Arguments):
     }
 
     unroll = "#pragma unroll"
+    casts = True
+    transforms = True
+    tiles = (16, 8, 4)
+    dot_of_bytes = "{total} = DOT({total}, {weights}, ((const fours *)({place}))->bytes);"
+    words = "cl_khr_integer_dot_product where -cl-std=CL3.0 and the device have it, else shifts"
+    group = (16, 8)
+    launches = (
+        "Global size: at least (width, height)",
+        "Global size: at least (ceil(width / {columns}), ceil(height / {rows}))",
+        "Groups of {group} items; global size: (ceil(width / {columns}), height), in whole groups",
+    )
+    aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
+    grouped = {
+        "heading": "__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))\nvoid {entry}"
+    }
+    shared_array = "__local {kind} {name}[{count}];"
+    local_place = ("get_local_id(0)", "get_local_id(1)")
+    group_place = ("get_group_id(0)", "get_group_id(1)")
     wait = "barrier(CLK_LOCAL_MEM_FENCE);"
     vector_operations = {
         "absolute": "as_{type}(as_int{lanes}({0}) & 0x7fffffff)",
@@ -112,6 +131,10 @@ class OpenCL(Arguments):
         line = f"    __global const {vector} *w = (__global const {vector} *)weights;"
         return [line] if kind.lanes > 1 else []
 
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"{name}.all + {index}"
+
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""
         return f"union {{ {kind} all[{count}]; float number[{count} * {lanes}]; }} {name};"
@@ -130,7 +153,9 @@ class OpenCL(Arguments):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         if parts.kernel is not None and parts.kernel.weights.lanes > 1:
-            return [*super().top(kernel, parts), BUILTINS]
+            words = OPENCL_GROUP if parts.kernel.group else OPENCL_TILE
+            instructions = [words] if parts.kernel.weights.dtype == "int32" else []
+            return [BUILTINS, *instructions, *super().top(kernel, parts)]
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
         return [*lanes, *super().top(kernel, parts)]
 

@@ -55,8 +55,15 @@ class Buffers(Dialect):
         place = [self.index(names[0], f"{column}{along}"), self.index(names[1], f"{row}{down}")]
         end = [f"    if ({outside}) {{", "        return;", "    }"]
         vectors = self.weights_as_vectors(kernel.weights)
-        opening = [*sizes, *(f"    {line}" for line in place), *end, *vectors]
+        if kernel.group is None:
+            opening = [*sizes, *(f"    {line}" for line in place), *end, *vectors]
+        else:
+            opening = [*self.in_function(kernel), *vectors, *sizes, *self.item_place()]
         return [*self.top(interface, parts), *self.head(interface), *opening]
+
+    def in_function(self, kernel: Kernel) -> list[str]:
+        """Return the declarations of a group's memory, where they are inside the function."""
+        return [f"    {line}" for line in self.group_memory(kernel)]
 
     @staticmethod
     def step(step: Expr) -> str:

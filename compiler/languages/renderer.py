@@ -38,6 +38,7 @@ from ..kernel.kernel import (
     Store,
     Type,
     View,
+    Write,
     const,
     name,
     parts,
@@ -71,6 +72,15 @@ def binding(template: str) -> int:
     return UNARY if template[0] in "-!" else ATOM
 
 
+def framed(
+    dialect: Dialect, kernel: Interface, parts: Parts, header: Sequence[str], lines: Sequence[str]
+) -> str:
+    """Return a kernel's source: a comment, what the kernel is bound to, its statements, its end."""
+    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+    begin, end = dialect.begin(kernel, parts), dialect.ends[kernel.role]
+    return dialect.finished("\n".join([*dialect.first, *comment, begin, *lines, end])) + "\n"
+
+
 def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
     """Yield the arrays that statements read and write, and the types of what is read and written."""
     for statement in walk(body):
@@ -95,8 +105,8 @@ class Renderer(Lines):
     """Prints one kernel in one language."""
 
     def __init__(self, dialect: Dialect, kernel: Kernel, bounded: bool, packed: NDArray[np.float32]) -> None:
-        self.dialect, self.bounded, self.kernel = dialect, bounded, housed(kernel, dialect, packed)
-        kernel = self.kernel
+        self.dialect, self.bounded = dialect.fitted(kernel), bounded
+        kernel = self.kernel = housed(kernel, dialect, packed)
         self.lines: list[str] = []
         self.depth = 1
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
@@ -136,7 +146,7 @@ class Renderer(Lines):
         takes = [(name, self.kind(kind)) for name, kind in function.takes]
         result = function.result
         if result is None:
-            self.lines += [*self.dialect.transform(function.name, function.takes), "{"]
+            self.lines.append(self.dialect.transform_head(function.name, self.kind(function.takes[0][1])))
         else:
             self.lines += [self.dialect.function_head(function.name, takes, self.kind(result.type))]
         self.depth = 1
@@ -150,7 +160,7 @@ class Renderer(Lines):
     def kind(self, kind: Type) -> str:
         """Return the name of a type."""
         if kind.lanes == 1:
-            return self.dialect.scalars[kind.dtype]
+            return self.dialect.byte if kind.dtype == "uint8" else self.dialect.scalars[kind.dtype]
         return self.dialect.vector_kind(kind.dtype, kind.lanes)
 
     def variable(self, kind: Type, kept: bool) -> str:
@@ -167,7 +177,7 @@ class Renderer(Lines):
 
     def _const(self, value: Expr) -> tuple[str, int]:
         """Return a constant."""
-        return self.dialect.number(value.value, value.type.dtype), ATOM
+        return self.dialect.number(value.value, "int32" if value.type.dtype == "uint8" else value.type.dtype), ATOM
 
     def _name(self, value: Expr) -> tuple[str, int]:
         """Return a name."""
@@ -235,7 +245,7 @@ class Renderer(Lines):
         """Return an element of an image, of the weights, or of an array."""
         array, index = str(value.value), value.args
         if array.startswith(IMAGE):
-            return self._pixel(array, index), ATOM
+            return self._pixel(array, index, value.type.lanes), ATOM
         if array == WEIGHTS:
             lanes = value.type.lanes
             place = self.text(index[0])
@@ -244,14 +254,16 @@ class Renderer(Lines):
             ), ATOM
         return self.element(array, index, value.type.lanes), ATOM
 
-    def _pixel(self, array: str, index: Sequence[Expr]) -> str:
-        """Return a channel of an image's pixel, or the value at a position of a row."""
+    def _pixel(self, array: str, index: Sequence[Expr], lanes: int) -> str:
+        """Return a channel of an image's pixel, all of its channels, or the value at a position of a row."""
         found = self.kernel.interface.named(array)
         assert found is not None, array
         channels = int(found.shape[-1])
+        if lanes > 1:
+            row, column = map(self.text, index)
+            return self.dialect.texel.format(image=array.removeprefix(IMAGE), row=row, column=column, part="rgba"[:lanes])
         if len(index) == 2:
-            row, position = index
-            return f"{array}[{self.text(row, 11)} * width * {channels} + {self.text(position, 11)}]"
+            return f"{array}[{self.text(index[0], 11)} * width * {channels} + {self.text(index[1], 10)}]"
         row, column, channel = map(self.text, index)
         return self.dialect.pixel.format(
             image=array.removeprefix(IMAGE), channels=channels, row=row, column=column, c=channel
@@ -287,8 +299,9 @@ class Renderer(Lines):
             self._line(self.dialect.index(statement.name, self.text(statement.value)))
             return
         if kind.lanes > 1 and self.dialect.calls_vectors:
-            self._line(f"{self.kind(kind)} {statement.name};")
-            self._vector_call(f"&{statement.name}", statement.value, False)
+            factors = kind.dtype == "int32"
+            self._line(f"{'wamnet_bytes' if factors else self.kind(kind)} {statement.name};")
+            self._vector_call(f"&{statement.name}", statement.value, False, not factors)
             return
         text = self.text(statement.value)
         self._line(self.dialect.let_value(self.variable(kind, statement.kept), statement.name, text))
@@ -300,7 +313,9 @@ class Renderer(Lines):
         kind = self.variable(statement.type, statement.kept)
         sizes = [self.text(size) if isinstance(size, Expr) else str(size) for size in statement.sizes]
         if statement.name in self.mixed:
-            self._line(self.dialect.mixed_array(kind, statement.name, sizes[0], statement.type.lanes))
+            size = statement.sizes[0]
+            count = self.text(size, 11) if isinstance(size, Expr) else str(size)
+            self._line(self.dialect.mixed_array(kind, statement.name, count, statement.type.lanes))
             return
         first = self.text(statement.value) if statement.value else ""
         self._line(self.dialect.memory(kind, statement.name, sizes, first))
@@ -311,20 +326,56 @@ class Renderer(Lines):
         if statement.array == RESULT:
             return self._result(index, value)
         target = self.element(statement.array, index, value.type.lanes)
+        if value.op == "dot4":
+            self._line(self._dotted(target, *value.args))
+            return
         if value.type.lanes > 1 and self.dialect.calls_vectors:
             self._vector_call(target if statement.array in self.mixed else f"&{target}", value, statement.add)
             return
-        self._line(f"{target} {'+=' if statement.add else '='} {self.text(value)};")
+        sign = "+" if statement.add else ""
+        if sign and value.op == "negative":
+            sign, value = "-", value.args[0]
+        self._line(f"{target} {sign}= {self.text(value)};")
 
-    def _vector_call(self, target: str, value: Expr, add: bool) -> None:
-        """Write a change of a vector as a call of one of the language's own functions."""
-        if value.op == "splat":
+    def _dotted(self, total: str, weights: Expr, four: Expr) -> str:
+        """Return the statement that adds products of bytes to a sum."""
+        if four.op == "load" and four.type.lanes > 1:
+            place = f"{four.value} + {self.text(four.args[0], 10)}"
+            return self.dialect.dot_of_bytes.format(total=total, weights=self.text(weights), place=place)
+        return f"{total} = wamnet_dots({total}, {self.text(weights)}, {self.text(four)});"
+
+    def _pack4(self, value: Expr) -> tuple[str, int]:
+        """Return four values as the bytes of a word."""
+        return f"wamnet_packed({', '.join(self.text(each) for each in value.args)})", ATOM
+
+    def _bits(self, value: Expr) -> tuple[str, int]:
+        """Return words of weights read as floats."""
+        return f"wamnet_numbers({self.text(value.args[0])})", ATOM
+
+    def _convert(self, value: Expr) -> tuple[str, int]:
+        """Return values of another kind."""
+        if self.kernel.group and self.kernel.weights.dtype == "int32" and value.type.lanes > 1:
+            return f"wamnet_floats({self.text(value.args[0])})", ATOM
+        if value.type.lanes == 1 and self.dialect.casts:
+            return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY
+        return self._operation(value)
+
+    def _vector_call(self, target: str, value: Expr, add: bool, starts: bool = True) -> None:
+        """Write a change of a vector as a call of one of the language's own functions.
+
+        `starts`: words of weights are where a sum begins, not factors.
+        """
+        if value.op == "convert":
+            place = self.element(value.args[0].value, value.args[0].args, value.type.lanes)
+            call, given = "floats", [f"&{place}"]
+        elif value.op == "splat":
             call, given = "clear", []
         elif value.op == "multiply":
             factor, number = value.args
             call, given = "add_product", [f"&{self.text(factor)}", self.text(number.args[0])]
         elif value.value == WEIGHTS:
-            call, given = "load", [f"weights + {self.text(value.args[0], 11)} * LANES"]
+            call = {"float32": "load", "int32": "start"}[value.type.dtype] if starts else "weights"
+            given = [f"weights + {self.text(value.args[0], 11)} * LANES"]
         else:
             place = self.element(value.value, value.args, value.type.lanes)
             call = "add" if add else "load" if value.value in self.mixed else "store"
@@ -341,6 +392,16 @@ class Renderer(Lines):
             number, of = divmod(int(channel.value), each)
             result, shown["i"] = f"{RESULT}_{number}", str(of)
         self._line(self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown))
+
+    def _write_write(self, statement: Write) -> None:
+        """Write all channels of a pixel."""
+        for line in self.dialect.pixel_begin:
+            self._line(line)
+        for channel, value in enumerate(statement.values):
+            self._result((statement.row, statement.column, const(channel)), value)
+        row, column = self.text(statement.row), self.text(statement.column)
+        for line in self.dialect.pixel_end:
+            self._line(line.format(row=row, column=column))
 
     @property
     def channels(self) -> int:
@@ -396,8 +457,15 @@ class Renderer(Lines):
 
     def _write_call(self, statement: Call) -> None:
         """Write a call of a function on views."""
-        self._line(self.dialect.transform_call(statement.function, [self.view(v) for v in statement.views]))
+        given = ", ".join(text for view in statement.views for text in self.view(view))
+        self._line(f"{self.dialect.own}{statement.function}({given});")
 
     def view(self, view: View) -> tuple[str, str]:
         """Return the address of a view, and its step."""
-        return self.element(view.array, view.index, 0), self.text(view.step)
+        array, index = self.arrays[view.array], view.index
+        rows = "".join(f"[{self.text(each)}]" for each in index[:-1])
+        last = self.text(index[-1], 10)
+        if view.array in self.mixed:
+            place = self.dialect.mixed_address(view.array, self.text(index[-1], 11), self.kind(array.type))
+            return place, self.text(view.step)
+        return f"{view.array}{rows}" + (f" + {last}" if last != "0" else ""), self.text(view.step)

@@ -38,7 +38,7 @@ from ..core.weights import tables
 from ..languages import interface
 from ..languages.dialect import Dialect, Parts
 from ..languages.interface import ENCODE
-from ..schedules.emit import framed
+from ..languages.renderer import framed
 from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, Values, kinds, names
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}

@@ -31,7 +31,8 @@ from ..languages.dialect import Dialect, Parts
 from ..languages.interface import Interface
 from ..plan import sine_contract
 from ..proof import bounds
-from ..schedules.emit import framed
+from ..languages.renderer import framed
+from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
 from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
@@ -92,7 +93,7 @@ def compile_encode(
     dialect = chosen.dialect
     if dialect:
         _check_images(images, dialect)
-    arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[interface.ENCODE] if dialect else PRINTED
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
     if dialect is None:

@@ -34,6 +34,7 @@ from ..languages import interface
 from ..languages.interface import Interface
 from ..languages.openings import IMAGES
 from ..plan import sine_contract
+from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
 from . import emit_path
 from .emit_path import Encoding
@@ -147,7 +148,7 @@ def compile_path(
     if programs.rays:
         written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
-    arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[interface.PATH] if dialect else PRINTED
     if images:
         arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))

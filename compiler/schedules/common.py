@@ -213,6 +213,15 @@ class Nest:
             return value
         return apply("select", name("inside", Type("bool")), value, const(0.0))
 
+    def texel(self, image: Image) -> Expr:
+        """Return all channels at `row` and `column` under the border rule."""
+        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), kind=FLOAT.of(image.channels))
+        if image.channels == 1:
+            return self.pixel(image, 0)
+        if self.gather.window.border == "clamp":
+            return value
+        return apply("select", name("inside", Type("bool")), value, splat(const(0.0), image.channels))
+
 
 def clamp(value: Expr, count: Expr) -> Expr:
     """Return the nearest index below `count`."""

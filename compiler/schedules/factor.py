@@ -36,7 +36,7 @@ from ..core.trace import trace
 from ..core.verify import verify
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from .emit import kernel_gather
+from .common import kernel_gather
 
 Array = NDArray[np.float64]
 

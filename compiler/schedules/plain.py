@@ -29,10 +29,20 @@ class Plainly(Nest):
         body: list[Statement] = []
         for group in self.groups:
             body += self.of_group(group)
+        body += self.outputs()
+        return self.kernel(body, constants, weights=self.weights)
+
+    weights = Type()
+
+    def outputs(self) -> Body:
+        """Return the statements that write the output."""
         index = self.program.outputs[0][1]
         shaped = bool(self.program.nodes[index].type.shape)
-        body += output(self.program, Y, X, lambda i: self.read(index, i) if shaped else self.read(index))
-        return self.kernel(body, constants)
+        return output(self.program, Y, X, lambda i: self.read(index, i) if shaped else self.read(index))
+
+    def count(self, index: int) -> int:
+        """Return the elements of a value's array."""
+        return self.program.nodes[index].type.shape[0]
 
     def component(self, node: Node) -> Expr:
         """Return one component of another group's vector."""
@@ -51,11 +61,10 @@ class Plainly(Nest):
             return [*self.statements(group, self.read, 1)]
         i, lane = name("i"), lambda k: self.read(k, name("i"))
         kept = [k for k in group if self.is_array(k)]
-        stores = {k: Store(f"v{k}", (i,), name(f"t{k}", Type(self.program.nodes[k].type.dtype))) for k in kept}
         lines: list[Statement] = []
-        for let, k in zip(self.statements(group, lane, 1), group, strict=True):
-            lines += [let, *([stores[k]] if k in stores else [])]
-        return [self.span(group), *map(self.array, kept), loop("i", node.type.shape[0], *lines)]
+        for let, k in zip(self.statements(group, lane, self.lanes), group, strict=True):
+            lines += [let, *([Store(f"v{k}", (i,), name(let.name, let.value.type))] if k in kept else [])]
+        return [self.span(group), *map(self.array, kept), loop("i", self.count(index), *lines)]
 
     def read(self, index: int, lane: Expr | None = None) -> Expr:
         """Return a value, or one component of it."""

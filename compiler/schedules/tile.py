@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import weights
-from ..core.ir import Image, Node, Program
+from ..core.ir import DTYPES, Image, Node, Program
 from ..core.sums import is_split
 from ..core.weights import Slot
 from ..kernel.kernel import (
@@ -49,10 +49,55 @@ from ..kernel.kernel import (
     splat,
 )
 from ..languages.interface import IMAGE, RESULT
-from .common import HEIGHT, WIDTH, X, Y, Nest, clamp, kernel_gather, loop, weight
+from .common import HEIGHT, WIDTH, X, Y, Nest, clamp, groups_of, kernel_gather, loop, output_channels, weight
 
 PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
 I, J, P, DX, DY, LEFT, TOP, BLOCK = map(name, ("i", "j", "p", "dx", "dy", "left", "top", "block"))
+
+
+LARGEST_PRIVATE = 2**20
+"""Most bytes of arrays in a work item: half of the smallest stack that glibc gives a thread, which executors
+grant. A quarter kept spectra from layers of 64 neurons, which take a third of the time with them."""
+
+ON_VECTORS = (
+    *("add", "subtract", "multiply", "divide", "negative", "absolute", "minimum", "maximum", "floor"),
+    *("reciprocal", "sqrt", "sin", "cos", "less", "less_equal", "greater", "greater_equal", "select"),
+    *("bitwise_and", "bitwise_xor", "right_shift", "convert"),
+)
+"""Operations that languages have on vectors."""
+
+
+def refused_by_vectors(program: Program, most_channels: int) -> str:
+    """Return why the values of a program cannot all be vectors, or nothing."""
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter", "input", "affine"):
+            continue
+        if node.op not in ON_VECTORS:
+            return f"%{index} is {node.op}, which has no form on vectors"
+        if not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold {', '.join(f'{t}[n]' for t in DTYPES)}"
+    if reason := _others_between_loops(program):
+        return reason
+    output = program.nodes[program.outputs[0][1]]
+    if (channels := output_channels(program)) > most_channels:
+        return f"it writes {channels} channels, of at most {most_channels}"
+    if any(node.op != "affine" for node in readers_of_window(program)):
+        return "something besides an affine map reads the window"
+    if output.op in ("constant", "parameter", "input"):
+        return "the output is not computed"
+    return ""
+
+
+def _others_between_loops(program: Program) -> str:
+    """Return which value that is not a float another loop would have to read from an array, or nothing."""
+    group_of = {index: number for number, group in enumerate(groups_of(program)) for index in group}
+    for reader, node in enumerate(program.nodes):
+        for index in node.args:
+            known = program.nodes[index]
+            other = known.op != "constant" and known.type.dtype != "float32"
+            if other and group_of.get(index) != group_of[reader]:
+                return f"%{index} is {known.type}, which %{reader} in another loop reads"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -169,7 +214,11 @@ class Tiled(Nest):
         for group in self.groups:
             body += self.of_group(group)
         body += self.outputs()
-        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.vector)
+        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weight_type())
+
+    def weight_type(self) -> Type:
+        """Return the type of an element of the weights."""
+        return self.vector
 
     # ---- the images around the pixels --------------------------------------------------------------------
 
@@ -262,15 +311,13 @@ class Tiled(Nest):
         source, blocks = self.program.nodes[node.args[0]], self.blocks(node.type.shape[0])
         block = BLOCK if blocks.count > 1 else const(0)
         at, n_in = block * blocks.vectors, source.type.shape[0]
-        first = self.offset(node["weight"]) // self.lanes + block * (n_in * blocks.vectors)
+        first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
         sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors))]
         starts = [Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
         if source.op == "input":
             products = self.windowed(blocks, first)
         else:
-            held = self.total(node.args[0])
-            value = load(f"v{node.args[0]}", P * held * LANES + I)
-            products = [self.multiplied(blocks, const(n_in), first, value, "sum")]
+            products = self.layer(blocks, first, node.args[0], n_in)
         ends = [
             Store(f"v{index}", (P * blocks.total + at + j,), self.ended(load("sum", P, const(j), kind=self.sum_type)))
             for j in range(blocks.vectors)
@@ -278,6 +325,15 @@ class Tiled(Nest):
         body = (*sums, self.each_pixel(*starts), *products, self.each_pixel(*ends))
         nest = loop("block", blocks.count, *body) if blocks.count > 1 else Block(body)
         return [self.mapped(index, node), self.array(index), nest]
+
+    def inputs(self, node: Node) -> int:
+        """Return the rows of weights of an affine map."""
+        return self.program.parameters[str(node["weight"])].shape[1]
+
+    def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
+        """Return the products of a layer's values."""
+        value = load(f"v{source}", P * self.total(source) * LANES + I)
+        return [self.multiplied(blocks, const(numbers), first, value, "sum")]
 
     @property
     def zero(self) -> Expr:

@@ -15,8 +15,8 @@ from functools import partial
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
-from ...compiler.schedules.emit import kernel_gather
-from ...compiler.schedules.emit_dot import Dot
+from ...compiler.schedules.common import kernel_gather
+from ...compiler.schedules.schedules import Dot
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError

@@ -21,7 +21,7 @@ from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
-from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
 from .executor import Executor, Kernel, Memory
 from .images import Images

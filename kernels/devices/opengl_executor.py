@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
 from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
-from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
-from ...compiler.schedules.glsl_compute import SHADER_VERSION
+from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
+from ...compiler.languages.glsl import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
 from .executor import Denoiser, Executor, Kernel, Memory, Size, is_denoiser

@@ -31,7 +31,7 @@ from ...compiler.scenes import emit_path
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import compile_path
-from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import windows
 from ...refimpl.network.dataset import FEATURES, encode_sums
 from ...refimpl.network.denoise import Model

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.interface import BLOCK
-from ...compiler.schedules.glsl_compute import SHADER_VERSION
+from ...compiler.languages.glsl import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.executor import Kernel, Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor

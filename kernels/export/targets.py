@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
 from ...compiler.languages.interface import BLOCK, TABLE
-from ...compiler.schedules.emit_inlined import LARGEST_WEIGHTS
+from ...compiler.schedules.inlined import LARGEST_WEIGHTS
 from ...compiler.schedules.schedules import PLAIN
 from . import tools
 

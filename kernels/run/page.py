@@ -37,8 +37,8 @@ from ...compiler.scenes.lower_encode import feature_rays, layers_of, learned_ray
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
-from ...compiler.schedules.emit import kernel_gather, output_channels
-from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
+from ...compiler.schedules.common import kernel_gather, output_channels
+from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...compiler.variants import parse, vary
 from ...refimpl import rng
 from ...refimpl.errors import InputError

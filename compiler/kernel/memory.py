@@ -1,7 +1,6 @@
 """The memory of a kernel that runs in NumPy [run.py], and the checks of every access.
 
-Memory is an array (components, columns) with a column for each item, for each group, or for all. Bytes may be
-read as words and words as bytes: the lowest byte is the first.
+Memory is an array (components, columns) with a column for each item, for each group, or for all.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 
 from .domain import STORED, computed
 from .kernel import FLOAT, Type
-from .sizes import BYTES
 from .verify import KernelError
 
 NOBODY, SEVERAL = -1, -2
@@ -60,19 +58,10 @@ class Items:
 
 
 class Memory:
-    """One array; `space`: `item`, `group`, `read` (weights, images) or `result`; `dtype`: as it is stored."""
+    """One array; `space`: `item`, `group`, `read` (weights, images) or `result`."""
 
-    def __init__(
-        self,
-        name: str,
-        data: NDArray[Any],
-        kind: Type,
-        sizes: tuple[int, ...],
-        space: str,
-        dtype: str = "float32",
-    ) -> None:
-        self.name, self.data, self.kind, self.sizes = name, data, kind, sizes
-        self.space, self.dtype = space, dtype
+    def __init__(self, name: str, data: NDArray[Any], kind: Type, sizes: tuple[int, ...], space: str) -> None:
+        self.name, self.data, self.kind, self.sizes, self.space = name, data, kind, sizes, space
         self.written = None if space == "read" else np.zeros(data.shape, np.bool_)
         if space in ("group", "result"):
             self.writer = np.full(data.shape, NOBODY, np.int64)
@@ -90,17 +79,18 @@ class Memory:
 
     # ---- places ------------------------------------------------------------------------------------------
 
-    def place(self, items: Items, index: Sequence[Any], lanes: int, dtype: str) -> tuple[Memory, Any]:
+    def place(self, items: Items, index: Sequence[Any], kind: Type) -> tuple[Memory, Any]:
         """Return this memory and the component where an access begins: for each item, or for all."""
-        ratio = BYTES[dtype] // BYTES[self.dtype] if dtype != self.dtype else 1
-        if len(index) == len(self.sizes) and Type(dtype, lanes) == self.kind:
-            return self, self._element(items, index, self.sizes) * (lanes * ratio)
+        lanes = kind.lanes
+        if len(index) == len(self.sizes) and kind == self.kind:
+            return self, self._element(items, index, self.sizes) * lanes
         if len(self.sizes) == 3 and len(index) == 2:  # an image's row and a position in it, or a pixel
             height, width, channels = self.sizes
             sizes = (height, width) if lanes > 1 else (height, width * channels)
             return self, self._element(items, index, sizes) * (channels if lanes > 1 else 1)
-        size = len(self.data) // (lanes * ratio)
-        return self, self._element(items, index, (size,)) * (lanes * ratio)
+        if self.kind.lanes == 1:  # elements side by side, from any one on
+            return self, self._element(items, index, (len(self.data) - lanes + 1,))
+        return self, self._element(items, index, (len(self.data) // lanes,)) * lanes
 
     def _element(self, items: Items, index: Sequence[Any], sizes: Sequence[int]) -> Any:
         """Return the number of an element, in the order of C."""
@@ -113,8 +103,7 @@ class Memory:
 
     def read(self, items: Items, place: Any, kind: Type) -> Any:
         """Return what is there: (items,), (lanes, items), or one number that all items read."""
-        ratio = BYTES[kind.dtype] // BYTES[self.dtype] if kind.dtype != self.dtype else 1
-        count, columns = kind.lanes * ratio, self.columns(items)
+        count, columns = kind.lanes, self.columns(items)
         if self.space == "group":
             self._reads(items, place, count)
         if isinstance(place, int):
@@ -128,8 +117,7 @@ class Memory:
             written = self.written if self.written is None else self.written[each, columns]
         if written is not None and not written.all():
             items.refuse(~written, f"{self.name} is read before it is written")
-        value = joined(there, kind) if ratio > 1 else there
-        value = value if kind.dtype in ("float32", "bool", "uint32") else computed(value)
+        value = there if kind.dtype in ("float32", "bool", "uint32") else computed(there)
         if kind.lanes == 1:
             return value[0].copy()
         return value.copy() if value.ndim == 2 else value[:, None]
@@ -137,10 +125,8 @@ class Memory:
     def write(self, items: Items, place: Any, kind: Type, value: Any) -> None:
         """Write a value for the active items."""
         self._check_range(items, kind, value)
-        ratio = BYTES[kind.dtype] // BYTES[self.dtype] if kind.dtype != self.dtype else 1
         value = np.broadcast_to(value, (kind.lanes, items.count))
-        value = split(value, ratio, kind) if ratio > 1 else value
-        count = kind.lanes * ratio
+        count = kind.lanes
         if isinstance(place, int) and self.space == "item" and self.written is not None:
             rows = slice(place, place + count)
             np.copyto(self.data[rows], value, where=items.mask, casting="unsafe")
@@ -212,31 +198,15 @@ class Memory:
 
 
 class Part:
-    """Elements of an array that a function sees: the first one's component, and how far they are apart."""
+    """Elements of an array that a function sees, from a component on."""
 
-    def __init__(self, memory: Memory, first: Any, step: Any) -> None:
-        self.memory, self.first, self.step = memory, first, step
+    def __init__(self, memory: Memory, first: Any) -> None:
+        self.memory, self.first = memory, first
 
-    def place(self, items: Items, index: Sequence[Any], lanes: int, dtype: str) -> tuple[Memory, Any]:
+    def place(self, items: Items, index: Sequence[Any], kind: Type) -> tuple[Memory, Any]:
         """Return the memory and the component where an access begins."""
-        memory = self.memory
-        ratio = BYTES[dtype] // BYTES[memory.dtype] if dtype != memory.dtype else 1
-        place = self.first + index[0] * self.step * (lanes * ratio)
-        return memory, items.checked(memory.name, place, len(memory.data) - lanes * ratio + 1)
+        place = self.first + index[0] * kind.lanes
+        return self.memory, items.checked(self.memory.name, place, len(self.memory.data) - kind.lanes + 1)
 
     def settle(self, groups: NDArray[np.bool_]) -> None:
         """Forget nothing: a function on views has no barrier."""
-
-
-def joined(parts: NDArray[Any], kind: Type) -> NDArray[Any]:
-    """Return words (lanes, items) of their bytes."""
-    words = np.ascontiguousarray(parts.reshape(kind.lanes, -1, parts.shape[-1]).transpose(0, 2, 1))
-    whole: NDArray[Any] = words.view(np.float32 if kind.dtype == "float32" else STORED[kind.dtype])[..., 0]
-    return whole
-
-
-def split(value: NDArray[Any], ratio: int, kind: Type) -> NDArray[Any]:
-    """Return the bytes of words (lanes, items)."""
-    words = np.ascontiguousarray(value.astype(np.float32 if kind.dtype == "float32" else STORED[kind.dtype]))
-    each = words.view(np.uint8).reshape(*value.shape, ratio)
-    return each.transpose(0, 2, 1).reshape(-1, value.shape[-1])

@@ -25,6 +25,7 @@ from .kernel import (
     INTEGERS,
     Array,
     Body,
+    Call,
     Expr,
     For,
     Function,
@@ -33,15 +34,14 @@ from .kernel import (
     Let,
     Statement,
     Store,
-    View,
+    Type,
+    Write,
+    apply,
     const,
-    parts,
-    values,
-    walk,
 )
 from .memory import Items, Memory, Part
-from .sizes import BYTES, integer
-from .verify import KernelError, function_arguments, verify
+from .sizes import integer
+from .verify import STEPS, KernelError, verify
 
 Values = Any
 """A number for all items, an array (items,) or (lanes, items)."""
@@ -72,7 +72,6 @@ class Runner:
         height, width = next(iter(images.values())).shape[:2]
         self.items, places = self._items(width, height)
         self.names: dict[str, Values] = {**self.constants, "width": width, "height": height, **places}
-        self.narrow = narrow_accesses(kernel)
         self.memory: dict[str, Memory | Part] = {WEIGHTS: self._weights(weights)}
         for key, image in images.items():
             self.memory[f"{IMAGE}{key}"] = Memory.of_image(f"{IMAGE}{key}", domain.lift(image))
@@ -100,11 +99,10 @@ class Runner:
         return Items(x, y, row // rows * groups[0] + column // columns), places
 
     def _weights(self, weights: NDArray[Any]) -> Memory:
-        """Return the memory of the weights, whose elements may be bytes or words bit by bit."""
+        """Return the memory of the weights, which may be words bit by bit."""
         kind, flat = self.kernel.weights, np.ascontiguousarray(weights).ravel()
-        dtype = self.narrow.get(WEIGHTS, kind.dtype)
-        data = self.domain.lift(flat) if dtype == "float32" else flat.view(STORED[dtype])
-        return Memory(WEIGHTS, data[:, None], kind, (len(flat) // kind.lanes,), "read", dtype)
+        data = self.domain.lift(flat) if kind.dtype == "float32" else flat.view(STORED[kind.dtype])
+        return Memory(WEIGHTS, data[:, None], kind, (len(flat) // kind.lanes,), "read")
 
     # ---- statements --------------------------------------------------------------------------------------
 
@@ -137,11 +135,10 @@ class Runner:
         shared, kind = statement.space == "group", statement.type
         columns = self.items.groups if shared else self.items.count
         sizes = tuple(integer(self.kernel, each) for each in statement.sizes)
-        dtype = self.narrow.get(statement.name, kind.dtype)
-        count = int(np.prod(sizes)) * kind.lanes * BYTES[kind.dtype] // BYTES[dtype]
-        data = np.zeros((count, columns), self.domain.dtype if dtype == "float32" else STORED[dtype])
+        dtype = self.domain.dtype if kind.dtype == "float32" else STORED[kind.dtype]
+        data = np.zeros((int(np.prod(sizes)) * kind.lanes, columns), dtype)
         self.names.pop(statement.name, None)
-        made = Memory(statement.name, data, kind, sizes, statement.space, dtype)
+        made = Memory(statement.name, data, kind, sizes, statement.space)
         self.memory[statement.name] = made
         if statement.value is not None:
             made.write(self.items, 0, kind, self.value(statement.value))
@@ -149,7 +146,7 @@ class Runner:
     def _run_store(self, statement: Store) -> None:
         """Write an element, or add to it."""
         kind, value = statement.value.type, self.value(statement.value)
-        memory, place = self._place(statement.array, statement.index, kind.lanes, kind.dtype)
+        memory, place = self._place(statement.array, statement.index, kind)
         if statement.add:
             read = memory.read(self.items, place, kind)
             value = (
@@ -159,7 +156,7 @@ class Runner:
             )
         memory.write(self.items, place, kind, value)
 
-    def _run_write(self, statement: Any) -> None:
+    def _run_write(self, statement: Write) -> None:
         """Write all channels of a pixel."""
         for channel, value in enumerate(statement.values):
             self._run_store(Store(RESULT, (statement.row, statement.column, const(channel)), value))
@@ -211,23 +208,15 @@ class Runner:
         for memory in self.memory.values():
             memory.settle(active > 0)
 
-    def _run_call(self, statement: Any) -> None:
+    def _run_call(self, statement: Call) -> None:
         """Run a function on views."""
         function = self.functions[statement.function]
-        arrays, steps = function_arguments(function)
         names: dict[str, Values] = {}
         memory: dict[str, Memory | Part] = {}
-        for number, ((array, kind), view) in enumerate(zip(arrays, statement.views, strict=True)):
-            step = self.value(view.step)
-            memory[array] = self._part(view, kind.lanes, kind.dtype, 1 if steps else step)
-            if steps:
-                names[steps[number]] = step
+        for (array, kind), view, step in zip(function.takes, statement.views, STEPS, strict=False):
+            names[step] = self.value(view.step)
+            memory[array] = Part(*self._place(view.array, view.index, kind))
         self._inside(function, names, memory)
-
-    def _part(self, view: View, lanes: int, dtype: str, step: Values) -> Part:
-        """Return the part of an array that a function sees, whose elements are `step` apart."""
-        memory, place = self._place(view.array, view.index, lanes, dtype)
-        return Part(memory, place, step)
 
     def _inside(
         self, function: Function, names: dict[str, Values], memory: dict[str, Memory | Part]
@@ -290,12 +279,12 @@ class Runner:
 
     def _value_load(self, value: Expr) -> Values:
         """Return an element of an array."""
-        memory, place = self._place(value.value, value.args, value.type.lanes, value.type.dtype)
+        memory, place = self._place(value.value, value.args, value.type)
         return memory.read(self.items, place, value.type)
 
-    def _place(self, array: str, index: Sequence[Expr], lanes: int, dtype: str) -> tuple[Memory, Values]:
+    def _place(self, array: str, index: Sequence[Expr], kind: Type) -> tuple[Memory, Values]:
         """Return the memory of an array, and the component where an access begins."""
-        return self.memory[array].place(self.items, [self.value(each) for each in index], lanes, dtype)
+        return self.memory[array].place(self.items, [self.value(each) for each in index], kind)
 
     def _value_take(self, value: Expr) -> Values:
         """Return an entry of a table."""
@@ -323,21 +312,22 @@ class Runner:
             return min(max(index, low), high)
         return np.where(index < low, low, np.where(index > high, high, index))
 
-    def _value_bitcast(self, value: Expr) -> Values:
-        """Return the same bits as another kind."""
+    def _value_bits(self, value: Expr) -> Values:
+        """Return the bits of words as floats."""
         return self.domain.cast(value, [self.value(value.args[0])])
 
+    def _value_pack4(self, value: Expr) -> Values:
+        """Return the bytes of four floats as a word, the first one the lowest."""
+        as_word = [apply("convert", each, value="int32") for each in value.args]
+        whole = [self.domain.apply(each, [self.value(each.args[0])]) for each in as_word]
+        word = sum((np.asarray(each) & 255) << (8 * k) for k, each in enumerate(whole))
+        return computed(np.asarray(word).astype(np.uint32).view(np.int32))
+
     def _value_dot4(self, value: Expr) -> Values:
-        """Return a sum plus four products of bytes of two words; `value` names the kinds of their bytes."""
-        total, *words = map(self.value, value.args)
-        kinds = value.value or ("int8", "int8")
-        for k in range(4):
-            first, second = (
-                (np.asarray(word) >> (8 * k)).astype(STORED[kind]).astype(np.int64)
-                for word, kind in zip(words, kinds, strict=True)
-            )
-            total = total + first * second
-        return total
+        """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""
+        words, four = map(self.value, value.args)
+        factors = four if value.args[1].type.lanes == 4 else [signed_byte(four, k) for k in range(4)]
+        return sum(signed_byte(words, k) * factors[k] for k in range(4))
 
     def _value_call(self, value: Expr) -> Values:
         """Return the result of a function of values."""
@@ -346,22 +336,6 @@ class Runner:
         return self._inside(function, names, {})
 
 
-def narrow_accesses(kernel: Kernel) -> dict[str, str]:
-    """Return the arrays some of whose accesses are narrower than their elements, with the narrow kind.
-
-    Such memory is bytes that are also read as words, or words that are also read as bytes.
-    """
-    declared = {WEIGHTS: kernel.weights.dtype}
-    accesses: list[tuple[str, str]] = []
-    for statement in walk((*kernel.body, *(each for function in kernel.functions for each in function.body))):
-        if isinstance(statement, Array):
-            declared[statement.name] = statement.type.dtype
-        if isinstance(statement, Store):
-            accesses.append((statement.array, statement.value.type.dtype))
-        for value in values(statement):
-            accesses += [(each.value, each.type.dtype) for each in parts(value) if each.op == "load"]
-    narrowest: dict[str, str] = {}
-    for array, dtype in accesses:
-        if array in declared and BYTES[dtype] < BYTES[narrowest.get(array, declared[array])]:
-            narrowest[array] = dtype
-    return narrowest
+def signed_byte(word: Values, k: int) -> Values:
+    """Return byte `k` of a word, as it is with its sign."""
+    return ((np.asarray(word) >> (8 * k)) & 255 ^ 128) - 128

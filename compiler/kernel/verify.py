@@ -17,6 +17,7 @@ from ..core.ops import OPS, TypeRuleError
 from ..languages.interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .kernel import (
     BOOL,
+    BYTE,
     FLOAT,
     INT,
     INTEGERS,
@@ -33,8 +34,7 @@ from .kernel import (
     Statement,
     Store,
     Type,
-    parts,
-    values,
+    Write,
     walk,
 )
 from .sizes import BYTES
@@ -65,20 +65,8 @@ def verify(kernel: Kernel) -> None:
     Verifier(kernel).all()
 
 
-def function_arguments(function: Function) -> tuple[list[tuple[str, Type]], list[str]]:
-    """Return the arrays that a function on views takes, and the names of their steps.
-
-    A function that takes no steps has them in its arrays: each index counts steps.
-    """
-    arrays = {statement.array for statement in walk(function.body) if isinstance(statement, Store)}
-    expressions = [
-        each for statement in walk(function.body) for value in values(statement) for each in parts(value)
-    ]
-    arrays |= {each.value for each in expressions if each.op == "load"}
-    return (
-        [(key, kind) for key, kind in function.takes if key in arrays],
-        [key for key, kind in function.takes if key not in arrays],
-    )
+STEPS = ("step", "leap")
+"""What a function on views calls the steps of its first and its second view."""
 
 
 class Verifier:
@@ -183,9 +171,11 @@ class Verifier:
     def function(self, function: Function) -> None:
         """Check a function, which sees constants, earlier functions and what it takes."""
         self.scopes.append({})
-        arrays = function_arguments(function)[0] if function.result is None else []
+        on_views = function.result is None
         for key, kind in function.takes:
-            self.declare(key, Declared(kind, (None,)) if (key, kind) in arrays else Declared(kind))
+            self.declare(key, Declared(kind, (None,) if on_views else None))
+        for key in STEPS[: len(function.takes)] if on_views else ():
+            self.declare(key, Declared(INT))
         if any(isinstance(statement, Barrier) for statement in walk(function.body)):
             raise KernelError(f"function {function.name} has a barrier")
         for statement in function.body:
@@ -236,7 +226,7 @@ class Verifier:
         if statement.add and (array == RESULT or kind.dtype not in ("float32", "int32", "uint32")):
             raise KernelError(f"a value of type {kind} is added to {array}")
 
-    def _check_write(self, statement: Any, depth: int) -> None:
+    def _check_write(self, statement: Write, depth: int) -> None:
         """Check all channels of a pixel."""
         channels = self.array(RESULT).sizes
         if channels is None or len(statement.values) != channels[-1]:
@@ -286,11 +276,11 @@ class Verifier:
         function = self.functions.get(statement.function)
         if function is None or function.result is not None:
             raise KernelError(f"{statement.function} is no function on views")
-        arrays, steps = function_arguments(function)
-        if len(arrays) != len(statement.views) or len(steps) not in (0, len(arrays)):
-            raise KernelError(f"{statement.function} takes {len(arrays)} views, not {len(statement.views)}")
+        if len(function.takes) != len(statement.views) or len(statement.views) > len(STEPS):
+            count = len(statement.views)
+            raise KernelError(f"{statement.function} takes {len(function.takes)} views, not {count}")
         stored = {each.array for each in walk(function.body) if isinstance(each, Store)}
-        for (key, kind), view in zip(arrays, statement.views, strict=True):
+        for (key, kind), view in zip(function.takes, statement.views, strict=True):
             self.element(view.array, view.index, kind)
             self.check(view.step, INT, "the step of a view")
             if key in stored and not self.array(view.array).written:
@@ -328,7 +318,7 @@ class Verifier:
         for each, size in zip(index, sizes, strict=True):
             number = self.constant(each)
             if size is not None and not whole:
-                size = size * size_of(declared.type) // size_of(kind)
+                size = limit(size, declared.type, kind)
             if number is not None and (number < 0 or (size is not None and number >= size)):
                 raise KernelError(f"index {number} is beyond {name}, which has {size}")
 
@@ -388,12 +378,11 @@ class Verifier:
             raise KernelError(f"a value is converted to {value.value}, which is no kind of value")
         return Type(value.value, self.type(value.args[0]).lanes)
 
-    def _type_bitcast(self, value: Expr) -> Type:
-        """Return the type of the same bits as another kind."""
+    def _type_bits(self, value: Expr) -> Type:
+        """Return the type of the same bits as floats."""
         self.arity(value, 1)
-        if size_of(self.type(value.args[0])) != size_of(value.type):
-            raise KernelError(f"the bits of {shown(value.args[0].type)} become {shown(value.type)}")
-        return value.type
+        self.check(value.args[0], INT.of(value.type.lanes), "the words that are read as floats")
+        return FLOAT.of(value.type.lanes)
 
     def _type_take(self, value: Expr) -> Type:
         """Return the type of an entry of a table."""
@@ -406,11 +395,20 @@ class Verifier:
         return Type(str(self.tables[value.value].dtype))
 
     def _type_dot4(self, value: Expr) -> Type:
-        """Return the type of sums of products of bytes."""
-        self.arity(value, 3)
-        for each in value.args:
-            self.check(each, INT.of(value.type.lanes), "an operand of dot4")
+        """Return the type of products of bytes of words with four bytes, or with those of a word."""
+        self.arity(value, 2)
+        four = self.type(value.args[1])
+        if four not in (BYTE.of(4), INT):
+            raise KernelError(f"dot4 with {shown(four)}, which is neither four bytes nor a word")
+        self.check(value.args[0], INT.of(value.type.lanes), "an operand of dot4")
         return INT.of(value.type.lanes)
+
+    def _type_pack4(self, value: Expr) -> Type:
+        """Return the type of a word of four floats' bytes."""
+        self.arity(value, 4)
+        for each in value.args:
+            self.check(each, FLOAT, "a byte of a word")
+        return INT
 
     def _type_call(self, value: Expr) -> Type:
         """Return the type of a function's result."""
@@ -453,12 +451,14 @@ def shown(kind: Type) -> str:
     return kind.dtype if kind.lanes == 1 else f"{kind.dtype} x {kind.lanes}"
 
 
-def size_of(kind: Type) -> int:
-    """Return the bytes of a value."""
-    return BYTES[kind.dtype] * kind.lanes
+def limit(size: int, declared: Type, kind: Type) -> int:
+    """Return how many indices an array of elements of one type has that is accessed as another.
+
+    Several elements at once begin at any one of them; else the index counts components.
+    """
+    return size - kind.lanes + 1 if declared.lanes == 1 else size * declared.lanes // kind.lanes
 
 
 def reads_as(declared: Type, kind: Type) -> bool:
-    """Return whether memory of one type may be accessed as another: as lanes, or as bytes of words."""
-    integers = {declared.dtype, kind.dtype} <= {"int32", "uint32", "uint8", "int8"}
-    return integers or (declared.dtype == kind.dtype and 1 in (declared.lanes, kind.lanes))
+    """Return whether memory of one type may be accessed as another: by component, or several at once."""
+    return declared.dtype == kind.dtype and 1 in (declared.lanes, kind.lanes)

@@ -181,36 +181,36 @@ def test_groups_share_memory_behind_a_barrier():
     assert ran(group_kernel(Barrier()), (2, 5))[:, :4].tolist() == [[8, 7, 6, 5], [3, 2, 1, 0]]
 
 
-def test_bytes_words_and_functions():
-    word = Expr("dot4", (const(100), load("word", const(0), kind=INT), load("word", const(1), kind=INT)), INT)
-    rows = [Store("bytes", (const(k),), const(v, BYTE)) for k, v in enumerate((1, 2, 255, 3, 5, 6, 7, 8))]
-    copies = [Store("word", (const(k),), load("bytes", const(k), kind=INT)) for k in range(2)]
+def test_products_of_bytes():
+    """Words of bytes with a sign, times four bytes without one from any place on, or times those of a word."""
+    rows = [Store("bytes", (const(k),), const(v, BYTE)) for k, v in enumerate((9, 1, 2, 255, 3))]
+    word = Expr("pack4", tuple(const(float(each)) for each in (1, -2, 3, 100)), INT)
+    words = splat(name("word"), 2)
+    four, twice = load("bytes", 1, kind=BYTE.of(4)), call("twice", [name("word")], INT)
     double = Function("twice", (("n", INT),), (Let("m", name("n") + name("n")),), name("m"))
-    value = apply("convert", call("twice", [word], INT), value="float32")
-    body = [Array("bytes", BYTE, (8,)), Array("word", INT, (2,)), *rows, *copies]
-    kernel = small(*body, Store(RESULT, (Y, X, const(0)), value), functions=(double,))
-    assert (ran(kernel) == 2 * (100 + 5 + 12 - 7 + 24)).all()
-
-
-@pytest.mark.parametrize("explicit", [True, False])
-def test_functions_on_views_step_through_arrays(explicit):
-    """A function takes steps and multiplies with them, or its indices count steps."""
-    two = name("leap") * 2 if explicit else const(2)
-    takes = [("source", FLOAT), *([("step", INT)] if explicit else [])]
-    takes += [("target", FLOAT), *([("leap", INT)] if explicit else [])]
-    body = (
-        Store(
-            "target",
-            (two,),
-            apply("add", load("source", const(0)), load("source", name("step") if explicit else 1)),
-        ),
+    sums = Array("sums", INT.of(2), value=splat(const(1000), 2))
+    adds = [
+        Store("sums", (), Expr("dot4", (words, each), INT.of(2)), add=True) for each in (four, name("word"))
+    ]
+    total = name("sums", INT.of(2)).lane(1) + (twice - name("word"))
+    write = Store(RESULT, (Y, X, const(0)), apply("convert", total - name("word"), value="float32"))
+    kernel = small(
+        Array("bytes", BYTE, (5,)), *rows, Let("word", word), sums, *adds, write, functions=(double,)
     )
+    assert (ran(kernel) == 1000 + (1 - 4 + 765 + 300) + (1 + 4 + 9 + 10000)).all()
+
+
+def test_functions_on_views_step_through_arrays():
+    body = (Store("to", (name("leap") * 2,), apply("add", load("from", 0), load("from", name("step")))),)
     fill = For("i", const(8), (Store("v", (TURN,), apply("convert", TURN, value="float32")),))
     views = (View("v", (const(1),), const(3)), View("v", (const(0),), const(2)))
     write = Store(RESULT, (Y, X, const(0)), load("v", const(4)))
-    function = Function("add", tuple(takes), body)
+    function = Function("add", (("from", FLOAT), ("to", FLOAT)), body)
     kernel = small(Array("v", FLOAT, (8,)), fill, Call("add", views), write, functions=(function,))
     assert (ran(kernel) == 1 + 4).all()
+    beyond = (View("v", (const(1),), const(7)), views[1])
+    with pytest.raises(KernelError, match="index 8 is beyond v, which has 8"):
+        ran(replace(kernel, body=(*kernel.body[:2], Call("add", beyond), write)))
 
 
 def test_components_of_vectors_and_positions_of_rows():

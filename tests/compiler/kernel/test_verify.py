@@ -23,6 +23,7 @@ from wamnet.compiler.kernel.kernel import (
     Store,
     Type,
     View,
+    Write,
     apply,
     call,
     const,
@@ -39,9 +40,7 @@ V, FOUR = Array("v", FLOAT, (2,)), FLOAT.of(4)
 ZERO = const(0.0)
 WRITE = Store(RESULT, (Y, X, const(0)), ZERO)
 GIVEN = Function("twice", (("n", INT),), (), name("n") + name("n"))
-COPY = Function(
-    "copy", (("source", FLOAT), ("target", FLOAT)), (Store("target", (const(0),), load("source", 1)),)
-)
+COPY = Function("copy", (("from", FLOAT), ("to", FLOAT)), (Store("to", (const(0),), load("from", 1)),))
 TABLES = (("table", np.zeros(2, np.float32)),)
 
 
@@ -112,10 +111,19 @@ WRONG = {
     ),
     "a constant of another kind": (small(Let("t", const(0.5, INT))), "0.5 is no constant of type int32"),
     "a type that does not exist": (small(Array("v", Type("float16"), (2,))), "which does not exist"),
-    "other bits": (
-        small(Let("t", Expr("bitcast", (ZERO,), INT.of(2)))),
-        "the bits of float32 become int32 x 2",
+    "bits of no words": (
+        small(Let("t", Expr("bits", (ZERO,), FLOAT))),
+        "words that are read as floats has type",
     ),
+    "products of other values": (
+        small(Let("t", Expr("dot4", (X, ZERO), INT))),
+        "neither four bytes nor a word",
+    ),
+    "a word of integers": (
+        small(Let("t", Expr("pack4", (X, X, X, X), INT))),
+        "a byte of a word has type int32",
+    ),
+    "a pixel without its channels": (small(Write(Y, X, ())), "a pixel is written with 0 channels"),
     "a written image": (
         small(Store("image_a", (Y, X, const(0)), ZERO)),
         "image_a is written, which is read only",

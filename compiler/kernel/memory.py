@@ -58,10 +58,14 @@ class Items:
 
 
 class Memory:
-    """One array; `space`: `item`, `group`, `read` (weights, images) or `result`."""
+    """One array; `space`: `item`, `group`, `read` (weights, images) or `result`.
+
+    `words`: the same bits as integers, where weights are read as both.
+    """
 
     def __init__(self, name: str, data: NDArray[Any], kind: Type, sizes: tuple[int, ...], space: str) -> None:
         self.name, self.data, self.kind, self.sizes, self.space = name, data, kind, sizes, space
+        self.words: NDArray[np.int32] | None = None
         self.written = None if space == "read" else np.zeros(data.shape, np.bool_)
         if space in ("group", "result"):
             self.writer = np.full(data.shape, NOBODY, np.int64)
@@ -82,7 +86,7 @@ class Memory:
     def place(self, items: Items, index: Sequence[Any], kind: Type) -> tuple[Memory, Any]:
         """Return this memory and the component where an access begins: for each item, or for all."""
         lanes = kind.lanes
-        if len(index) == len(self.sizes) and kind == self.kind:
+        if len(index) == len(self.sizes) and lanes == self.kind.lanes:
             return self, self._element(items, index, self.sizes) * lanes
         if len(self.sizes) == 3 and len(index) == 2:  # an image's row and a position in it, or a pixel
             height, width, channels = self.sizes
@@ -104,16 +108,17 @@ class Memory:
     def read(self, items: Items, place: Any, kind: Type) -> Any:
         """Return what is there: (items,), (lanes, items), or one number that all items read."""
         count, columns = kind.lanes, self.columns(items)
+        data = self.words if self.words is not None and kind.dtype == "int32" else self.data
         if self.space == "group":
             self._reads(items, place, count)
         if isinstance(place, int):
             rows = slice(place, place + count)
-            there = self.data[rows] if self.space == "item" else self.data[rows][:, columns]
+            there = data[rows] if self.space == "item" else data[rows][:, columns]
             written = self.written if self.written is None else self.written[rows]
             written = written[:, columns] if self.space == "group" and written is not None else written
         else:
             each = place + np.arange(count)[:, None]
-            there = self.data[each, columns]
+            there = data[each, columns]
             written = self.written if self.written is None else self.written[each, columns]
         if written is not None and not written.all():
             items.refuse(~written, f"{self.name} is read before it is written")

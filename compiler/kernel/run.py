@@ -100,9 +100,11 @@ class Runner:
 
     def _weights(self, weights: NDArray[Any]) -> Memory:
         """Return the memory of the weights, which may be words bit by bit."""
-        kind, flat = self.kernel.weights, np.ascontiguousarray(weights).ravel()
-        data = self.domain.lift(flat) if kind.dtype == "float32" else flat.view(STORED[kind.dtype])
-        return Memory(WEIGHTS, data[:, None], kind, (len(flat) // kind.lanes,), "read")
+        flat, lanes = np.ascontiguousarray(weights).ravel(), self.kernel.weights.lanes
+        data = self.domain.lift(flat.view(np.float32))[:, None]
+        memory = Memory(WEIGHTS, data, FLOAT.of(lanes), (len(flat) // lanes,), "read")
+        memory.words = flat.view(np.int32)[:, None]
+        return memory
 
     # ---- statements --------------------------------------------------------------------------------------
 

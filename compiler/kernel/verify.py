@@ -305,6 +305,8 @@ class Verifier:
         declared = self.array(name)
         for each in index:
             self.check(each, INT, f"an index of {name}")
+        if name == WEIGHTS and kind.dtype in ("float32", "int32"):  # words, bit by bit
+            declared = Declared(Type(kind.dtype, declared.type.lanes), declared.sizes)
         sizes, whole = declared.sizes, kind == declared.type
         assert sizes is not None, "an array has sizes"
         if name.startswith(IMAGE) and len(index) == 2:

@@ -11,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wamnet.compiler.core.ir import Image
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.ir import Gather, Image
+from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.weights import pack
 from wamnet.compiler.kernel.domain import Domain
 from wamnet.compiler.kernel.kernel import (
@@ -45,9 +47,17 @@ from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.plan import plan_program
+from wamnet.compiler.schedules.bytes import bytes_stored, group_of_bytes, tile_of_bytes, words_stored
+from wamnet.compiler.schedules.fft import fft, spectra_stored
+from wamnet.compiler.schedules.group import LARGEST_NUMBERS, group
+from wamnet.compiler.schedules.inlined import inlined
+from wamnet.compiler.schedules.packed import packed, packed_weights
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.tile import all_stored, tile
 from wamnet.kernels.devices import c_executor
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.whole import forward_whole, rounded
 
 X, Y, TURN = map(name, ("x", "y", "i"))
 WRITTEN = Store(RESULT, (Y, X, const(0)), const(1.0))
@@ -122,6 +132,50 @@ def test_kernels_are_near_the_reference(kit, case):
         assert (np.abs(result - expected.value) <= expected.bound).all()
 
 
+def flat(arrays):
+    """Return arrays one after another."""
+    return np.concatenate([np.ravel(each) for each in arrays.values()])
+
+
+SCHEDULES = {
+    "group": lambda p: (group(p, 2, (4, 2), True), flat(all_stored(p, 4, LARGEST_NUMBERS))),
+    "group, by components": lambda p: (group(p, 1, (2, 4), False), flat(all_stored(p, 4, LARGEST_NUMBERS))),
+    "inlined": lambda p: (inlined(p), np.zeros(0, np.float32)),
+    "packed": lambda p: (packed(p), flat(packed_weights(p))),
+    "fft": lambda p: (fft(p, 4, 2, 4, 2, True), flat(spectra_stored(p, 4, 4, 2))),
+}
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_other_schedules_are_near_the_reference(kit, schedule, border):
+    program = kit.denoiser(kit.network([36, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 3, border)
+    plan, images = plan_program(program, "opencl"), pictures({"a": 3, "b": 1}, (3, 5))
+    expected, (kernel, weights) = plan.expected(images), SCHEDULES[schedule](plan.emitted)
+    far = 4 if schedule == "fft" else 1  # another order of sums, whose own bound is larger
+    assert (np.abs(run(kernel, images, weights) - expected.value) <= far * expected.bound).all()
+
+
+BYTEWISE = {
+    "tile": lambda p: (tile_of_bytes(p, 4, 3, True), flat(bytes_stored(p, 4, 2))),
+    "group": lambda p: (group_of_bytes(p, 2, (4, 2), True), flat(words_stored(p))),
+}
+
+
+@pytest.mark.parametrize("schedule", BYTEWISE)
+def test_integer_networks_are_exact(schedule):
+    network = rounded(siren.init([36, 7, 5, 3], 3.0, 5.0, seed=2), 3)
+    channels = {"a": 3, "b": 1}
+    sources = tuple(Image(key, n, -127.0, 127.0, whole=True) for key, n in channels.items())
+    gather = Gather(Window(3, "zero"), sources)
+    program = trace(lambda x: forward_whole(network, x), {"window": ir.Type(shape=(36,))}, gather)
+    plan = plan_program(program, "opencl")
+    random = np.random.default_rng(3)
+    images = {key: random.integers(-127, 128, (3, 5, n)).astype(np.float32) for key, n in channels.items()}
+    kernel, weights = BYTEWISE[schedule](plan.emitted)
+    assert np.array_equal(run(kernel, images, weights), plan.expected(images).value)
+
+
 @pytest.mark.parametrize("shape", [None, (4, 3, 2, False), (16, 5, 1, False)])
 @pytest.mark.parametrize(("border", "size"), [("zero", (3, 7)), ("clamp", (1, 1))])
 def test_bits_are_those_of_c_without_contraction(executor_named, kit, tmp_path, border, size, shape):
@@ -182,7 +236,7 @@ def test_groups_share_memory_behind_a_barrier():
 
 
 def test_products_of_bytes():
-    """Words of bytes with a sign, times four bytes without one from any place on, or times those of a word."""
+    """Words of bytes with a sign, times four bytes without one from any place on, or those of a word."""
     rows = [Store("bytes", (const(k),), const(v, BYTE)) for k, v in enumerate((9, 1, 2, 255, 3))]
     word = Expr("pack4", tuple(const(float(each)) for each in (1, -2, 3, 100)), INT)
     words = splat(name("word"), 2)

@@ -29,6 +29,7 @@ from .kernel import (
     Let,
     Statement,
     Store,
+    Write,
     const,
     walk,
 )
@@ -60,6 +61,11 @@ def _body(body: Body, variables: Collection[str]) -> Body:
     names = set(variables)
     for number, statement in enumerate(body):
         if isinstance(statement, Comment):
+            continue
+        if isinstance(statement, Write):
+            place = (statement.row, statement.column)
+            stores = (Store(RESULT, (*place, const(c)), value) for c, value in enumerate(statement.values))
+            statements += [_statement(store, names) for store in stores]
             continue
         rest = walk(body[number + 1 :])
         stored = any(

@@ -118,11 +118,11 @@ return;
 }}
 """,
     "cuda": f"""
-@constants@
 #ifndef WAMNET_CLAMP
 #define WAMNET_CLAMP
 static __device__ inline {CLAMP}
 #endif
+@constants@
 extern "C" __global__ void wamnet_denoise(
 @each const float *__restrict__ IMAGE,@
 const float *__restrict__ weights,

@@ -12,7 +12,7 @@ TOKEN = re.compile(
     r"(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
     r"|(?P<float>\d+(?:\.\d+(?:e[+-]\d+)?|e[+-]\d+)f(?!\w))|(?P<mask>0x7fffffff)(?!\w)"
     r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>[A-Za-z_]\w*(?:::\w+)?)"
-    r"|(?P<sign>\+\+|\+=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
+    r"|(?P<sign>\+\+|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
 )
 """The tokens of all languages; a kernel has no others."""
 

@@ -342,15 +342,16 @@ class Parser:
     def _assignment(self) -> Store:
         """Read an assignment."""
         target = self._postfix(self._take())
-        add = self._take() == "+="
-        if not add and self.tokens[self.at - 1][1] != "=":
-            raise Unread(f"{self.tokens[self.at - 1][1]!r} is no assignment")
+        sign = self._take()
+        if sign not in ("=", "+=", "-="):
+            raise Unread(f"{sign!r} is no assignment")
         if target.op == "name":
             target = Expr("load", (), target.type, target.value)
         if target.op != "load" or target.value == WEIGHTS or target.value.startswith(IMAGE):
             raise Unread("an assignment to no element")
         value = self._of(self._expression(), target.type, target.value)
-        return Store(target.value, target.args, value, add)
+        value = self._made("negative", value) if sign == "-=" else value
+        return Store(target.value, target.args, value, sign != "=")
 
     def _of(self, value: Expr, kind: Type, key: str) -> Expr:
         """Return a value of a declared type; an operator's single value fills all lanes."""

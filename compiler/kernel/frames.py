@@ -39,6 +39,8 @@ const float *restrict weights,
 float *restrict result,
 int width,
 int height"""
+"""The arguments of C's functions, and of one that names the images for the first time."""
+
 SAME = ARGUMENTS.replace("@each const float *restrict IMAGE,@\n", "@images@")
 """The arguments of C's functions, which name the images in the same order each time."""
 

@@ -12,7 +12,7 @@ TOKEN = re.compile(
     r"(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
     r"|(?P<float>\d+(?:\.\d+(?:e[+-]\d+)?|e[+-]\d+)f(?!\w))|(?P<mask>0x7fffffff)(?!\w)"
     r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>[A-Za-z_]\w*(?:::\w+)?)"
-    r"|(?P<sign>\+\+|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
+    r"|(?P<sign>\+\+|--|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
 )
 """The tokens of all languages; a kernel has no others."""
 
@@ -28,14 +28,27 @@ PRODUCTS = len(BINARY) - 1
 """The level of products."""
 
 COMMON = {"floor": "floor", "sqrt": "sqrt", "exp": "exp", "sin": "sin", "cos": "cos"}
+"""Functions that most languages name as the operations."""
+
 SHADER = {**COMMON, "pow": "power", "min": "minimum", "max": "maximum", "abs": "absolute", "clamp": "clamp"}
+"""Functions of shading languages."""
+
 C_CALLS = {f"{word}f": op for word, op in COMMON.items()} | {
     "powf": "power", "fabsf": "absolute", "wamnet_clamp": "clamp",
 }  # fmt: skip
+"""Functions of C and CUDA."""
+
 LEAST_MOST = {"min": "minimum", "max": "maximum"}
+"""Functions of integers."""
+
 C_TYPES = {"float": FLOAT, "int": INT, "bool": BOOL}
+"""Types of C and its children."""
+
 VECTORS = {f"float{n}": FLOAT.of(n) for n in (2, 4, 8, 16)}
+"""Vectors of OpenCL."""
+
 MASKS = {f"int{n}": BOOL.of(n) for n in (2, 4, 8, 16)}
+"""Truth values in vectors of OpenCL, which are integers with all bits set."""
 
 
 @dataclass(frozen=True)

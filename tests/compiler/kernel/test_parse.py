@@ -223,6 +223,7 @@ REFUSED = {
     "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;"),
     "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]"),
     "a double": ("part1[j] = 0.0f", "part1[j] = 0.0"),
+    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]"),
     "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0"),
     "an integer that is too large": ("float v1[2];", "float v1[2]; int big = 4294967297;"),
     "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j"),

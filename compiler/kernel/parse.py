@@ -138,7 +138,7 @@ class Parser:
         while at < len(text):
             match = TOKEN.match(text, at)
             if match is None:
-                raise Unread(f"{text[at : at + 20]!r}")
+                raise Unread(f"{text[at : at + 20]!r} begins with no token")
             if match.lastgroup:
                 self.tokens.append((match.lastgroup, match[0].strip()))
             at = match.end()

@@ -214,40 +214,65 @@ def test_every_token_counts(tiny, target, schedule):
 
 
 REFUSED = {
-    "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3"),
-    "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2"),
-    "an octal number": ("j < 2;", "j < 02;"),
-    "a comment of C++": ("float v1[2];", "float v1[2]; // all"),
-    "a line that goes on": ("float v1[2];", "float v1[2]; \\\n"),
-    "another letter": ("float v1[2];", "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */"),
-    "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;"),
-    "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]"),
-    "a double": ("part1[j] = 0.0f", "part1[j] = 0.0"),
-    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]"),
-    "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0"),
-    "an integer that is too large": ("float v1[2];", "float v1[2]; int big = 4294967297;"),
-    "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j"),
-    "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;"),
-    "a call of another function": ("part1[j] = 0.0f", "part1[j] = tan(0.0f)"),
-    "an index beyond its array": ("float v1[2];", "float v1[2]; v1[2] = 0.0f;"),
-    "a further statement": ("    int x = (int)get", "    width = 1;\n    int x = (int)get"),
-    "a further function": ("__kernel void", "float twice(float a) { return a; }\n__kernel void"),
-    "images in another order": ("image_a,\n", "image_a,\n    __global const float *restrict image_a,\n"),
+    "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "no frame of opencl"),
+    "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is no constant"),
+    "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
+    "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
+    "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "begins with no token"),
+    "another letter": (
+        "float v1[2];",
+        "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */",
+        "beyond printable ASCII",
+    ),
+    "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;", "'clamp' is no name of a value"),
+    "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]", "part2 is not declared"),
+    "a double": ("part1[j] = 0.0f", "part1[j] = 0.0", "begins with no token"),
+    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is no value"),
+    "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0", "begins with no token"),
+    "an integer that is too large": (
+        "float v1[2];",
+        "float v1[2]; int big = 4294967297;",
+        "4294967297 is no constant of type int32",
+    ),
+    "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j", "part1 of type .* has a value of type"),
+    "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;", "j is no array"),
+    "a call of another function": (
+        "part1[j] = 0.0f",
+        "part1[j] = tan(0.0f)",
+        "tan is no function of the language",
+    ),
+    "an index beyond its array": ("float v1[2];", "float v1[2]; v1[2] = 0.0f;", "index 2 is beyond v1"),
+    "a further statement": (
+        "    int x = (int)get",
+        "    width = 1;\n    int x = (int)get",
+        "no frame of opencl",
+    ),
+    "a further function": (
+        "__kernel void",
+        "float twice(float a) { return a; }\n__kernel void",
+        "no frame of opencl",
+    ),
+    "images in another order": (
+        "image_a,\n",
+        "image_a,\n    __global const float *restrict image_a,\n",
+        "images in two orders",
+    ),
     "another number of channels": (
         "image_a[(row * width + column) * 1 + c]",
         "image_a[(row * width + column) * 2 + c]",
+        "image_a has two numbers of channels",
     ),
-    "another place of the result": ("(y * width + x)", "(y * height + x)"),
-    "a deep expression": ("part1[j] = 0.0f", f"part1[j] = {'(' * 9999}0.0f{')' * 9999}"),
+    "another place of the result": ("(y * width + x)", "(y * height + x)", "without its row"),
+    "a deep expression": ("part1[j] = 0.0f", f"part1[j] = {'(' * 9999}0.0f{')' * 9999}", "recursion"),
 }
 
 
-@pytest.mark.parametrize(("old", "new"), REFUSED.values(), ids=REFUSED)
-def test_refused(tiny, old, new):
+@pytest.mark.parametrize(("old", "new", "reason"), REFUSED.values(), ids=REFUSED)
+def test_refused(tiny, old, new, reason):
     kernel = plain(tiny)
     kernel = replace(kernel, constants=(*kernel.constants, Constant("PIXELS", const(3))))
     source = rendered(kernel, "opencl", pack(tiny))
     channels = {"image_a": 1}
     assert parse(source, "opencl", channels) == canonical(kernel)
-    with pytest.raises(Unread):
+    with pytest.raises(Unread, match=reason):
         parse(source.replace(old, new, 1), "opencl", channels)

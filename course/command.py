@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ....refimpl.errors import InputError
-from ...common.terminal import progress, say, table
-from ...files.outputs import making_folder, write_text
+from wamnet.cli.common.terminal import progress, say, table
+from wamnet.cli.files.outputs import making_folder, write_text
+from wamnet.refimpl.errors import InputError
 
 if TYPE_CHECKING:
-    from ...course.grading import Result
-    from ...course.labs import Lab
-    from ...course.sandbox import Limits
+    from .grading import Result
+    from .labs import Lab
+    from .sandbox import Limits
 
 START_EXAMPLES = """Examples:
 
@@ -38,6 +38,14 @@ wamnet course grade students -o grades
 
 wamnet course grade students -o grades --lab 3 --lab 4 --seconds 20"""
 """Shown below the help of `wamnet course grade`."""
+
+COMMANDS = {
+    "course": ("course", ""),
+    "course start": ("start", "START_EXAMPLES"),
+    "course check": ("check", "CHECK_EXAMPLES"),
+    "course grade": ("grade", "GRADE_EXAMPLES"),
+}
+"""Function and examples of each command, which `wamnet` registers."""
 
 STATUS_NOT_YET = 1
 """Exit status of a check when a lab is not right; grading a class ends with 0."""
@@ -68,7 +76,7 @@ def start(
     ],
 ) -> None:
     """Write the skeletons of all labs, a Makefile and a README to a new folder."""
-    from ...course.start import begin
+    from .start import begin
 
     with making_folder(folder) as new:
         names = begin(new)
@@ -94,8 +102,8 @@ def check(
 
     Your code runs as yours, in your folder, in a separate process with limits on time and memory.
     """
-    from ...course.grading import grade
-    from ...course.labs import LABS, lab_named
+    from .grading import grade
+    from .labs import LABS, lab_named
 
     limits = _limits(seconds, memory)
     if not folder.is_dir():
@@ -110,7 +118,7 @@ def check(
 
 def _limits(seconds: int, memory: int) -> Limits:
     """Return the limits, or refuse them."""
-    from ...course.sandbox import Limits
+    from .sandbox import Limits
 
     for name, value, most in (("--seconds", seconds, MOST_SECONDS), ("--memory", memory, MOST_MEMORY_MB)):
         if not 1 <= value <= most:
@@ -160,9 +168,9 @@ def grade(
     has no network, and has limits on time and memory. It returns data, which the grader compares. Endless
     loops and the like are named in the tables, and stop nobody else.
     """
-    from ...course import table as tables
-    from ...course.grading import files_of, grade_class
-    from ...course.sandbox import unavailable
+    from . import table as tables
+    from .grading import files_of, grade_class
+    from .sandbox import unavailable
 
     limits = _limits(seconds, memory)
     if workers is not None and workers < 1:
@@ -186,6 +194,6 @@ def grade(
 
 def _labs(words: Sequence[str] | None) -> Sequence[Lab]:
     """Return the labs that are named, each once, or all without names."""
-    from ...course.labs import LABS, lab_named
+    from .labs import LABS, lab_named
 
     return tuple(dict.fromkeys(map(lab_named, words))) if words else LABS

@@ -23,12 +23,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl import rng
-from ...refimpl.errors import shown
-from ...spec.conformance import case as cases
-from ...spec.conformance.case import Case, given, load
-from ...spec.conformance.numbers import to_json
-from ...spec.conformance.run import judge
+from wamnet.refimpl import rng
+from wamnet.refimpl.errors import shown
+from wamnet.spec.conformance import case as cases
+from wamnet.spec.conformance.case import Case, given, load
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.run import judge
+
 from .wire import Raised, names_of
 
 VECTORS = Path(cases.__file__).resolve().parents[1] / "vectors"

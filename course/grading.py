@@ -23,7 +23,8 @@ from itertools import islice
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 
-from ...refimpl.errors import InputError, shown
+from wamnet.refimpl.errors import InputError, shown
+
 from .frame import Ended, Wrong, of_exception, outcome
 from .judged import load
 from .labs import LABS, Lab
@@ -181,7 +182,7 @@ class Grader:
     def begin(self, lab: Lab, folder: Path, limits: Limits, trusted: bool) -> int:
         """Begin with a lab; return the file number to wait for."""
         if self.process is None:
-            command = [sys.executable, "-m", "wamnet.cli.course.worker"]
+            command = [sys.executable, "-m", "wamnet_course.worker"]
             self.process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
             )

@@ -1,4 +1,4 @@
-"""The process that runs a student's code: `python -m wamnet.cli.course.judged FOLDER LIMITS...`.
+"""The process that runs a student's code: `python -m wamnet_course.judged FOLDER LIMITS...`.
 
 1. It takes the pipes to the grader from its standard streams, which a student's prints do not reach [`main`].
 2. It limits itself [sandbox.py], loads the student's file [`load`], and answers the grader's calls [`serve`].
@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.errors import InputError
+from wamnet.refimpl.errors import InputError
+
 from .sandbox import Limits, confine, die_with_parent
 from .wire import LONGEST_MESSAGE, MOST_BYTES, STUDENT, Channel, error_of, names_of, plain, unpacked
 

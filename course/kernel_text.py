@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ...compiler.reading.lanes import Unread
-from ...compiler.reading.syntax import Parser
-from ...compiler.reading.tokens import Function, Text, Type
+from wamnet.compiler.reading.lanes import Unread
+from wamnet.compiler.reading.syntax import Parser
+from wamnet.compiler.reading.tokens import Function, Text, Type
 
 
 class TextError(Exception):

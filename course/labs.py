@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ...refimpl.errors import InputError
+from wamnet.refimpl.errors import InputError
+
 from .frame import Check
 
 SKELETONS = Path(__file__).parent / "skeletons"

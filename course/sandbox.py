@@ -61,8 +61,8 @@ LIMITS = Limits()
 
 def bubblewrap() -> list[str]:
     """Return the command that runs another one in a sandbox."""
-    names = ("", ".cli", ".compiler", ".kernels", ".models", ".refimpl")
-    parts = (importlib.util.find_spec(f"wamnet{name}") for name in names)
+    names = ("wamnet", "wamnet.cli", "wamnet.compiler", "wamnet.kernels", "wamnet.models", "wamnet.refimpl")
+    parts = (importlib.util.find_spec(name) for name in (*names, "wamnet_course"))
     packages = [place for part in parts if part for place in part.submodule_search_locations or ()]
     folders = ["/usr", "/etc/alternatives", "/etc/ld.so.cache", sys.base_prefix, sys.prefix]
     folders.append(str(Path(sys.executable).resolve().parents[1]))

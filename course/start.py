@@ -50,8 +50,8 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli.course.grading import grade
-from wamnet.cli.course.labs import LABS
+from wamnet_course.grading import grade
+from wamnet_course.labs import LABS
 
 FOLDER = Path(__file__).parent
 CASES = [(lab, check.name) for lab in LABS if (FOLDER / lab.file).is_file() for check in lab.checks]

@@ -95,7 +95,7 @@ def sources(folder: Path) -> dict[str, bytes]:
 @contextmanager
 def started(folder: Path, limits: Limits, trusted: bool, shows: bool) -> Iterator[tuple[Functions, Any]]:
     """Give a new process, with the student's functions before anything is loaded; it ends with the block."""
-    command = [sys.executable, "-m", "wamnet.cli.course.judged"]
+    command = [sys.executable, "-m", "wamnet_course.judged"]
     command += [str(folder.resolve()) if trusted else FOLDER, *map(str, limits)]
     quiet = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "PYTHONDONTWRITEBYTECODE"), "1")
     home = {} if trusted else {"HOME": FOLDER, "TMPDIR": FOLDER}

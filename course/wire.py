@@ -27,7 +27,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError, WamnetError
+from wamnet.refimpl.errors import CompileError, WamnetError
 
 MOST_BYTES = 1 << 23
 """Length limit of a student's message: the largest array of a lab has one megabyte."""

@@ -1,4 +1,4 @@
-"""Grade the labs of a class one after another: `python -m wamnet.cli.course.worker`.
+"""Grade the labs of a class one after another: `python -m wamnet_course.worker`.
 
 Each line of the standard input is a lab, and each line of the standard output its result, as JSON; modules
 are imported once. The process ends with the command that started it.

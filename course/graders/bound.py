@@ -19,16 +19,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....compiler import artifact
-from ....compiler.compile import compile_program
-from ....compiler.core import sums
-from ....compiler.core.enclosure import round_up
-from ....compiler.core.lower import lower
-from ....compiler.proof.checker import check
-from ....compiler.proof.evidence import Refused
-from ....refimpl.network import siren
-from ....refimpl.network.dataset import Normalization, Window
-from ....refimpl.network.denoise import Model
+from wamnet.compiler import artifact
+from wamnet.compiler.compile import compile_program
+from wamnet.compiler.core import sums
+from wamnet.compiler.core.enclosure import round_up
+from wamnet.compiler.core.lower import lower
+from wamnet.compiler.proof.checker import check
+from wamnet.compiler.proof.evidence import Refused
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.denoise import Model
+
 from ..frame import Check, Likely, Wrong, expect, hold, number_text, numbers_of, spread, still
 
 U, TINY, WIDER = 2.0**-24, 2.0**-110, 1 + 2.0**-16

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl.light.scene import Camera
-from ....spec.conformance.case import Case, given
+from wamnet.refimpl.light.scene import Camera
+from wamnet.spec.conformance.case import Case, given
+
 from ..frame import SINGLE, Check, alike, expect, hold, near, numbers_of, still, vectors
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), vertical_fov_deg=41.0)

@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from ....compiler.core.interpret import interpret
-from ....compiler.core.ir import Gather, Image, Type
-from ....compiler.core.verify import verify
-from ....compiler.proof.whole import RULES, Rounds, known
-from ....refimpl.errors import CompileError
-from ....refimpl.network import siren
-from ....refimpl.network.dataset import Window
-from ....refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
-from ....spec.conformance.kinds.whole import network_from
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Gather, Image, Type
+from wamnet.compiler.core.verify import verify
+from wamnet.compiler.proof.whole import RULES, Rounds, known
+from wamnet.refimpl.errors import CompileError
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
+from wamnet.spec.conformance.kinds.whole import network_from
+
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors
 from ..wire import Expression
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ....kernels.judge.welch import sidak
+from wamnet.kernels.judge.welch import sidak
+
 from ..frame import (
     SIGNIFICANCE,
     SINGLE,

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import rng
-from ....refimpl.errors import InputError
+from wamnet.refimpl import rng
+from wamnet.refimpl.errors import InputError
+
 from ..frame import (
     SIGNIFICANCE,
     Check,

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ....compiler.core.interpret import interpret
-from ....compiler.core.ir import Program, Type
-from ....compiler.core.passes.eliminate_dead import eliminate_dead
-from ....compiler.core.trace import trace
-from ....compiler.core.verify import verify
-from ....refimpl.errors import CompileError
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Program, Type
+from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.verify import verify
+from wamnet.refimpl.errors import CompileError
+
 from ..frame import Check, Wrong
 
 FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], list[str], str]] = {

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import rng
+from wamnet.refimpl import rng
+
 from ..frame import (
     SIGNIFICANCE,
     SINGLE,

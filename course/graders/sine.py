@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ....compiler.core.interpret import interpret
-from ....compiler.core.ir import Type
-from ....compiler.core.sine import POLYNOMIALS
-from ....compiler.core.verify import verify
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.ir import Type
+from wamnet.compiler.core.sine import POLYNOMIALS
+from wamnet.compiler.core.verify import verify
+
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, vectors
 from ..wire import Expression
 

@@ -11,18 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from ....kernels.verify import judgement, run
-from ....kernels.verify.cases import questions
-from ....kernels.verify.renderers import Own
-from ....refimpl import encoding, vectors
-from ....refimpl.light import intersection, transport
-from ....refimpl.light.shapes.sphere import sphere_distance
-from ....spec.conformance.case import Case
-from ....spec.conformance.kinds import FUNCTIONS
-from ....spec.conformance.numbers import to_json
-from ....spec.conformance.program import of_reference
-from ....spec.conformance.report import first_blamed
-from ....spec.conformance.run import Verdict, judge
+from wamnet.kernels.verify import judgement, run
+from wamnet.kernels.verify.cases import questions
+from wamnet.kernels.verify.renderers import Own
+from wamnet.refimpl import encoding, vectors
+from wamnet.refimpl.light import intersection, transport
+from wamnet.refimpl.light.shapes.sphere import sphere_distance
+from wamnet.spec.conformance.case import Case
+from wamnet.spec.conformance.kinds import FUNCTIONS
+from wamnet.spec.conformance.numbers import to_json
+from wamnet.spec.conformance.program import of_reference
+from wamnet.spec.conformance.report import first_blamed
+from wamnet.spec.conformance.run import Verdict, judge
+
 from ..frame import Check, Wrong, cases_of, hold
 
 SUITE = (

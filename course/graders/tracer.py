@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl import rng
+from wamnet.refimpl import rng
+
 from ..frame import Check, Wrong, hold, kind_of_number, number_text, spread
 from ..wire import Expression, Node, Program
 

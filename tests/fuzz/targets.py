@@ -24,7 +24,6 @@ from PIL import Image, ImageCms
 
 from wamnet.cli.commands import demo
 from wamnet.cli.common import inputs as cli_inputs
-from wamnet.cli.course import frame, wire
 from wamnet.cli.files import dataset_files, exr, images
 from wamnet.cli.main import main
 from wamnet.compiler import artifact, variants
@@ -45,6 +44,7 @@ from wamnet.refimpl.network import denoise, siren, train
 from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.reading import parse_json
 from wamnet.spec.conformance import case, report
+from wamnet_course import frame, wire
 
 STUDENTS = [
     json.dumps(message).encode()

@@ -59,7 +59,6 @@ COMMANDS: Mapping[str, tuple[str, str, str]] = {
     "tune": ("tune", "tune", "EXAMPLES"),
     "executors": ("denoise", "executors", "EXECUTORS_EXAMPLES"),
     "conformance": ("conformance", "conformance", "EXAMPLES"),
-    "verify-renderer": ("verify.renderer", "verify_renderer", "EXAMPLES"),
     "demo": ("demo", "demo", "EXAMPLES"),
     "bench": ("bench", "bench", "EXAMPLES"),
     "bench render": ("measure.render", "render", "EXAMPLES"),
@@ -70,7 +69,7 @@ COMMANDS: Mapping[str, tuple[str, str, str]] = {
 }
 """Each command's module in `commands`, function and examples; one of a group follows the group."""
 
-DISTRIBUTIONS: Mapping[str, str] = {"course": "wamnet-course"}
+DISTRIBUTIONS: Mapping[str, str] = {"verify-renderer": "wamnet-verify", "course": "wamnet-course"}
 """Distribution of each command that joins through an entry point of the group `ENTRY_POINTS`."""
 
 ENTRY_POINTS = "wamnet.commands"

@@ -11,9 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.kernels.verify import judgement, run
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.renderers import Own
 from wamnet.refimpl import encoding, vectors
 from wamnet.refimpl.light import intersection, transport
 from wamnet.refimpl.light.shapes.sphere import sphere_distance
@@ -23,6 +20,9 @@ from wamnet.spec.conformance.numbers import to_json
 from wamnet.spec.conformance.program import of_reference
 from wamnet.spec.conformance.report import first_blamed
 from wamnet.spec.conformance.run import Verdict, judge
+from wamnet_verify import judgement, run
+from wamnet_verify.cases import questions
+from wamnet_verify.renderers import Own
 
 from ..frame import Check, Wrong, cases_of, hold
 

@@ -19,7 +19,7 @@ PEERS = {
     "halide": ("kernels/bench/peers/peer_halide.py",),
     "numba": ("kernels/bench/peers/peer_numba.py",),
     "pyoidn": ("kernels/bench/peers/peer_oidn.py",),
-    "mitsuba": ("kernels/bench/peers/peer_mitsuba.py", "kernels/verify/mitsuba_process.py"),
+    "mitsuba": ("kernels/bench/peers/peer_mitsuba.py", "spec/conformance/renderers/mitsuba_process.py"),
     "bpy": ("kernels/bench/peers/cycles_process.py", "kernels/blender/process.py"),
 }
 """Packages that are compared with, and the only files of each; one file reads graphs of others by onnx."""
@@ -47,7 +47,10 @@ ALLOWED = {
 """What each part may import in addition to the standard library; its keys are in the order of imports."""
 
 ORDER = tuple(ALLOWED)
-OTHERS = {"course": {"numpy", "typer"}}
+OTHERS = {
+    "spec/conformance/renderers": {"numpy", "typer"},
+    "course": {"numpy", "typer", "wamnet_verify"},
+}
 """What each other distribution may import in addition to the standard library and the package."""
 
 PUBLIC = ("api", "kernel")
@@ -93,7 +96,6 @@ ROOMS = {
         "blender": ("", "run"),
         "bench": ("", "devices", "run"),
         "export": ("", "devices", "run", "bench"),
-        "verify": ("", "devices", "run", "judge", "bench"),
     },
     "spec": {"conformance": ()},
     "cli": {

@@ -35,7 +35,7 @@ else:
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 """Where the packages of the quick set-up are listed."""
 
-DISTRIBUTIONS = {"course": "wamnet_course"}
+DISTRIBUTIONS = {"spec/conformance/renderers": "wamnet_verify", "course": "wamnet_course"}
 """Package of each other distribution in this repository, by its folder."""
 
 NEEDS = {

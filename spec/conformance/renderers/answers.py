@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.light.camera import camera_basis, camera_ray
-from ...refimpl.light.scene import Camera
+from wamnet.refimpl.light.camera import camera_basis, camera_ray
+from wamnet.refimpl.light.scene import Camera
 
 NODES = 64
 """Nodes of a Gauss-Legendre rule: the integrands are smooth, and 32 give the same ten digits."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ...refimpl.light.scene import Scene
+from wamnet.refimpl.light.scene import Scene
 
 SLACK = 2e-3
 """How far a mean may be off without a statistical reason, in the answer's largest channel: half floats of a

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
-from ...refimpl.errors import InputError
+from wamnet.refimpl.errors import InputError
+
 from . import layer_cases, light_cases
 from .case import RULES, Question
 

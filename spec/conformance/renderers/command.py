@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....refimpl.errors import InputError
-from ...common import options
-from ...common.terminal import progress, say, table
-from ...files.outputs import check_new_folder, check_output, making_folder, write_text
+from wamnet.cli.common import options
+from wamnet.cli.common.terminal import progress, say, table
+from wamnet.cli.files.outputs import check_new_folder, check_output, making_folder, write_text
+from wamnet.refimpl.errors import InputError
 
 if TYPE_CHECKING:
-    from ....kernels.verify.case import Question
-    from ....kernels.verify.judgement import Verdict
-    from ....kernels.verify.renderers import Renderer
+    from .case import Question
+    from .judgement import Verdict
+    from .renderers import Renderer
 
 EXAMPLES = """Examples:
 
@@ -29,6 +29,9 @@ wamnet verify-renderer --format mitsuba --command "my_renderer {scene} {output}"
 
 wamnet verify-renderer --format blender --write scenes"""
 """Shown below the help of `wamnet verify-renderer`."""
+
+COMMANDS = {"verify-renderer": ("verify_renderer", "EXAMPLES")}
+"""Function and examples of the command, which `wamnet` registers."""
 
 STATUS_DEVIATES = 1
 """Exit status when a rule is broken."""
@@ -125,8 +128,8 @@ def verify_renderer(
     cases says what deviates, and a smaller picture with other seeds must confirm it. What a format cannot say
     is "not tested". Ends with status 1 if a rule is broken.
     """
-    from ....kernels.verify import report, run
-    from ....kernels.verify.cases import chosen
+    from . import report, run
+    from .cases import chosen
 
     questions = chosen(words or ())
     if write is not None:
@@ -158,7 +161,7 @@ def verify_renderer(
 
 def _known_profiles(names: Sequence[str]) -> list[str]:
     """Return the names, or refuse an unknown one."""
-    from ....kernels.verify.case import PROFILES
+    from .case import PROFILES
 
     for name in names:
         if name not in PROFILES:
@@ -168,7 +171,7 @@ def _known_profiles(names: Sequence[str]) -> list[str]:
 
 def _known_form(form: str | None) -> str:
     """Return the name of a format, or refuse it."""
-    from ....kernels.verify.renderers import FORMATS
+    from .renderers import FORMATS
 
     if form is None or form not in FORMATS:
         rule = "a form of scene files must be named" if form is None else "it is unknown"
@@ -178,7 +181,7 @@ def _known_form(form: str | None) -> str:
 
 def _check_numbers(pictures: int, seed: int, timeout: float) -> None:
     """Refuse numbers that cannot be used."""
-    from ....kernels.verify.run import LARGEST_SEED, LEAST_PICTURES
+    from .run import LARGEST_SEED, LEAST_PICTURES
 
     if not LEAST_PICTURES <= pictures <= 1000:
         rule = f"their spread is the error of their mean: {LEAST_PICTURES} at least, and at most 1000"
@@ -193,7 +196,7 @@ def _renderer(
     name: str | None, command: str | None, form: str | None, executor: str, timeout: float
 ) -> Renderer:
     """Return who is asked, or refuse what does not say it."""
-    from ....kernels.verify.renderers import ByCommand, command_words, known
+    from .renderers import ByCommand, command_words, known
 
     if (name is None) == (command is None):
         value = "neither given" if name is None else "both given"
@@ -210,7 +213,7 @@ def _renderer(
 
 def read_layers(path: Path) -> Mapping[str, Any]:
     """Return the layers of an EXR by name, finite or not, or of a PNG as layer `display`."""
-    from ...files import exr, images
+    from wamnet.cli.files import exr, images
 
     if path.suffix == ".png":
         return {"display": images.read_png(path)}
@@ -221,10 +224,10 @@ def _write_scenes(folder: Path, form: str, questions: Sequence[Question]) -> Non
     """Write the scene files of all shots, and answers.json."""
     import json
 
-    from ....kernels.verify.judgement import expected
-    from ....kernels.verify.parts import NotExpressed
-    from ....kernels.verify.renderers import FORMATS
-    from ....kernels.verify.run import shots_of
+    from .judgement import expected
+    from .parts import NotExpressed
+    from .renderers import FORMATS
+    from .run import shots_of
 
     check_new_folder(folder)
     answers = [
@@ -256,9 +259,9 @@ def _write_scenes(folder: Path, form: str, questions: Sequence[Question]) -> Non
 
 def _print(name: str, verdicts: Sequence[Verdict]) -> None:
     """Print a line for each case, and what to look at first."""
-    from ....kernels.verify import report
-    from ....kernels.verify.judgement import first_blamed, sentence_of
-    from ....kernels.verify.run import counts
+    from . import report
+    from .judgement import first_blamed, sentence_of
+    from .run import counts
 
     # What was found and the answer are in the sentences below, where they differ.
     kept = [0, 1, 2, 5, 6]

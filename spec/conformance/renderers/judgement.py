@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..judge.welch import holm, student_quantile, welch_p
+from wamnet.kernels.judge.welch import holm, student_quantile, welch_p
+
 from .case import PROFILES, RULES, Question
 
 SIGNIFICANCE = 0.01

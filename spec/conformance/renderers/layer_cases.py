@@ -11,10 +11,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...refimpl.light.camera import camera_basis
-from ...refimpl.light.materials import Conductor, Dielectric, Material, Mirror
-from ...refimpl.light.scene import Box, Camera, Light, Quad, Scene
-from ...refimpl.light.shapes.shape import Vector
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene
+from wamnet.refimpl.light.shapes.shape import Vector
+
 from . import answers
 from .case import Question, Shot
 

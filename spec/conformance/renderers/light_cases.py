@@ -11,10 +11,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...refimpl import encoding
-from ...refimpl.light.materials import Conductor, Dielectric, Material, Mirror
-from ...refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
-from ...refimpl.light.shapes.shape import Vector
+from wamnet.refimpl import encoding
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes.shape import Vector
+
 from . import answers
 from .case import DISPLAY_SLACK, Question, Shot
 

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.light.materials import Conductor, Dielectric, Material, Mirror
-from ...refimpl.light.scene import Box, Camera, Room, Scene, Sphere
-from ...refimpl.light.shapes.quad import light_radiance
-from ...refimpl.light.shapes.shape import Vector
-from ..bench.peers.peer_mitsuba import room_walls
+from wamnet.kernels.bench.peers.peer_mitsuba import room_walls
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes.quad import light_radiance
+from wamnet.refimpl.light.shapes.shape import Vector
 
 Array = NDArray[np.float64]
 

@@ -22,14 +22,15 @@ from typing import Protocol
 
 import numpy as np
 
-from ...refimpl import encoding
-from ...refimpl.errors import InputError
-from ...refimpl.light.render import Job
-from ...refimpl.light.scene import to_json
-from ...refimpl.light.transport import Settings
-from ..folders import temporary
-from ..orphans import printed, running
-from ..run.render_frame import render_frame
+from wamnet.kernels.folders import temporary
+from wamnet.kernels.orphans import printed, running
+from wamnet.kernels.run.render_frame import render_frame
+from wamnet.refimpl import encoding
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import to_json
+from wamnet.refimpl.light.transport import Settings
+
 from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray, write_three
 from .case import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture

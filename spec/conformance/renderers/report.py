@@ -13,7 +13,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...refimpl.errors import escaped
+from wamnet.refimpl.errors import escaped
+
 from .case import RULES
 from .judgement import DEVIATES, SIGNIFICANCE, UNTESTED, Verdict, first_blamed, sentence_of
 from .run import counts

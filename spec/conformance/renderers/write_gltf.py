@@ -25,7 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.light.scene import Camera
+from wamnet.refimpl.light.scene import Camera
+
 from .case import Shot
 from .parts import (
     GLASS,

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...refimpl.light.scene import Camera
+from wamnet.refimpl.light.scene import Camera
+
 from .case import Shot
 from .parts import (
     GLASS,

@@ -24,8 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.encoding import LEVELS, srgb_decode
-from ...refimpl.light.scene import Camera
+from wamnet.refimpl.encoding import LEVELS, srgb_decode
+from wamnet.refimpl.light.scene import Camera
+
 from .case import Shot
 from .parts import GLASS, MATTE, METAL, MIRROR, Look, Mesh, NotExpressed, frame_of, meshes_of, parts_of
 

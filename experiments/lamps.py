@@ -36,7 +36,6 @@ from lab.tables import Column
 from lights import NAMES, seen_colors
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.run.draws import variation_of
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
@@ -44,6 +43,7 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import Ranges, Variation
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.train import SHORT
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 Array = NDArray[np.float64]
 

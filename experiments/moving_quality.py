@@ -32,9 +32,6 @@ from quality import PLANS, ROWS, SHIPPED_SET, Bench
 from wamnet.compiler.model_file import load_model
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench.measure_pipeline import PEERS, STEP_S, moments
-from wamnet.kernels.bench.peers.moving import DENOISED, MitsubaOidn
-from wamnet.kernels.bench.peers.peer_cycles import Cycles
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.run.frame_plan import TRAIN
 from wamnet.kernels.run.geometry import Shown, compare
 from wamnet.kernels.run.pipeline import Pipeline
@@ -45,6 +42,10 @@ from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.network.denoise import Model
+from wamnet_peers import table
+from wamnet_peers.moving import DENOISED, MitsubaOidn
+from wamnet_peers.peer_cycles import Cycles
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SCENE = "minicubes"
 """What moves."""
@@ -117,7 +118,7 @@ def ours(options: Namespace) -> Iterator[Pictures]:
 def theirs(name: str, size: int) -> Iterator[Pictures]:
     """Yield the pictures of a peer by each quality; nothing, and a sentence, where it is missing."""
     try:
-        maker = PEERS[name](moments(SCENE)[0], size)
+        maker = table.makers[name](moments(SCENE)[0], size)
     except ExecutorUnavailable as error:
         sys.stderr.write(f"no rows: {error}\n")
         return

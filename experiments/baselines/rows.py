@@ -373,7 +373,7 @@ def open_image_denoise(
 
     Clean ones are those of the reference, whose camera rays are counted as its cost.
     """
-    from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
+    from wamnet_peers.peer_oidn import filtered, prefiltered
 
     guides: Mapping[str, Callable[[Case], Frame | None]] = {
         "none": lambda _: None,

@@ -30,10 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from ....refimpl.errors import WamnetError
-from ....refimpl.light.scene import Box, Camera, Scene, from_json
-from ....refimpl.light.shapes.quad import light_radiance
-from .peer_mitsuba import room_walls
+from wamnet.refimpl.errors import WamnetError
+from wamnet.refimpl.light.scene import Box, Camera, Scene, from_json
+from wamnet.refimpl.light.shapes.quad import light_radiance
+from wamnet_verify.parts import room_walls
 
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 """Corners of the cube [-1, 1]^3."""

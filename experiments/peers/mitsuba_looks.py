@@ -29,8 +29,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.light.materials import Conductor, Dielectric, Material, Mirror
-from ....refimpl.light.scene import Sky
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
+from wamnet.refimpl.light.scene import Sky
 
 METAL = "wamnet_metal"
 """Name of the plugin of rough metal."""

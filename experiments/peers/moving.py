@@ -16,14 +16,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.frame import Frame
-from ....refimpl.light.scene import Scene
-from ....refimpl.light.transport import Settings
+from wamnet.kernels.bench.measure_pipeline import Ways
+from wamnet.kernels.bench.measure_render import VARIANT
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.transport import Settings
+
 from . import peer_mitsuba
 from .peer_oidn import Kept
 
@@ -32,25 +35,6 @@ DENOISED = ("fast", "high")
 
 SHAPES = {"boxes": "box", "spheres": "sphere", "quads": "quad", "lights": "light"}
 """Shapes that may differ from picture to picture, and what their names in Mitsuba's scene begin with."""
-
-VARIANT = "llvm_ad_rgb"
-"""Mitsuba's variant: compiled, on vectors and all cores."""
-
-Ways = Mapping[str, Callable[[], float | None]]
-
-
-class Maker(Protocol):
-    """What makes pictures of a scene that moves."""
-
-    @property
-    def about(self) -> str:
-        """Return in words what it is, with versions."""
-
-    def ways(self, shots: Sequence[Scene]) -> Ways:
-        """Return what is measured, by name; pictures show the scenes one after another."""
-
-    def close(self) -> None:
-        """Give back what it holds."""
 
 
 class MitsubaOidn:

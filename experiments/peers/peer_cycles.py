@@ -23,12 +23,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.errors import ExecutorUnavailable, InputError
-from ....refimpl.light.scene import Scene, to_json
-from ....refimpl.light.transport import Settings
-from ...run.line_process import LineProcess
+from wamnet.kernels.bench.measure_pipeline import Ways
+from wamnet.kernels.run.line_process import LineProcess
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.light.scene import Scene, to_json
+from wamnet.refimpl.light.transport import Settings
+
 from . import peer_mitsuba
-from .moving import DENOISED, Ways
+from .moving import DENOISED
 
 MEMORY = Path("/dev/shm")
 """Folder in memory of Linux."""

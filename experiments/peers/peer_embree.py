@@ -22,11 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.errors import ExecutorUnavailable
-from ....refimpl.light.camera import camera_basis
-from ....refimpl.light.scene import Box, Light, Quad, Scene
-from ....refimpl.light.shapes.quad import light_radiance, quad_area_pdf
-from ....refimpl.light.transport import Settings
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.scene import Box, Light, Quad, Scene
+from wamnet.refimpl.light.shapes.quad import light_radiance, quad_area_pdf
+from wamnet.refimpl.light.transport import Settings
+from wamnet_verify.parts import room_walls
+
 from . import peer_mitsuba
 
 SOURCE = Path(__file__).with_name("embree_paths.c")
@@ -114,7 +116,7 @@ def _compile(program: Path) -> None:
 def scene_bytes(scene: Scene, width: int, height: int, edges: int) -> bytes:
     """Return a scene as embree_paths.c reads it."""
     basis, room = camera_basis(scene.camera, np.float32), scene.room
-    walls = peer_mitsuba.room_walls(room) if room is not None else []
+    walls = room_walls(room) if room is not None else []
     flat: tuple[Quad | Light, ...] = (*scene.quads, *scene.lights)
     quads = [*walls, *((quad.corner, quad.edge_u, quad.edge_v) for quad in flat)]
     rows = surfaces(scene)

@@ -18,15 +18,20 @@ Mitsuba: Jakob et al., "Mitsuba 3 renderer", https://mitsuba-renderer.org, its d
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ....refimpl.errors import ExecutorUnavailable, InputError
-from ....refimpl.light.materials import Material
-from ....refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
-from ....refimpl.light.shapes.quad import light_radiance
-from ....refimpl.light.transport import Settings
+from wamnet.kernels.bench.measure_render import VARIANT
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.light.materials import Material
+from wamnet.refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes.quad import light_radiance
+from wamnet.refimpl.light.transport import Settings
+from wamnet_verify.parts import room_walls
+
 from . import mitsuba_looks as looks
 from .mitsuba_looks import rgb
 
@@ -174,16 +179,6 @@ def export(mi: Any, scene: Scene, width: int, height: int, settings: Settings) -
     return made
 
 
-def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
-    """Return corner and edges (3,) of the walls, in the order of WALLS, whose normals point inwards."""
-    low, edges = np.array(room.low), np.diag(np.subtract(room.high, room.low))
-    walls = []
-    for axis in range(3):
-        u, v = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
-        walls += [(low, u, v), (low + edges[axis], v, u)]
-    return walls
-
-
 def _two_sided(mi: Any, name: str, quad: Quad) -> dict[str, Any]:
     """Return the shape of a quad that reflects on both sides, or two shapes if it emits on both."""
     if not any(quad.emission):
@@ -295,3 +290,9 @@ def _sensor_class(mi: Any) -> Any:
 def render(mi: Any, loaded: Any, spp: int, seed: int) -> Any:
     """Return the mean colours (H, W, 3), rows from the top, of a loaded scene; waits until they are there."""
     return np.array(mi.render(loaded, spp=spp, seed=seed))
+
+
+def renderer(scene: Scene, width: int, height: int, settings: Settings) -> Callable[[int, int], Any]:
+    """Return what renders a scene, by the number of samples and a seed."""
+    mi = open_mitsuba(VARIANT)
+    return partial(render, mi, mi.load_dict(export(mi, scene, width, height, settings)))

@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.errors import ExecutorUnavailable
-from ....refimpl.light.camera import camera_basis
-from ....refimpl.light.scene import Light, Quad, Scene
-from ....refimpl.light.shapes.quad import quad_row
-from ....refimpl.light.transport import Settings
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.light.camera import camera_basis
+from wamnet.refimpl.light.scene import Light, Quad, Scene
+from wamnet.refimpl.light.shapes.quad import quad_row
+from wamnet.refimpl.light.transport import Settings
+
 from . import peer_mitsuba
 from .peer_embree import FARTHEST, lamps, surfaces
 

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.encoding import to_display
-from ....refimpl.errors import InputError
-from ....refimpl.frame import Frame
-from ....refimpl.network.denoise import Model
-from ..contender import Contender, Opened, Tools, told_as_missing
-from ..workload import Given
+from wamnet.kernels.bench.contender import Contender, Opened, Tools, told_as_missing
+from wamnet.kernels.bench.workload import Given
+from wamnet.refimpl.encoding import to_display
+from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network.denoise import Model
 
 LAYERS = ("color", "albedo", "normal")
 """Layers that it is given, in the order of its arguments."""

@@ -10,11 +10,13 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from ....refimpl.network.denoise import Model
-from ..contender import FULL, Contender, Opened, Tools, told_as_missing
-from ..cost import layered
-from ..workload import Given
-from .peer_onnxruntime import Run, at_first, graph, quantised
+from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, told_as_missing
+from wamnet.kernels.bench.cost import layered
+from wamnet.kernels.bench.workload import Given
+from wamnet.kernels.export.onnx_export import graph
+from wamnet.refimpl.network.denoise import Model
+
+from .peer_onnxruntime import Run, at_first, quantised
 
 
 def _open(name: str, precision: str, tools: Tools, model: Model, size: int) -> Opened:

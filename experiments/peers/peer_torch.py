@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl.network.activation import RELU, SINE
-from ....refimpl.network.denoise import Model
-from ....refimpl.network.siren import Siren
-from ....refimpl.network.train import Recipe
-from ..contender import Contender, Opened, Tools, activation_in, told_as_missing
-from ..cost import layered
-from ..workload import Given
+from wamnet.kernels.bench.contender import Contender, Opened, Tools, activation_in, told_as_missing
+from wamnet.kernels.bench.cost import layered
+from wamnet.kernels.bench.workload import Given
+from wamnet.refimpl.network.activation import RELU, SINE
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.siren import Siren
+from wamnet.refimpl.network.train import Recipe
 
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""

@@ -64,7 +64,7 @@ def is_declared_elsewhere(node: ast.stmt) -> bool:
     return any(d.endswith(("overload", "override", ".setter")) for d in decorators)
 
 
-UNTYPED = {"kernels/bench/peers/peer_numba.py"}
+UNTYPED = {"experiments/peers/peer_numba.py"}
 """Files whose functions have the types that a compiler of Python finds."""
 
 

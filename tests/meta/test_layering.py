@@ -11,16 +11,16 @@ import budget
 import pytest
 
 PEERS = {
-    "torch": ("kernels/bench/peers/peer_torch.py",),
-    "onnx": ("kernels/bench/peers/peer_onnxruntime.py", "compiler/importing/graph.py"),
-    "onnxruntime": ("kernels/bench/peers/peer_onnxruntime.py",),
-    "openvino": ("kernels/bench/peers/peer_openvino.py",),
-    "tinygrad": ("kernels/bench/peers/peer_tinygrad.py",),
-    "halide": ("kernels/bench/peers/peer_halide.py",),
-    "numba": ("kernels/bench/peers/peer_numba.py",),
-    "pyoidn": ("kernels/bench/peers/peer_oidn.py",),
-    "mitsuba": ("kernels/bench/peers/peer_mitsuba.py", "spec/conformance/renderers/mitsuba_process.py"),
-    "bpy": ("kernels/bench/peers/cycles_process.py", "kernels/blender/process.py"),
+    "torch": ("experiments/peers/peer_torch.py",),
+    "onnx": ("kernels/export/onnx_export.py", "compiler/importing/graph.py"),
+    "onnxruntime": ("experiments/peers/peer_onnxruntime.py", "kernels/export/onnx_export.py"),
+    "openvino": ("experiments/peers/peer_openvino.py",),
+    "tinygrad": ("experiments/peers/peer_tinygrad.py",),
+    "halide": ("experiments/peers/peer_halide.py",),
+    "numba": ("experiments/peers/peer_numba.py",),
+    "pyoidn": ("experiments/peers/peer_oidn.py",),
+    "mitsuba": ("experiments/peers/peer_mitsuba.py", "spec/conformance/renderers/mitsuba_process.py"),
+    "bpy": ("experiments/peers/cycles_process.py", "kernels/blender/process.py"),
 }
 """Packages that are compared with, and the only files of each; one file reads graphs of others by onnx."""
 
@@ -49,6 +49,7 @@ ALLOWED = {
 ORDER = tuple(ALLOWED)
 OTHERS = {
     "spec/conformance/renderers": {"numpy", "typer"},
+    "experiments/peers": {"numpy", "wamnet_verify", *PEERS},
     "course": {"numpy", "typer", "wamnet_verify"},
 }
 """What each other distribution may import in addition to the standard library and the package."""
@@ -56,7 +57,7 @@ OTHERS = {
 PUBLIC = ("api", "kernel")
 """Modules of the folder `wamnet`, which are imported from beside the parts."""
 
-OUTSIDE = ("tests", "experiments", "docs")
+OUTSIDE = ("tests", "experiments", "docs", "examples")
 """Folders that may import everything and that nothing may import."""
 
 
@@ -189,7 +190,7 @@ def test_devices_are_used_in_kernels_only(house):
 def test_peers_are_used_in_their_file_only(house):
     """And only when they are used: nothing that is installed needs them."""
     wrong = []
-    for source in house.parts():
+    for source in house.installed():
         at_import = {id(node) for node in source.tree.body}
         for node, name in imports(source):
             place = PEERS.get(name.partition(".")[0])

@@ -17,10 +17,10 @@ from typing import NamedTuple
 CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 """A clause opens a paragraph with its number, as **RNG-1**."""
 
-CODE = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli)/[\w/]+\.py): *([\w., ]+)`")
+CODE = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py): *([\w., ]+)`")
 """Code is named by path and names: `refimpl/rng.py: pcg4d`; several names are separated by commas."""
 
-BROKEN = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli)/[\w/]+\.py:)[^`\n]*\n[^`]*`")
+BROKEN = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py:)[^`\n]*\n[^`]*`")
 """Names of code over two lines, which nobody would see."""
 
 REFERENCE = re.compile(r"\b([A-Z]{2,5}-\d+[a-z]?)\b")

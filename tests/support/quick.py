@@ -35,7 +35,11 @@ else:
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 """Where the packages of the quick set-up are listed."""
 
-DISTRIBUTIONS = {"spec/conformance/renderers": "wamnet_verify", "course": "wamnet_course"}
+DISTRIBUTIONS = {
+    "spec/conformance/renderers": "wamnet_verify",
+    "experiments/peers": "wamnet_peers",
+    "course": "wamnet_course",
+}
 """Package of each other distribution in this repository, by its folder."""
 
 NEEDS = {

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.peers.peer_mitsuba import room_walls
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
 from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
 from wamnet.refimpl.light.shapes.quad import light_radiance
@@ -98,6 +97,16 @@ class Mesh:
     look: Look
     front: bool
     thick: float = 0.0
+
+
+def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
+    """Return corner and edges (3,) of the walls, in the order of WALLS, whose normals point inwards."""
+    low, edges = np.array(room.low), np.diag(np.subtract(room.high, room.low))
+    walls = []
+    for axis in range(3):
+        u, v = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
+        walls += [(low, u, v), (low + edges[axis], v, u)]
+    return walls
 
 
 def parts_of(scene: Scene) -> Parts:

@@ -36,7 +36,7 @@ from lab.tables import Column
 from lights import NAMES, seen_colors
 from numpy.typing import NDArray
 
-from wamnet.kernels.run.draws import variation_of
+from wamnet.models.data.draws import variation_of
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical

@@ -52,7 +52,7 @@ from lab.ground import (
 from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
-from wamnet.kernels.run.draws import variation_of
+from wamnet.models.data.draws import variation_of
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import AT_REST, Ranges, Variation

@@ -29,13 +29,13 @@ from lab.frames import Shot, frames, reference
 from lab.sets import SETS
 from quality import PLANS, ROWS, SHIPPED_SET, Bench
 
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench.measure_pipeline import PEERS, STEP_S, moments
-from wamnet.kernels.run.frame_plan import TRAIN
-from wamnet.kernels.run.geometry import Shown, compare
 from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_on import render_on
+from wamnet.models.data.frame_plan import TRAIN
+from wamnet.models.data.geometry import Shown, compare
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Floats

@@ -46,7 +46,7 @@ from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run import tune
 from wamnet.kernels.run.denoise_on import images_of, images_on
-from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame

@@ -37,7 +37,6 @@ from numpy.typing import NDArray
 from wamnet.cli.common.inputs import load_model
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.model_file import save_model
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
@@ -49,6 +48,7 @@ from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.kernels.export.wgpu_runner import WgpuRunner, hlsl_runner, vulkan_runner
 from wamnet.kernels.run.denoise_on import images_of
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical

@@ -25,7 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..compiler.core.writing import write_bytes
+from ..models.writing import write_bytes
 from ..refimpl.errors import InputError, shown
 from ..refimpl.reading import BROKEN, parse_json, read_file
 from .folders import cache_base, is_private

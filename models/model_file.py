@@ -38,7 +38,7 @@ from ..refimpl.network.siren import Siren
 from ..refimpl.network.train import TrainState
 from ..refimpl.network.whole import Whole
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
-from .core.writing import write_bytes
+from .writing import write_bytes
 
 Tensors = Mapping[str, NDArray[Any]]
 Texts = Mapping[str, str]

@@ -209,7 +209,7 @@ def demo(
 
 def of_scene(plan: Plan, name: str) -> Plan:
     """Return the plan for a scene: the preset that suits its materials, and views if it is static."""
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
     from ...refimpl.light.shading import build, ever_follows
 
     source = scene_source(name)
@@ -315,8 +315,8 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
     from ...compiler.scenes.lower_encode import sees
-    from ...kernels.run import frame_plan
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data import frame_plan
+    from ...models.data.scene_source import scene_source
     from ...refimpl.network.train import PRESETS
 
     source = scene_source(plan.scene)
@@ -349,8 +349,8 @@ def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
 
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
     """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
-    from ...compiler.model_file import load_checkpoint
     from ...kernels.run.trainer import facts_of
+    from ...models.model_file import load_checkpoint
     from ...refimpl.network.train import PRESETS, model_of
 
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)

@@ -29,7 +29,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from ...compiler.core.writing import TEMPORARY_NAME, is_regular, remove_temporaries
+from ...models.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
 from ...refimpl.reading import BROKEN, parse_json, read_file
 from .alone import working_in
@@ -196,7 +196,7 @@ def manifest_of(
 
     `nearest` says of each split of test frames how far the nearest training frame is.
     """
-    from ...kernels.run.frame_plan import version
+    from ...models.data.frame_plan import version
 
     facts = [frame.describe() for frame in frames]
     for frame in facts:
@@ -419,7 +419,7 @@ class Store(Generic[BandT]):
 
     def _join_if_whole(self, picture: Pictured[Band]) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
-        from ...kernels.run.frame_plan import join
+        from ...models.data.frame_plan import join
         from . import exr
 
         bands, whole = self._bands[picture.name], (0, picture.height)

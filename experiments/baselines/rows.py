@@ -30,9 +30,9 @@ from wamnet.cli.common.packages import need
 from wamnet.cli.files import exr
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.run import draws, geometry
 from wamnet.kernels.run.denoise_on import images_of
-from wamnet.kernels.run.geometry import Shown
+from wamnet.models.data import draws, geometry
+from wamnet.models.data.geometry import Shown
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.frame import Floats, Frame

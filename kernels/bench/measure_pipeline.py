@@ -27,6 +27,7 @@ import numpy as np
 
 from ...compiler.compile import compile_plan
 from ...compiler.variants import plan_model
+from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ...refimpl.network import dataset, siren
@@ -37,7 +38,6 @@ from ..measure import in_turns
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
-from ..run.scene_source import scene_source
 from ..run.tune import choose
 
 MOMENTS = 48

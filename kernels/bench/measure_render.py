@@ -26,13 +26,13 @@ from typing import Any
 
 import numpy as np
 
+from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ..devices.registry import open_executor
 from ..measure import environment
 from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
-from ..run.scene_source import scene_source
 from . import peers
 
 Frames = Callable[[int], Any]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import schedule_text
 from ...compiler.languages.interface import FULL, PLAIN
-from ...compiler.model_file import model_bytes
+from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image

@@ -13,9 +13,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ...refimpl.errors import InputError
-from ..run.draws import times
-from ..run.frame_plan import KINDS, SPLITS, TRAIN
-from ..run.render_frame import Rows
+from ..data.draws import times
+from ..data.frame_plan import KINDS, SPLITS, TRAIN, Rows
 
 LARGEST_SEED = (1 << 31) - 1
 """Of Cycles."""

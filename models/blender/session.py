@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...refimpl.errors import ExecutorUnavailable, InputError
-from ..run.line_process import LineProcess
+from .line_process import LineProcess
 from .plan import Animation, Shot
 from .process import MARK
 

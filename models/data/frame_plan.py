@@ -7,8 +7,8 @@
    [`compared`].
 4. A picture is cut into bands of rows, each an independent task [`Picture.tasks`]; how is a function of the
    request only, so that an interrupted run finds its bands again whatever the number of workers is.
-5. A task is carried out anywhere [`carry_out`], and the bands of a picture are joined [`join`]. A noisy
-   picture with others before it is one task, since a history needs whole pictures [before.py].
+5. A task is carried out anywhere [kernels/run/before.py], and the bands of a picture are joined [`join`]. A
+   noisy picture with others before it is one task, since a history needs whole pictures.
 
 The pictures are a function of the request and of the version of this package.
 """
@@ -30,10 +30,8 @@ from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.scenes import TURN_SECONDS
 from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, Ranges, check_ranges, varied
-from .before import MOST_BEFORE, followed
 from .draws import Draw, drawn, drawn_outside
 from .geometry import Comparison, Shown, compare
-from .render_frame import Progress, Rows, render_frame, renderer
 from .scene_source import SCENE_FILE, Parameters, SceneSource
 
 NOISY_SPP = 1
@@ -54,6 +52,12 @@ TRAIN, TEST, OUTSIDE = "train", "test", "outside"
 
 SPLITS = (TRAIN, TEST, OUTSIDE)
 """The splits in the order of their frames."""
+
+MOST_BEFORE = 256
+"""Most pictures before a frame: at rest a history counts to 64, and studies to four times as many."""
+
+Rows = tuple[int, int]
+"""A band of rows [first, last)."""
 
 Pair = tuple[float, float]
 
@@ -290,8 +294,7 @@ def plan(request: Request) -> list[FramePlan]:
 
 
 def _check(request: Request) -> None:
-    """Refuse an executor, a scene, numbers of frames, an animation or a seed that mean nothing."""
-    renderer(request.executor)
+    """Refuse a scene, numbers of frames, an animation or a seed that mean nothing."""
     for name, low in (("frames", 1), ("test_frames", 0), ("outside_frames", 0)):
         value = getattr(request, name)
         if not low <= value <= LARGEST_FRAMES:
@@ -338,18 +341,6 @@ def compared(
         shown[frame.split].append(Shown(frame.name, frame.draw.time_s, scene))
     train = shown.pop(TRAIN)
     return compare(train, shown, on_progress) if any(shown.values()) else {}
-
-
-def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
-    """Render a task's rows; a worker that has another version of this package refuses."""
-    if task.version != version():
-        rule = f"the data set is made by {task.version}, and every worker must have the same"
-        raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
-    picture = task.picture
-    executor = picture.request.executor
-    if picture.before:
-        return followed(executor, picture.scene_at, picture.job, picture.before, on_progress)
-    return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame
 
 
 def join(bands: Sequence[Frame]) -> Frame:

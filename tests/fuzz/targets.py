@@ -30,11 +30,11 @@ from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Node, Program, Type
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.importing.network import import_network
-from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
 from wamnet.kernels import cache
 from wamnet.kernels.run import curve
+from wamnet.models.importing.network import import_network
+from wamnet.models.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scene, variation
@@ -61,7 +61,7 @@ VECTORS = Path(case.__file__).parents[1] / "vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""
 
 
-NETWORKS = Path(__file__).parents[1] / "compiler/networks"
+NETWORKS = Path(__file__).parents[1] / "models/networks"
 """Where networks of other programs are."""
 
 

@@ -18,7 +18,7 @@ from quick import DISTRIBUTIONS
 ROOT = Path(__file__).resolve().parents[2]
 """The repository's root folder."""
 
-PARTS = ("models", "refimpl", "compiler", "kernels", "spec", "cli", "wamnet")
+PARTS = ("refimpl", "models", "compiler", "kernels", "spec", "cli", "wamnet")
 """The folders that make up the package, in the order of imports: each may import those before it."""
 
 FOREIGN = {"out", "build", "dist", "__pycache__", "node_modules"}

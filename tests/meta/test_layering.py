@@ -12,7 +12,7 @@ import pytest
 
 PEERS = {
     "torch": ("experiments/peers/peer_torch.py",),
-    "onnx": ("kernels/export/onnx_export.py", "compiler/importing/graph.py"),
+    "onnx": ("kernels/export/onnx_export.py", "models/importing/graph.py"),
     "onnxruntime": ("experiments/peers/peer_onnxruntime.py", "kernels/export/onnx_export.py"),
     "openvino": ("experiments/peers/peer_openvino.py",),
     "tinygrad": ("experiments/peers/peer_tinygrad.py",),
@@ -20,14 +20,14 @@ PEERS = {
     "numba": ("experiments/peers/peer_numba.py",),
     "pyoidn": ("experiments/peers/peer_oidn.py",),
     "mitsuba": ("experiments/peers/peer_mitsuba.py", "spec/conformance/renderers/mitsuba_process.py"),
-    "bpy": ("experiments/peers/cycles_process.py", "kernels/blender/process.py"),
+    "bpy": ("experiments/peers/cycles_process.py", "models/blender/process.py"),
 }
 """Packages that are compared with, and the only files of each; one file reads graphs of others by onnx."""
 
 ALLOWED = {
-    "models": set(),
     "refimpl": {"numpy"},
-    "compiler": {"numpy", "safetensors", "onnx", "google"},
+    "models": {"numpy", "safetensors", "onnx", "google", "bpy"},
+    "compiler": {"numpy"},
     "kernels": {"numpy", "pyopencl", "pocl", "moderngl", "wgpu", "PIL", *PEERS},
     "spec": {"numpy"},
     "cli": {
@@ -76,8 +76,8 @@ def imports(source) -> Iterator[tuple[ast.AST, str]]:
 
 
 ROOMS = {
-    "models": {"": ()},
     "refimpl": {"": (), "light": ("",), "network": ("",)},
+    "models": {"": (), "importing": ("",), "data": (), "blender": ("data",)},
     "compiler": {
         "core": (),
         "languages": ("core",),
@@ -85,7 +85,6 @@ ROOMS = {
         "reading": ("core", "proof"),
         "schedules": ("core", "languages", "proof"),
         "": ("core", "languages", "proof", "schedules"),
-        "importing": ("core", ""),
         "scenes": ("core", "languages", "proof", "schedules", ""),
         "training": ("core", "languages", "proof", "schedules", ""),
     },
@@ -94,7 +93,6 @@ ROOMS = {
         "devices": ("",),
         "run": ("", "devices"),
         "judge": ("", "devices", "run"),
-        "blender": ("", "run"),
         "bench": ("", "devices", "run"),
         "export": ("", "devices", "run", "bench"),
     },

@@ -74,7 +74,7 @@ def pipeline(
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring
     from ....kernels.bench.workload import check_size
-    from ....kernels.run.scene_source import scene_source
+    from ....models.data.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 

@@ -7,7 +7,7 @@ import pytest
 import strangers
 from packages import needed
 
-from wamnet.compiler.importing.network import import_network
+from wamnet.models.importing.network import import_network
 from wamnet.refimpl.network.imported import evaluate
 
 pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]

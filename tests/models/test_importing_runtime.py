@@ -11,7 +11,7 @@ import pytest
 from packages import needed
 from strangers import graph
 
-from wamnet.compiler.importing.network import import_network
+from wamnet.models.importing.network import import_network
 from wamnet.refimpl.errors import InputError
 
 pytestmark = pytest.mark.needs("packages")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.kernels.run import geometry as G
+from wamnet.models.data import geometry as G
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import Variation, varied

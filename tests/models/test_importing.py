@@ -11,10 +11,10 @@ from strangers import STRANGERS, graph
 
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.importing.network import import_network
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.variants import plan_model
+from wamnet.models.importing.network import import_network
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network.imported import Step, evaluate
 

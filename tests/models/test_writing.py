@@ -7,7 +7,7 @@ import os
 import pytest
 
 from wamnet.compiler.artifact import MANIFEST_NAME
-from wamnet.compiler.core import writing
+from wamnet.models import writing
 
 
 def test_temporary_names_cannot_be_guessed(tmp_path) -> None:

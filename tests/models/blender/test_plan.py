@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from wamnet.kernels.blender.plan import LARGEST_SEED, Animation, Request, drawn, plan
+from wamnet.models.blender.plan import LARGEST_SEED, Animation, Request, drawn, plan
 from wamnet.refimpl.errors import InputError
 
 FILM = Animation("5.0", "hall", "ViewLayer", 1, 48, 1, 24.0, 384, 288, "BOX", "CPU")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wamnet.kernels.run import draws
+from wamnet.models.data import draws
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import TURN_SECONDS, canonical
 from wamnet.refimpl.light.variation import Ranges, outside, saturation_of, varied

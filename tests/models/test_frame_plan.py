@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.run import frame_plan
-from wamnet.kernels.run.frame_plan import Request, carry_out, frame_draws, join, plan
+from wamnet.kernels.run.before import carry_out
+from wamnet.models.data import frame_plan
+from wamnet.models.data.frame_plan import Request, frame_draws, join, plan
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import render
 from wamnet.refimpl.light.scenes import canonical
@@ -147,7 +148,6 @@ def test_joined_bands_are_the_reference(monkeypatch) -> None:
         ({"outside_frames": 1}, "number of frames outside is 1"),
         ({"arc_s": 8.0}, "arc_s is 8.0: training leaves it out of the animation"),
         ({"yaw_deg": (10.0, -10.0)}, "range of yaw_deg is 10.0:-10.0"),
-        ({"executor": "abacus"}, "executor that renders is abacus"),
         ({"scene": "nowhere"}, "scene is nowhere: no canonical scene"),
         ({"parameters": {"time": 1.0}}, "parameter time is 1.0: each frame has its own; use --start"),
         ({"size_px": 0}, "width is 0"),
@@ -158,6 +158,13 @@ def test_refusals(change, text) -> None:
     """Before anything is rendered."""
     with pytest.raises(InputError, match=text):
         plan(replace(TINY, **change))
+
+
+def test_an_unknown_executor_is_rejected() -> None:
+    """Where a task is carried out: plans know no executors."""
+    (task,) = plan(replace(TINY, executor="abacus"))[0].pictures["noisy"].tasks()
+    with pytest.raises(InputError, match="executor that renders is abacus"):
+        carry_out(task)
 
 
 def test_a_worker_of_another_version_refuses() -> None:

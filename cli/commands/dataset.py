@@ -278,15 +278,8 @@ def make(
             _render(store, request, frames[0], workers, scheduler)
     for line in summed_up(nearest):
         say(line)
-    say_what_was_made(store, made)
-
-
-def say_what_was_made(store: dataset_files.Store[Any], made: int) -> None:
-    """Say how many pictures there are, and which have other bytes than an earlier run's."""
-    for name in store.changed:
-        say(f"{store.folder / name}: has other bytes than before; another NumPy or processor made it")
-    count = f"{len(store.pictures)} pictures of {len(store.frames)} frames"
-    say(f"{store.folder}: {count}, {made} of them made now")
+    for line in store.summary(made):
+        say(line)
 
 
 def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:

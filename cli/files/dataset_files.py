@@ -401,6 +401,13 @@ class Store(Generic[BandT]):
             if task.rows not in self._bands[name]
         ]
 
+    def summary(self, made: int) -> list[str]:
+        """Return a line per picture with other bytes than an earlier run's, and the number of pictures."""
+        reason = "has other bytes than before; another NumPy or processor made it"
+        count = f"{len(self.pictures)} pictures of {len(self.frames)} frames"
+        changed = [f"{self.folder / name}: {reason}" for name in self.changed]
+        return [*changed, f"{self.folder}: {count}, {made} of them made now"]
+
     def put(self, task: Band, band: Frame) -> None:
         """Keep a rendered band; when it is its picture's last one, finish the picture."""
         self._publish(task.picture, task.rows, band)

@@ -15,7 +15,6 @@ from ....models.data.frame_plan import KINDS
 from ...common.inputs import check_input
 from ...common.terminal import progress, say
 from ...files import dataset_files, exr
-from ..dataset import say_what_was_made
 
 if TYPE_CHECKING:
     from ....models.blender.plan import FilmFrame, Request, Shot
@@ -66,7 +65,8 @@ def make(folder: Path, asked: Asked) -> None:
         f"{asked.file}: frames {animation.first} to {animation.last} of {animation.scene}, view layer "
         f"{animation.view_layer}, by Cycles of Blender {animation.version}"
     )
-    say_what_was_made(store, made)
+    for line in store.summary(made):
+        say(line)
 
 
 def _planned(asked: Asked, blender: Blender) -> tuple[Request, list[FilmFrame]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wamnet.kernels.bench.contender import Contender, Opened, Tools, told_as_missing
 from wamnet.kernels.bench.cost import layered
 from wamnet.kernels.bench.workload import Given
-from wamnet.kernels.export.onnx_graph import graph
+from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
 
 

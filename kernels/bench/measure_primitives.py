@@ -37,7 +37,8 @@ from ...refimpl.light.scene import (
     primitives,
 )
 from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 from . import peers
 from .measure_render import BY_HAND, VARIANT
 

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from ...compiler.core.ir import sha256
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 from . import onnx_export, tools
 from .check_pair import SEED
 from .package import Export

@@ -36,7 +36,7 @@ from .alone import working_in
 from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
-    from ...kernels.run.render_frame import Rows
+    from ...models.data.frame_plan import Rows
     from ...refimpl.frame import Frame
 
 SCHEMA = "wamnet-dataset-2"

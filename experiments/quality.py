@@ -42,18 +42,18 @@ from wamnet.compiler.schedules.schedules import PLAIN
 from wamnet.compiler.targets import target_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run import tune
 from wamnet.kernels.run.denoise_on import images_of, images_on
-from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import BEST, MIRRORS, SHORT, SKY, Recipe
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SHIPPED_SET = "minicubes-page"
 """The set that the network of the web page learns from: everything that the page can move."""

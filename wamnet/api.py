@@ -52,14 +52,14 @@ def load(
 
         model = wamnet.load("minicubes")
     """
-    from .compiler.model_file import load_model
+    from .models.model_file import load_model
     from .refimpl.network.denoise import Model
 
     if isinstance(model, Model):
         return model
     path = Path(model)
     if path.suffix.lower() == ".onnx":
-        from .compiler.importing.network import import_network
+        from .models.importing.network import import_network
 
         return import_network(path, dict(ranges or {}), border).model
     if ranges is not None or border:
@@ -375,7 +375,7 @@ def _name(executor: str, trains: bool = False) -> str:
 
 def _scene(scene: Paths | Scene, parameters: Mapping[str, Any]) -> Scene:
     """Return a canonical scene by name, or that of a file."""
-    from .kernels.run.scene_source import scene_source
+    from .models.data.scene_source import scene_source
     from .refimpl.light.scene import Scene
 
     if not isinstance(scene, Scene):

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...compiler.core.writing import remove_temporaries
+from ...models.writing import remove_temporaries
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.domain import Watch
@@ -126,7 +126,7 @@ def animate(
     After any interruption the same command resumes where it was.
     """
     from ...compiler.scenes.lower_encode import feature_rays
-    from ...kernels.run.frame_plan import animation_times
+    from ...models.data.frame_plan import animation_times
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -241,7 +241,7 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
 
 def scene_of(model: Model) -> str:
     """Return the canonical scene that a model was trained on, or minicubes; reject that of a file."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
 
     if f"trained_on_{SCENE_FILE}" in model.info:
         name, rule = model.info.get("trained_on_scene", ""), "it is that of a scene file"
@@ -273,7 +273,7 @@ def plan_shots(
     and camera rays of the features (or 0).
     """
     from ...compiler.scenes.lower_encode import sees
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
 

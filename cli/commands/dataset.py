@@ -1,6 +1,6 @@
 """`wamnet dataset`: pairs of noisy pictures and targets over an animation, on as many processes as there are.
 
-1. The request says what the data set consists of [`kernels/run/frame_plan.py`]; the folder says what of it is
+1. The request says what the data set consists of [`models/data/frame_plan.py`]; the folder says what of it is
    there [`cli/files/dataset_files.py`].
 2. Before anything is rendered, what the frames show is compared; test frames that are not unseen are refused
    [`compared`].
@@ -29,8 +29,8 @@ from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
 if TYPE_CHECKING:
-    from ...kernels.run.frame_plan import FramePlan, Request, Task
-    from ...kernels.run.scene_source import Parameters
+    from ...models.data.frame_plan import FramePlan, Request, Task
+    from ...models.data.scene_source import Parameters
 
 EXAMPLES = """Examples:
 
@@ -186,7 +186,7 @@ def dataset(
     another frame shows are refused. The folder gets a manifest with draws, seeds and checksums. The same
     command resumes after any interruption, and makes damaged files again. Workers change no byte.
     """
-    from ...kernels.run.frame_plan import plan
+    from ...models.data.frame_plan import plan
 
     if only_check:
         check(output, scene)
@@ -214,8 +214,8 @@ def _request(
     last: tuple[bool, str | None, int],
 ) -> Request:
     """Return the request of a scene's name and parameters, of fields, ranges by option and the last three."""
-    from ...kernels.run.frame_plan import Request
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.frame_plan import Request
+    from ...models.data.scene_source import scene_source
 
     options.refuse_given(command, OF_BLENDER, "without --from-blender")
     source, (seen, power, before) = scene_source(*named), last
@@ -278,20 +278,13 @@ def make(
             _render(store, request, frames[0], workers, scheduler)
     for line in summed_up(nearest):
         say(line)
-    say_what_was_made(store, made)
-
-
-def say_what_was_made(store: dataset_files.Store[Any], made: int) -> None:
-    """Say how many pictures there are, and which have other bytes than an earlier run's."""
-    for name in store.changed:
-        say(f"{store.folder / name}: has other bytes than before; another NumPy or processor made it")
-    count = f"{len(store.pictures)} pictures of {len(store.frames)} frames"
-    say(f"{store.folder}: {count}, {made} of them made now")
+    for line in store.summary(made):
+        say(line)
 
 
 def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     """Return how far the nearest training frame is, by split of test frames; refuse frames that are alike."""
-    from ...kernels.run import frame_plan
+    from ...models.data import frame_plan
 
     tests = any(frame.split != frame_plan.TRAIN for frame in frames)
     with progress("comparing what the frames show", len(frames) if tests else 0) as advance:
@@ -317,8 +310,9 @@ def _render(
     scheduler: str | None,
 ) -> None:
     """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
-    from ...kernels.run.frame_plan import KINDS, carry_out
+    from ...kernels.run.before import carry_out
     from ...kernels.run.render_frame import renderer
+    from ...models.data.frame_plan import KINDS
     from ...refimpl.frame import Frame
 
     tasks = store.tasks()

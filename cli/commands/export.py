@@ -148,7 +148,7 @@ class Span:
         Some scenes are laid out in another way at time 0, where their boxes are parallel to the axes.
         """
         from ...kernels.export.motion import TIME, Motion
-        from ...kernels.run.frame_plan import animation_times
+        from ...models.data.frame_plan import animation_times
 
         if TIME not in self.kinds:
             given = {"--seconds": self.seconds, "--fps": self.fps}

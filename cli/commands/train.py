@@ -138,7 +138,7 @@ def train(
     more --steps it continues after the end; the learning rate, which falls over the length of the run, then
     jumps, so the model differs from that of a run which had this length from the start.
     """
-    from ...compiler.model_file import load_checkpoint
+    from ...models.model_file import load_checkpoint
 
     inputs, targets = inputs or [], targets or []
     check_output(output, (".safetensors",), [*inputs, *targets])
@@ -219,7 +219,7 @@ def _of_variant(
 
 def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
     """Write a model in integers, rounded on the frames and not trained, and say so."""
-    from ...compiler.model_file import save_model
+    from ...models.model_file import save_model
     from ...refimpl.network.train import whole_of
     from ..common.inputs import load_model
 
@@ -379,8 +379,8 @@ def fit(
 
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
-    from ...compiler.model_file import save_checkpoint, save_model
     from ...kernels.run.trainer import model_of_run
+    from ...models.model_file import save_checkpoint, save_model
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()

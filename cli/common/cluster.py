@@ -18,7 +18,7 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
-from ...compiler.core.writing import signals_wait
+from ...models.writing import signals_wait
 from ...refimpl.errors import InputError
 from .packages import need
 

@@ -52,7 +52,7 @@ def load_model(path: Path, imported: bool = False) -> Model:
 
     `imported`: networks of other programs too, which do not read frames.
     """
-    from ...compiler import model_file
+    from ...models import model_file
 
     path = model_path(path)
     try:
@@ -71,7 +71,7 @@ def load_model(path: Path, imported: bool = False) -> Model:
 
 def trained_scene(model: Model) -> str | None:
     """Return the canonical scene that a model was trained on; None for several, a file's, and no name."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
     from ...refimpl.light.scenes import CANONICAL
 
     name = model.info.get("trained_on_scene", "")
@@ -80,7 +80,7 @@ def trained_scene(model: Model) -> str | None:
 
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
 
     told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
@@ -114,7 +114,7 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
     from ...refimpl.light.scenes import CANONICAL, canonical
     from ...refimpl.light.variation import RANGES, outside, ranges_from_json
 
@@ -130,7 +130,7 @@ def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
     """Return a canonical scene by name, or that of a scene file, as a view has it."""
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
 
     parameters = options.parse_parameters(assignments)
     if time is not None:

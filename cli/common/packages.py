@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ...compiler.core.writing import signals_wait
+from ...models.writing import signals_wait
 from ...refimpl.errors import InputError
 
 

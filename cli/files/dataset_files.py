@@ -29,14 +29,14 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from ...compiler.core.writing import TEMPORARY_NAME, is_regular, remove_temporaries
+from ...models.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
 from ...refimpl.reading import BROKEN, parse_json, read_file
 from .alone import working_in
 from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
-    from ...kernels.run.render_frame import Rows
+    from ...models.data.frame_plan import Rows
     from ...refimpl.frame import Frame
 
 SCHEMA = "wamnet-dataset-2"
@@ -196,7 +196,7 @@ def manifest_of(
 
     `nearest` says of each split of test frames how far the nearest training frame is.
     """
-    from ...kernels.run.frame_plan import version
+    from ...models.data.frame_plan import version
 
     facts = [frame.describe() for frame in frames]
     for frame in facts:
@@ -401,6 +401,13 @@ class Store(Generic[BandT]):
             if task.rows not in self._bands[name]
         ]
 
+    def summary(self, made: int) -> list[str]:
+        """Return a line per picture with other bytes than an earlier run's, and the number of pictures."""
+        reason = "has other bytes than before; another NumPy or processor made it"
+        count = f"{len(self.pictures)} pictures of {len(self.frames)} frames"
+        changed = [f"{self.folder / name}: {reason}" for name in self.changed]
+        return [*changed, f"{self.folder}: {count}, {made} of them made now"]
+
     def put(self, task: Band, band: Frame) -> None:
         """Keep a rendered band; when it is its picture's last one, finish the picture."""
         self._publish(task.picture, task.rows, band)
@@ -419,7 +426,7 @@ class Store(Generic[BandT]):
 
     def _join_if_whole(self, picture: Pictured[Band]) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
-        from ...kernels.run.frame_plan import join
+        from ...models.data.frame_plan import join
         from . import exr
 
         bands, whole = self._bands[picture.name], (0, picture.height)

@@ -3,7 +3,7 @@
 1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is
    neither a folder nor one of the inputs [`check_output`].
 2. The content goes into a new file of another name in the same folder; only when it is complete does it take
-   the output's name, in one step of the file system [`replacing`, compiler/core/writing.py]. Whatever ends
+   the output's name, in one step of the file system [`replacing`, models/writing.py]. Whatever ends
    the writer before that (an error, Ctrl-C) removes the new file and leaves the old one.
 3. A folder that a command works in is a real one, or is not there yet [`check_real_folder`].
 4. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...compiler.core import writing
+from ...models import writing
 from ...refimpl.errors import InputError, escaped
 
 

@@ -78,7 +78,7 @@ def learned_scene(model: Model) -> str:
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
     """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
     from ...kernels.run.page import Animation
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
 
     still = scene_source(name, options.parse_parameters(assignments)).still
     if still is not None:

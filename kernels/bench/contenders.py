@@ -3,7 +3,7 @@
 1. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
 2. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
-3. Each peer has a file of its own, `peer_*.py`; a new one is a file and a line in `PEERS`.
+3. Peers come from another distribution, where it is installed [`peers.py`].
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
+from . import peers
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
-from .peers import peer_halide, peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .workload import Given
 
 VARIANTS: tuple[Variant, ...] = (
@@ -44,16 +44,6 @@ CACHES = {
     "opengl": "Mesa keeps shaders on disk, ~/.cache/mesa_shader_cache",
 }
 """What the drivers of an executor keep of what they have compiled."""
-
-PEERS: tuple[Contender, ...] = (
-    *peer_torch.CONTENDERS,
-    *peer_onnxruntime.CONTENDERS,
-    *peer_openvino.CONTENDERS,
-    *peer_tinygrad.CONTENDERS,
-    *peer_halide.CONTENDERS,
-    *peer_oidn.CONTENDERS,
-)
-"""What others make."""
 
 QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
@@ -125,7 +115,7 @@ def of_machine(
             found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
         if name != "numpy" and not quick:
             found += _of_integers(name, suits)
-    return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
+    return [*found, *(peer for peer in peers.contenders() if not quick or peer.name in QUICK)]
 
 
 def _of_integers(executor: str, suits: str) -> list[Contender]:

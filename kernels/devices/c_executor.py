@@ -43,8 +43,9 @@ from ...compiler.languages.interface import (
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .. import cache
 from ..folders import discard, new_temporary
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Denoiser, Executor, Kernel, Memory, is_denoiser, words
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
 from .images import widest
+from .kernel import Denoiser, Kernel, Memory, is_denoiser, words
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
 from ...refimpl.errors import InputError
-
-if TYPE_CHECKING:
-    from .executor import Denoiser
+from .kernel import Denoiser
 
 Images = Mapping[str, NDArray[np.float32]]
 """Images (H, W, C) by name."""

@@ -23,8 +23,9 @@ from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
-from .executor import Executor, Kernel, Memory
+from .executor import Executor
 from .images import Images
+from .kernel import Kernel, Memory
 from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22

@@ -23,20 +23,9 @@ from numpy.typing import NDArray
 from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import (
-    BYTE_SCHEDULE,
-    INDEX_LIMIT,
-    Denoiser,
-    Executor,
-    Kernel,
-    Memory,
-    Part,
-    Size,
-    in_order,
-    is_denoiser,
-    shapes,
-)
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
 from .images import Images, widest
+from .kernel import Denoiser, Kernel, Memory, Part, Size, in_order, is_denoiser, shapes
 
 if TYPE_CHECKING:
     from ...compiler.scenes.path_kernel import PathArtifact

@@ -25,7 +25,8 @@ from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...compiler.languages.glsl import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
-from .executor import Denoiser, Executor, Kernel, Memory, Size, is_denoiser
+from .executor import Executor
+from .kernel import Denoiser, Kernel, Memory, Size, is_denoiser
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\

@@ -6,7 +6,7 @@ import platform
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...compiler.core.writing import signals_wait
+from ...models.writing import signals_wait
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..folders import protect_caches
 from ..memory import widen_stacks

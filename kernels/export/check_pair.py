@@ -35,7 +35,7 @@ from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import windows
 from ...refimpl.network.dataset import FEATURES, encode_sums
 from ...refimpl.network.denoise import Model
-from ..devices.executor import Part
+from ..devices.kernel import Part
 from ..devices.registry import open_executor
 
 SIDES = (1, 3)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.hosts import CHANNELS
 from ...compiler.languages.interface import TABLE, Interface
-from ..devices.executor import Memory
+from ..devices.kernel import Memory
 from .gl_runner import ESRunner
 
 TOP = f"""\

@@ -29,10 +29,10 @@ from ...compiler.artifact import (
     manifest_text,
     weight_bytes,
 )
-from ...compiler.core.writing import is_regular, write_together
-from ...compiler.model_file import load_model
 from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import PLAIN
+from ...models.model_file import load_model
+from ...models.writing import is_regular, write_together
 from ...refimpl.errors import InputError, WamnetError
 from ...refimpl.network import siren
 from ...refimpl.network.dataset import Normalization, Window

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...compiler.languages.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.executor import Kernel
+from ..devices.kernel import Kernel
 from .buffer_runner import BufferRunner, Launch
 from .wgpu_runner import UNIFORM_BYTES, declared
 

@@ -24,13 +24,15 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import schedule_text
 from ...compiler.languages.interface import FULL, PLAIN
-from ...compiler.model_file import model_bytes
+from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
-from ..devices.executor import Denoiser as Kernel
-from ..devices.executor import Executor, Size
+from ..devices.executor import Executor
 from ..devices.images import Images
+from ..devices.kernel import Denoiser as Kernel
+from ..devices.kernel import Size
+from ..devices.planes import smoothed
 from ..memory import keep_freed_memory
 from .kept import kept_kernels
 from .tune import Subject, pick
@@ -141,7 +143,8 @@ def images_on(
     found = dict(images_of(replace(model, features=tuple(others)), frame))
     for feature in (FEATURES[name] for name in model.features if name not in found):
         given = {"color": feature.layer, **feature.guides}
-        found[feature.name] = executor.smooth(kernels, {what: frame[layer] for what, layer in given.items()})
+        layers = {what: frame[layer] for what, layer in given.items()}
+        found[feature.name] = smoothed(executor, kernels, layers)
     return {name: found[name] for name in model.features}
 
 

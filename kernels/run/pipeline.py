@@ -38,8 +38,9 @@ from ...refimpl.light.transport import SPREAD, Settings
 from ...refimpl.network.dataset import check_features
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.whole import INPUT_LEVELS
-from ..devices.executor import Executor, Part
-from ..devices.passes import PICTURE
+from ..devices.executor import Executor
+from ..devices.kernel import Part
+from ..devices.passes import PICTURE, Passes
 from .moving import MovingPaths
 from .render_on import SAMPLES_AT_ONCE
 from .tune import choose
@@ -142,7 +143,7 @@ class Pipeline:
         )
         self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
         self._drawn = self._closed = False
-        self.passes = executor.passes(self.encode, self.denoise, size)
+        self.passes = Passes(executor, self.encode, self.denoise, size)
 
     @property
     def _ray_count(self) -> int:

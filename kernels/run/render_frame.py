@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from ...models.data.frame_plan import Rows
 from ...refimpl.errors import InputError
 from ...refimpl.light.environment import with_sun
 from ...refimpl.light.render import Job, Render, render
@@ -22,9 +23,6 @@ from ..devices.registry import open_executor
 from ..memory import keep_freed_memory
 from .render_on import Frames, render_on
 from .render_pool import render_parallel
-
-Rows = tuple[int, int]
-"""A band of rows [first, last)."""
 
 Progress = Callable[[int], None]
 """Called with the number of samples that were just finished."""

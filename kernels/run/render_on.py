@@ -38,7 +38,8 @@ from ...refimpl.light.render import (
 )
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 from ..memory import keep_freed_memory
 from .moving import Moment, MovingPaths
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...compiler.core.writing import write_together
+from ...models.writing import write_together
 from ...refimpl.errors import InputError
 from .case import FORMAT, VERSION, Kind, text_of
 from .kinds import KINDS

@@ -16,8 +16,8 @@ from PIL import Image
 from wamnet.cli.commands import animate
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels.run.render_frame import render_frame
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

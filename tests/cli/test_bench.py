@@ -14,10 +14,10 @@ from wamnet.cli.commands import bench, bench_forms, bench_frames, train
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
 from wamnet.cli.reports import bench_report, plots, report
-from wamnet.compiler.model_file import load_model, save_checkpoint, save_model
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels.bench import contest, rates
-from wamnet.kernels.run.frame_plan import frame_draws
+from wamnet.models.data.frame_plan import frame_draws
+from wamnet.models.model_file import load_model, save_checkpoint, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.variation import Ranges
 

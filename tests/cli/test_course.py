@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli.course.labs import LABS
+from wamnet_course.labs import LABS
 
 pytestmark = pytest.mark.needs("programs")
 

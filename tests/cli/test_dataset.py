@@ -18,7 +18,8 @@ import pytest
 from wamnet import kernels
 from wamnet.cli.common import cluster
 from wamnet.cli.files import dataset_files, exr
-from wamnet.kernels.run import draws, frame_plan, render_frame
+from wamnet.kernels.run import render_frame
+from wamnet.models.data import draws, frame_plan
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.files import dataset_files, exr
-from wamnet.kernels.blender import session
+from wamnet.models.blender import session
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,8 +12,9 @@ import pytest
 
 from wamnet.cli.files import dataset_files as files
 from wamnet.cli.files.alone import LOCK
-from wamnet.kernels.run import frame_plan
-from wamnet.kernels.run.frame_plan import Request, carry_out, plan
+from wamnet.kernels.run.before import carry_out
+from wamnet.models.data import frame_plan
+from wamnet.models.data.frame_plan import Request, plan
 from wamnet.refimpl.errors import InputError
 
 REQUEST = Request("cornell", frames=2, test_frames=1, size_px=6, spp=2)

@@ -16,8 +16,8 @@ from wamnet.cli.files import dataset_files, exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
 from wamnet.cli.reports import machine, runs
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import plan_model
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.network.denoise import denoise
 
@@ -156,7 +156,7 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this was done before")
 
-    monkeypatch.setattr("wamnet.kernels.run.frame_plan.render_frame", never)
+    monkeypatch.setattr("wamnet.kernels.run.before.render_frame", never)
     monkeypatch.setattr("wamnet.refimpl.network.train.train_step", never)
     monkeypatch.setattr("wamnet.kernels.run.trainer.Run.enqueue", never)
     results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)

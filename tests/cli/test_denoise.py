@@ -14,9 +14,9 @@ import pytest
 from wamnet.cli.commands import denoise
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.devices.registry import CONTEXT_VARIABLE
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame

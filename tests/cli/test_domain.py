@@ -11,8 +11,8 @@ import pytest
 from wamnet.cli.commands import animate
 from wamnet.cli.common.domain import Watch
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels.run.trainer import facts_of, with_domain
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical

@@ -30,7 +30,7 @@ def started(wamnet, capsys, monkeypatch):
         return capsys.readouterr().out
 
     monkeypatch.setattr(render_frame, "render_frame", stop)
-    monkeypatch.setattr("wamnet.kernels.run.frame_plan.carry_out", stop)
+    monkeypatch.setattr("wamnet.kernels.run.before.carry_out", stop)
     monkeypatch.setattr("wamnet.compiler.scenes.lower_scene.lower_scene", stop)
     return run
 

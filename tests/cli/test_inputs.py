@@ -13,8 +13,8 @@ import pytest
 from wamnet import models
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.compiler.scenes.lower_encode import feature_rays
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scenes

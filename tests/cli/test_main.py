@@ -110,6 +110,18 @@ def test_wrong_options_are_one_line(refused, arguments, text) -> None:
     assert text in refused(*arguments)
 
 
+@pytest.mark.parametrize(("command", "distribution"), module.DISTRIBUTIONS.items())
+def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, distribution) -> None:
+    """Where they are not installed; the list of commands has them where they are."""
+    assert command in wamnet().out
+    monkeypatch.setattr(module, "entry_points", lambda group: [])
+    assert command not in wamnet().out
+    assert refused(command, "check", "1") == (
+        f"wamnet: error: command is {command}: distribution {distribution} is not installed; "
+        f"install it: pip install {distribution}\n"
+    )
+
+
 def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
     """A full disk is not a bug."""
 

@@ -10,8 +10,8 @@ import pytest
 
 from wamnet.cli.commands import train
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import train_on
+from wamnet.models.model_file import load_checkpoint, load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import train as reference
@@ -68,7 +68,7 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
     kept = []
     monkeypatch.setattr(train, "CHECKPOINT_INTERVAL_S", -1.0)
     monkeypatch.setattr(
-        "wamnet.compiler.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
+        "wamnet.models.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
     )
     frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
     recipe = train.choose_recipe("best", None, {"features": ("color",), "steps": 4})

@@ -16,10 +16,10 @@ from wamnet.cli.main import main
 from wamnet.compiler import artifact
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.core.ir import sha256
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels.devices.registry import WAYS
 from wamnet.kernels.judge import apart
 from wamnet.kernels.run.denoise_on import images_of
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 
 TWO = ("--executor", "numpy", "--executor", "opencl", "--schedules", "plain")

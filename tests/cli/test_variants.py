@@ -13,10 +13,10 @@ from wamnet.cli.commands.choose import Request, check_request
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels import cache, denoise_on, open_executor
 from wamnet.kernels.run import measure_curve
 from wamnet.kernels.run.curve import Curve, Point
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 

@@ -16,7 +16,7 @@ import pytest
 
 from wamnet.cli.commands import view
 from wamnet.cli.reports import webpage
-from wamnet.compiler.model_file import load_model, save_model
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import packages
 import pytest
 
-from wamnet.cli.course import table
-from wamnet.cli.course.grading import Limits, grade, grade_class
-from wamnet.cli.course.labs import lab_named
+from wamnet_course import table
+from wamnet_course.grading import Limits, grade, grade_class
+from wamnet_course.labs import lab_named
 
 pytestmark = pytest.mark.needs("programs")
 

@@ -12,7 +12,7 @@ from lab import frames
 from lab.frames import Shot
 
 from wamnet.kernels.run import render_on
-from wamnet.kernels.run.frame_plan import version
+from wamnet.models.data.frame_plan import version
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, USUAL
 from wamnet.refimpl.light import render as driver

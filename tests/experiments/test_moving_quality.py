@@ -6,7 +6,7 @@ import moving_quality
 import pytest
 from lab import printed
 
-from wamnet.kernels.run.frame_plan import TRAIN
+from wamnet.models.data.frame_plan import TRAIN
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 

@@ -14,7 +14,7 @@ from lab.results import Results
 from lab.sets import SETS
 
 import models
-from wamnet.compiler.model_file import load_model
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

@@ -17,7 +17,7 @@ from lab.results import Results
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.kernels import open_executor
-from wamnet.kernels.run import geometry
+from wamnet.models.data import geometry
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 

@@ -12,7 +12,7 @@ from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import target_named
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError

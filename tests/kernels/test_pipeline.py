@@ -20,7 +20,8 @@ from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
+from wamnet.kernels.devices.passes import Passes
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import SEEN, Frame
 from wamnet.refimpl.light import scenes
@@ -514,7 +515,7 @@ def test_kernels_in_another_language_are_refused(executor, model_of):
         Pipeline(elsewhere, scene("empty"), model, (2, 2)) as pipeline,
         pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"),
     ):
-        executor.passes(pipeline.encode, pipeline.denoise, (2, 2))
+        Passes(executor, pipeline.encode, pipeline.denoise, (2, 2))
 
 
 def test_too_large_a_picture_is_refused(executor_named, model_of):

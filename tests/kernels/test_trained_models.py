@@ -31,8 +31,8 @@ from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices import registry
 from wamnet.kernels.run.denoise_on import images_of
-from wamnet.kernels.run.draws import drawn
 from wamnet.kernels.run.render_frame import render_frame
+from wamnet.models.data.draws import drawn
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene

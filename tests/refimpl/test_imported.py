@@ -81,7 +81,7 @@ def test_many_outputs_are_refused():
 
 
 def test_a_model_of_it_is_checked():
-    from wamnet.compiler.model_file import imported_model
+    from wamnet.models.model_file import imported_model
 
     model = imported_model(network(), WINDOW, {})
     check_model(model)

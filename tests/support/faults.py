@@ -199,7 +199,7 @@ def prepare(folder: Path) -> None:
     import numpy as np
 
     from wamnet.cli.files import exr
-    from wamnet.compiler.model_file import save_model
+    from wamnet.models.model_file import save_model
     from wamnet.refimpl.light.render import Job, render
     from wamnet.refimpl.light.scenes import canonical
     from wamnet.refimpl.network import siren

@@ -57,7 +57,7 @@ def exports(
     from ....kernels.export.check import HEAD
     from ....kernels.export.shelf import random_model
     from ....kernels.export.targets import NAMES
-    from ....kernels.run.scene_source import scene_source
+    from ....models.data.scene_source import scene_source
 
     # Of a scene that moves, a time when its parts are turned.
     shown = scene_source(scene).at(TIME_S)

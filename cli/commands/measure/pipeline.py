@@ -24,8 +24,7 @@ from .shared import (
 )
 
 if TYPE_CHECKING:
-    from ....kernels.bench.measure_pipeline import Measured
-    from ....kernels.bench.peers.moving import Maker
+    from ....kernels.bench.measure_pipeline import Maker, Measured
     from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -75,7 +74,7 @@ def pipeline(
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring
     from ....kernels.bench.workload import check_size
-    from ....kernels.run.scene_source import scene_source
+    from ....models.data.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 
@@ -133,12 +132,13 @@ def _makers(
 ) -> dict[str, Maker]:
     """Open other makers of pictures until the stack is closed; note what they are, or why one is missing."""
     from ....kernels.bench import measure_pipeline as measuring
+    from ....kernels.bench import peers
     from ....refimpl.errors import ExecutorUnavailable, InputError
 
     makers: dict[str, Maker] = {}
     for name in names:
         try:
-            makers[name] = measuring.PEERS[name](measuring.moments(scene)[0], size)
+            makers[name] = peers.table().makers[name](measuring.moments(scene)[0], size)
         except (ExecutorUnavailable, InputError) as error:
             notes[f"No row: {error}"] = None
         else:

@@ -50,7 +50,7 @@ def primitives(
     from ....kernels import open_executor
     from ....kernels.bench import measure_primitives as measuring
     from ....kernels.bench.workload import check_size
-    from ....kernels.devices.executor import Part
+    from ....kernels.devices.kernel import Part
     from ....kernels.measure import environment
 
     given = names_of("--executors", executors, measuring.EXECUTORS)

@@ -14,7 +14,7 @@ from ...common.terminal import say
 from ...files.outputs import check_output
 
 if TYPE_CHECKING:
-    from ....compiler.importing.network import Found
+    from ....models.importing.network import Found
 
 EXAMPLES = """Examples:
 
@@ -66,8 +66,8 @@ def import_model(
     convolution becomes a layer on a window; the border of the picture is that of the network's own margins.
     What cannot be a kernel is refused with the node's name.
     """
-    from ....compiler.importing.network import import_network
-    from ....compiler.model_file import save_model
+    from ....models.importing.network import import_network
+    from ....models.model_file import save_model
 
     check_input(network)
     path = output or Path(network.with_suffix(SUFFIX).name)

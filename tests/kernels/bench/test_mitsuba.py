@@ -11,13 +11,13 @@ import pytest
 from peer_pictures import SPP, ours, p_values, theirs
 from statistical import SIGNIFICANCE, assert_all_plausible, sidak
 
-from wamnet.kernels.bench.peers import peer_mitsuba
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.materials import Dielectric
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Variation, varied
+from wamnet_peers import peer_mitsuba
 
 pytestmark = pytest.mark.apart
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from packages import needed
 
-from wamnet.kernels.bench.peers.peer_oidn import prefiltered
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet_peers.peer_oidn import prefiltered
 
 pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
 

@@ -14,7 +14,7 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.export.gl_runner import ESRunner
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light.scenes import canonical

@@ -11,9 +11,9 @@ from strangers import STRANGERS
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.importing.network import import_network
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.export.package import Request, export
+from wamnet.models.importing.network import import_network
 from wamnet.refimpl.errors import InputError
 
 pytestmark = pytest.mark.needs("packages")

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.proof.checker import check
 from wamnet.kernels.export import shelf
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]

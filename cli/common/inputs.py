@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ... import models
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from . import options
 from .terminal import tell
 
@@ -25,11 +25,11 @@ CHECKPOINT_MARK = ".checkpoint"
 def check_input(path: Path) -> None:
     """Refuse an input that is not a file."""
     if path.is_dir():
-        raise InputError("input file", str(path), "it is a folder", "give the name of a file in it")
+        raise InputError("input file", str(path), "is a folder", "give the name of a file in it")
     if not path.exists():
-        raise InputError("input file", str(path), "it does not exist", "check the name")
+        raise InputError("input file", str(path), "not found", "check the name")
     if not path.is_file():
-        rule = "it is not a regular file (a pipe or a device)"
+        rule = "is a pipe or a device, not a regular file"
         raise InputError("input file", str(path), rule, "give a file on a disk")
 
 
@@ -40,10 +40,11 @@ def model_path(path: Path) -> Path:
     if path.suffix or (path.exists() and not (name in known and path.is_dir())):
         return path
     if path.is_dir():
-        tell(f"{path}/ is a folder, and no model: the model of this name that ships with wamnet is taken")
+        tell(f"{path}/ is a folder, not a model: using the bundled model of this name")
     if name not in known:
-        rule = "there is no such file, and wamnet ships no model of this name"
-        raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
+        raise InputError(
+            "model", str(path), "not found", f"{choice(name, known)}, or give a .safetensors file"
+        )
     return models.path(name)
 
 
@@ -59,14 +60,14 @@ def load_model(path: Path, imported: bool = False) -> Model:
         found = model_file.load_model(path)
         if not found.is_imported or imported:
             return found
-        rule = f"it was imported and reads {', '.join(found.features)}, not the features of a frame"
+        rule = f"was imported and reads {', '.join(found.features)}, not the features of a frame"
         raise InputError("model", str(path), rule, "use it with wamnet compile, listing or export --check")
     except InputError as error:
         if error.value != model_file.CHECKPOINT_FORMAT:
             raise
     name = path.name.replace(CHECKPOINT_MARK + path.suffix, path.suffix)
-    way_out = f"give the model beside it: {path.with_name(name)}" if name != path.name else "give the model"
-    raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
+    way_out = f"give the model next to it: {path.with_name(name)}" if name != path.name else "give the model"
+    raise InputError("model file", str(path), "is a checkpoint of training, not a model", way_out)
 
 
 def trained_scene(model: Model) -> str | None:

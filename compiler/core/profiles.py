@@ -21,7 +21,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from . import sine
 from .ir import LEAST
 from .ops import Rounding
@@ -167,8 +167,7 @@ def profile_named(name: str) -> Profile:
         for degree in sine.POLYNOMIALS
         if _has_degrees(profile) and degree != sine.DEGREE
     ]
-    known = ", ".join([*PROFILES, *others])
-    raise CompileError(f"profile {name!r} does not exist; there are: {known}")
+    raise CompileError(f"profile {name!r}: unknown ({choice(name, [*PROFILES, *others])})")
 
 
 def _has_degrees(profile: Profile) -> bool:

@@ -188,7 +188,7 @@ def _check(request: Request) -> None:
     for name, low in {**least, "percent": 1, "seed": 0}.items():
         value = getattr(request, name)
         if value < low:
-            raise InputError(name, value, f"it must be {low} or more", "choose another number")
+            raise InputError(name, value, f"must be {low} or more", "choose another number")
     if not 0.0 <= request.arc_s < len(request.animation.frames) / request.animation.fps:
         rule = "training leaves it out of the animation: it must be 0 or more and shorter"
         raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")

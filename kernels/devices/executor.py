@@ -266,7 +266,7 @@ class Executor(ABC):
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
-        rule = "it has no compiled trainer"
+        rule = "has no compiled trainer"
         raise InputError(
             "executor that trains", self.name, rule, "use executor opencl, or refimpl.network.train"
         )

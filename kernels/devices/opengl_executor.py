@@ -372,9 +372,7 @@ class OpenGLExecutor(Executor):
 def _open(kind: str) -> tuple[str, Any]:
     """Return the kind of the context and the context, or say why there is none."""
     if kind != "auto" and kind not in CONTEXTS:
-        raise InputError(
-            "OpenGL context", kind, f"must be auto, {', '.join(CONTEXTS)}", "choose one of these"
-        )
+        raise InputError("OpenGL context", kind, "unknown", f"choose one of auto, {', '.join(CONTEXTS)}")
     reasons = []
     for name in CONTEXTS if kind == "auto" else (kind,):
         try:

@@ -31,7 +31,7 @@ from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.render import Job, feature_job, feature_sampler
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import SPREAD, Settings
@@ -260,18 +260,18 @@ class Pipeline:
         """Refuse a feature without an image."""
         if feature not in self._features:
             known = ", ".join(self._features)
-            raise InputError("feature image", feature, f"there are {known}", "name it in show=")
+            raise InputError("feature image", feature, f"is not one of {known}", "name it in show=")
 
     def _check_drawn(self) -> None:
         """Refuse to read what was not drawn."""
         self._check_open()
         if not self._drawn:
-            raise InputError("pipeline", "nothing drawn", "an image is read after it was drawn", "draw first")
+            raise InputError("pipeline", NO_VALUE, "has drawn no image yet", "draw first")
 
     def _check_open(self) -> None:
         """Refuse work without images."""
         if self._closed:
-            raise InputError("pipeline", "closed", "its images were given back", "make another one")
+            raise InputError("pipeline", NO_VALUE, "closed", "make another one")
 
     def close(self) -> None:
         """Give the images on the device back; the executor stays open."""

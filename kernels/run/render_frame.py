@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.environment import with_sun
 from ...refimpl.light.render import Job, Render, render
 from ...refimpl.light.scene import Scene
@@ -106,8 +106,7 @@ RENDERERS: Mapping[str, Renderer] = {
 def renderer(executor: str) -> Renderer:
     """Return how an executor renders, or refuse its name."""
     if executor not in RENDERERS:
-        rule = f"must be one of {', '.join(RENDERERS)}"
-        raise InputError("executor that renders", executor, rule, "choose one of these")
+        raise InputError("executor that renders", executor, "unknown", choice(executor, RENDERERS))
     return RENDERERS[executor]
 
 

@@ -86,7 +86,7 @@ def check_ranges(ranges: Ranges) -> None:
         if pair is None:
             continue
         low, high = _limits(name)
-        rule = f"LOW:HIGH within {low:g} to {high:g}, LOW not above HIGH"
+        rule = f"must be LOW:HIGH within {low:g} to {high:g}, LOW not above HIGH"
         if not (all(map(math.isfinite, pair)) and low <= pair[0] <= pair[1] <= high):
             raise InputError(f"range of {name}", f"{pair[0]}:{pair[1]}", rule, "choose other limits")
 
@@ -142,7 +142,7 @@ def varied(scene: Scene, variation: Variation) -> Scene:
     for name in ("yaw_deg", "pitch_deg", "distance"):
         value, (low, high) = getattr(v, name), _limits(name)
         if not low <= value <= high:
-            raise InputError(name, value, f"it must be a number from {low:g} to {high:g}", "choose another")
+            raise InputError(name, value, f"must be a number from {low:g} to {high:g}", "choose another")
     lights = scene.lights
     if v.lights:
         if len(v.lights) != len(lights):

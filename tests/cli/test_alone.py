@@ -43,7 +43,7 @@ def test_locks_of_two_files_are_two(tmp_path) -> None:
     one, two = tmp_path / ("a" * 255), tmp_path / "b"
     with alone_at(one, "writing"), alone_at(two, "writing"):
         assert all(path.name.startswith(BESIDE) for path in tmp_path.iterdir())
-        with pytest.raises(InputError, match=r"output file is .*b: another process is writing there"):
+        with pytest.raises(InputError, match=r"output file '.*b': another process is writing there"):
             alone_at(two, "writing").__enter__()
     assert list(tmp_path.iterdir()) == []
 
@@ -62,7 +62,7 @@ def test_what_is_no_lock_is_refused_and_stays(tmp_path, kind) -> None:
         os.mkfifo(path)
     else:
         path.write_text("mine")
-    with pytest.raises(InputError, match=r"lock file is .*: a lock of wamnet is an empty file"):
+    with pytest.raises(InputError, match=r"lock file '.*': a lock of wamnet is an empty file"):
         alone_in(tmp_path, "painting").__enter__()
     assert path.is_symlink() or path.exists()
     assert target.exists() == (kind == "link")

@@ -87,7 +87,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_names_are_refused(name) -> None:
-    with pytest.raises(InputError, match="variant is .*: " + WRONG[name].replace("+", r"\+")):
+    with pytest.raises(InputError, match="variant '.*': " + WRONG[name].replace("+", r"\+")):
         parse(name)
 
 

@@ -58,12 +58,12 @@ def test_a_mean_has_a_spread(results):
 
 
 def test_another_experiment_s_file_is_refused(results):
-    with pytest.raises(InputError, match="it belongs to test with settings"):
+    with pytest.raises(InputError, match="belongs to test with settings"):
         Results.open(results.path, "test", {"size": 16})
-    with pytest.raises(InputError, match="it belongs to test"):
+    with pytest.raises(InputError, match="belongs to test"):
         Results.open(results.path, "other", {"size": 8})
     results.path.write_text("{")
-    with pytest.raises(InputError, match="it is not a file of results"):
+    with pytest.raises(InputError, match="is not a file of results"):
         Results.open(results.path, "test", {"size": 8})
 
 
@@ -101,7 +101,7 @@ def test_a_file_of_the_older_form_goes_on(results):
     results.put("a", 0, {"psnr": 30.0})
     assert results.data()["schema"] == "wamnet-experiment-2"
     results.path.write_text(json.dumps({**data, "schema": "wamnet-experiment-3"}))
-    with pytest.raises(InputError, match="it is not a file of results"):
+    with pytest.raises(InputError, match="is not a file of results"):
         results.records()
 
 

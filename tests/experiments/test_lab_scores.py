@@ -129,7 +129,7 @@ def test_flip_of_the_authors_pair():
 
 
 def test_flip_refuses_what_is_not_encoded():
-    with pytest.raises(InputError, match=r"range of the picture is 0.* to 1.*: FLIP takes display-encoded"):
+    with pytest.raises(InputError, match=r"range of the picture '0.* to 1.*': FLIP takes display-encoded"):
         scores.flip(REFERENCE, PICTURE)
     with pytest.raises(InputError, match="range of its reference"):
         scores.flip(PICTURE, REFERENCE)

@@ -162,7 +162,7 @@ def test_records_of_other_settings_are_refused(made, monkeypatch):
     _, arguments = made
     other = {**TINY.paper, "steps": 3}
     monkeypatch.setitem(table1.SCALES, "toy", replace(TINY, paper=other))
-    with pytest.raises(InputError, match=r"record of wamnet, seed 0 is .*: it was made with .*\"steps\": 2"):
+    with pytest.raises(InputError, match=r"record of wamnet, seed 0 '.*': was made with .*\"steps\": 2"):
         table1.main([*arguments, "--seeds", "0", "--only", "wamnet"])
 
 

@@ -310,7 +310,7 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
     monkeypatch.setattr(c_executor, "INDEX_LIMIT", 10)
     artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
     with pytest.raises(
-        InputError, match="size of the picture for C is 4 x 3 with 1 channels: one image must hold"
+        InputError, match="size of the picture for C '4 x 3 with 1 channels': one image must hold"
     ):
         executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})
 

@@ -22,7 +22,7 @@ def test_a_quarter_turn_of_the_lattice_is_alike() -> None:
     """The fault that was found: frames two seconds apart differ in colours only."""
     one, other = (G.first_hits(canonical("minicubes", time=t)) for t in (0.7, 2.7))
     assert G.difference(one, other) < G.ALIKE
-    text = "test frame is test/00000 .2.7 s.: normals and depths are those of train/00000 .0.7 s."
+    text = "test frame 'test/00000 .2.7 s.': normals and depths are those of train/00000 .0.7 s."
     with pytest.raises(InputError, match=text):
         G.compare([shown("train/00000", 0.7)], {"test": [shown("test/00000", 2.7)]})
 

@@ -47,7 +47,7 @@ def test_a_bundled_model_loads_by_name(tmp_path):
     assert repr(model).count("\n") == 1
     assert "trained on scene cornell" in repr(model)
     assert wamnet.load(model) is model
-    with pytest.raises(wamnet.WamnetError, match="bundled models: cornell, glossy, minicubes"):
+    with pytest.raises(wamnet.WamnetError, match="choose one of cornell, glossy, minicubes"):
         wamnet.load("spheres")
     with pytest.raises(wamnet.WamnetError, match="No such file"):
         wamnet.load(tmp_path / "none.safetensors")

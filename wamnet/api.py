@@ -178,7 +178,7 @@ def denoise(
 
     model = load(model)
     if model.is_imported:
-        rule = "was imported, and reads images of its own, not the layers of a frame"
+        rule = "was imported, and reads its own images, not the layers of a frame"
         raise InputError("model", repr(model), rule, "use wamnet.compile(model, target).run(...)")
     whole = _frame({**(frame.layers if isinstance(frame, Frame) else frame or {}), **layers})
     name = _name(executor)

@@ -158,7 +158,7 @@ def animate(
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
     watch.report(output)
-    say(f"{output}: {len(shots)} pictures, {made} of them made now")
+    say(f"{output}: {len(shots)} frames, {made} of them rendered now")
 
 
 def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
@@ -219,7 +219,7 @@ def _check_names(output: Path, model: Path, fps: float) -> None:
         check_output(output, tuple(movie.WRITERS), [model])
         movie.check(output, fps)
     elif output.suffix:
-        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
+        rule = f"must end in {' or '.join(movie.WRITERS)}, or name a folder"
         raise InputError("output", str(output), rule, "rename it")
 
 
@@ -228,7 +228,7 @@ def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
     chosen = options.parse_parameters(assignments or [])
     if "time" in chosen:
         value = chosen["time"]
-        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+        raise InputError("parameter time", value, "every frame has its own", "use --start and --seconds")
     return dict(chosen)
 
 
@@ -239,7 +239,7 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
     found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
-        say(f"{output}: {len(unlike)} of {len(shots)} pictures are unlike those of the training: {sentence}")
+        say(f"{output}: {len(unlike)} of {len(shots)} frames are unlike those of the training: {sentence}")
 
 
 def scene_of(model: Model) -> str:

@@ -183,12 +183,11 @@ def bench(
 
     All contenders are interleaved, so that drift of the machine affects them alike.
 
-    The bundled mini-cubes model is measured on unseen frames of its scene, which are rendered first;
-    another model on those of its own scene, or of a data set. Installed baselines take part: PyTorch,
-    ONNX Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and the denoiser Open Image
-    Denoise: [bold]pip install torch onnxruntime openvino halide tinygrad pyoidn[/]. Errors are against
-    float64, PSNR against the references. Predicted times follow from measured rates of operations, sines
-    and memory traffic.
+    The bundled mini-cubes model is measured on unseen frames of its scene; another model on its training
+    scene or a data set. Installed baselines take part: PyTorch, ONNX Runtime, OpenVINO, Halide,
+    tinygrad, and Open Image Denoise: [bold]pip install torch onnxruntime openvino halide tinygrad
+    pyoidn[/]. Errors are against float64, PSNR against the references. Predicted times follow from
+    measured rates.
     """
     packages.need("matplotlib", "for the plots")
     check_folder(output)

@@ -108,7 +108,7 @@ def compare_pictures(image: Path, reference: Path, exposure: float, as_json: boo
     if a.display.shape != b.display.shape:
         (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape
         rule = f"{reference} has {columns}x{rows}"
-        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare pictures of one size")
+        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare images of one size")
     scores = measure(a, b)
     if as_json:
         typer.echo(json.dumps({"image": str(image), "reference": str(reference), **as_data(scores)}))

@@ -86,11 +86,11 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
-        told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
+        told.append(f"it shows {scene}, but the model was trained only on {scenes}: expect a poor image")
     elif files and scene and info.get(SCENE_FILE, "") not in files.split(", "):
         told.append(f"{scene} is another scene file than the one the model was trained on: expect errors")
     elif beyond := outside_ranges(model, info):
-        told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
+        told.append(f"outside the training ranges: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info and (rule := unlike_features(model, info)):
         told.append(f"{rule}: expect worse edges")
     return told
@@ -108,9 +108,7 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
     if rays in counts and (source or not learned):
         return ""
     at_random = "" if source or not learned else " at random"
-    return (
-        f"its features are of --feature-spp {rays}{at_random}, those that the model learned from of {wanted}"
-    )
+    return f"its features are of --feature-spp {rays}{at_random}, those of the training of {wanted}"
 
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:

@@ -412,7 +412,7 @@ def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, .
     for text in texts:
         number, color = _parse_light(text)
         if number not in colors:
-            rule = f"the scene's lamps are 1 to {len(own)}" if own else "the scene has no lamps"
+            rule = f"the scene's lights are 1 to {len(own)}" if own else "the scene has no lights"
             raise InputError("--light", text, rule, "choose another" if own else "leave it out")
         if number in chosen:
             raise InputError("--light", text, f"light {number} already has a colour", "give one per light")

@@ -301,7 +301,7 @@ def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
     """Refuse a data set that has wrong pictures; name the first."""
     if wrong:
         name, what = next(iter(wrong.items()))
-        rule = f"{len(wrong)} of its pictures are not as {MANIFEST} says, first {name}: {what}"
+        rule = f"{len(wrong)} of its images do not match {MANIFEST}, first {name}: {what}"
         way_out = "make them: run the command wamnet dataset that began it"
         raise InputError("data set", str(folder), rule, way_out)
 

@@ -154,12 +154,12 @@ class _Kernel(Lines):
         if len(self.programs.inputs) > self.dialect.most_numbers:
             raise CompileError(
                 f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} numbers "
-                f"of the scene, and {len(self.programs.inputs)} move: compile fewer moments of it, or one"
+                f"of the scene, and {len(self.programs.inputs)} move: compile fewer times of it, or one"
             )
         if images and not self.dialect.painted:
             raise CompileError(
                 f"{self.dialect.language}: its path kernels write sums, not encoded images: compile the "
-                "encoding as a kernel of its own"
+                "encoding as a separate kernel"
             )
         self._sums()
         self._samples()

@@ -175,7 +175,7 @@ def drawn(frames: Sequence[int], seed: int, count: int, what: str) -> list[int]:
     A frame that is there already is passed over. Raises InputError where there are not so many.
     """
     if count > len(frames):
-        rule = f"the film has {len(frames)} frames for them"
+        rule = f"the animation has {len(frames)} frames for them"
         raise InputError(f"number of {what}", count, rule, "use fewer, or a longer animation")
     places = (int(time) for time in times(seed, 0.0, float(len(frames)), 0, DRAWS * len(frames)))
     order = dict.fromkeys(min(place, len(frames) - 1) for place in places) if count else {}

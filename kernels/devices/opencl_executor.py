@@ -170,10 +170,10 @@ class OpenCLExecutor(Executor):
         count, largest = height * width * most, self._device.max_mem_alloc_size
         if count >= INDEX_LIMIT or 4 * count > largest:
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{width} x {height} with {most} channels",
                 f"one image must hold fewer than {INDEX_LIMIT} numbers and at most {largest} bytes",
-                "split the picture, or use executor numpy",
+                "split the image, or use executor numpy",
             )
 
     def _local_size(self, artifact: Denoiser) -> tuple[int, int]:
@@ -220,10 +220,10 @@ class OpenCLExecutor(Executor):
             if size is None:
                 raise
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{size[1]} x {size[0]}",
                 f"the device does not run it ({' '.join(str(error).split())})",
-                "split the picture, or use executor numpy",
+                "split the image, or use executor numpy",
             ) from None
 
     def _start(

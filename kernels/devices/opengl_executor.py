@@ -360,7 +360,7 @@ class OpenGLExecutor(Executor):
                 f"texture for {name}",
                 f"{size[0]} x {size[1]} with {channels} channels",
                 f"this OpenGL takes at most {largest} x {largest} with 4 channels",
-                "split the picture, or use another executor",
+                "split the image, or use another executor",
             )
 
     def close(self) -> None:

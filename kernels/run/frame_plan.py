@@ -261,8 +261,8 @@ def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
         raise InputError(what, (start_s, seconds, fps), "must be finite and last", "change it")
     count = max(1, round(seconds * fps))
     if count > LARGEST_FRAMES:
-        rule = f"a film has {LARGEST_FRAMES} at most"
-        raise InputError("number of pictures", count, rule, "make it shorter, or use fewer per second")
+        rule = f"an animation has {LARGEST_FRAMES} at most"
+        raise InputError("number of frames", count, rule, "make it shorter, or use fewer per second")
     return [start_s + k / fps for k in range(count)]
 
 

@@ -58,9 +58,7 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
     if feature_job(job) is None:
         return None
     if seen:
-        rule = (
-            "in a pipeline what is seen past mirrors and glass is seen by the paths, of which there are fewer"
-        )
+        rule = "in a pipeline the paths see through mirrors and glass, and there are fewer of them"
         raise InputError("feature_spp", job.feature_spp, rule, "use 0, or render_on and denoise_on")
     source, sampler = feature_sampler(job), job.settings.sampler
     if source not in (sampler, SPREAD[sampler]):
@@ -68,7 +66,7 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
         raise InputError("feature_sampler", source, rule, f"use {sampler} or {SPREAD[sampler]}")
     if whole:
         rule = "kernels of render_on trace no rays of features"
-        raise InputError("whole", whole, rule, "render references by a kernel of their own")
+        raise InputError("whole", whole, rule, "render references with a separate kernel")
     return FeatureRays(job.feature_spp, source)
 
 
@@ -119,7 +117,7 @@ class Pipeline:
         self._rays = _rays_of(job, whole, sees(self._features))
         if whole and sees(self._features):
             rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
-            raise InputError("whole", whole, rule, "render references by a kernel of their own")
+            raise InputError("whole", whole, rule, "render references with a separate kernel")
         self._in_integers = model.is_whole
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums

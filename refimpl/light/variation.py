@@ -147,7 +147,7 @@ def varied(scene: Scene, variation: Variation) -> Scene:
     if v.lights:
         if len(v.lights) != len(lights):
             rule = f"the scene has {len(lights)}"
-            raise InputError("number of lamps' colours", len(v.lights), rule, "give one for each")
+            raise InputError("number of light colours", len(v.lights), rule, "give one per light")
         lights = tuple(replace(light, color=color) for light, color in zip(lights, v.lights, strict=True))
     told = {name: repr(float(getattr(v, name))) for name in ("yaw_deg", "pitch_deg", "distance")}
     told["lights"] = json.dumps([light.color for light in lights])

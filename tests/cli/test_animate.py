@@ -158,7 +158,7 @@ def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
     save_model(tmp_path / "f.safetensors", replace(network, info=facts))
     two = ("--scene", "mine.json", "--yaw", 9, "--seconds", 0.2, "--fps", 10, "--size", 13)
     outcome = wamnet("animate", "f.safetensors", *two, "-o", "still")
-    assert "2 of 2 pictures are unlike those of the training: cornell is another scene file" in outcome.out
+    assert "2 of 2 frames are unlike those of the training: cornell is another scene file" in outcome.out
     shown = varied(canonical("cornell"), Variation(9.0))
     for index in (0, 1):
         noisy = encoding.to_display(render(shown, Job(13, 13, seed=2 * index)).frame["color"], 0.0)
@@ -200,7 +200,7 @@ def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
     network = load_model(tmp_path / "m.safetensors")
     learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
     save_model(tmp_path / "n.safetensors", replace(network, info=learned))
-    begin, unlike = "outside of what the model has learned: ", "pictures are unlike those of the training: "
+    begin, unlike = "outside the training ranges: ", "frames are unlike those of the training: "
     outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
     assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
     outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")
@@ -324,7 +324,7 @@ def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
     ("arguments", "text"),
     [
         (["--fps", 0], "must be finite and last (change it"),
-        (["--fps", 1e9], "number of pictures 8000000000: a film has 100000 at most"),
+        (["--fps", 1e9], "number of frames 8000000000: an animation has 100000 at most"),
         (["--size", 0], "width 0"),
         (["--rank", 9999], "rank 9999: a window of "),
         (["--rank", -1], "rank -1: a window of "),
@@ -332,20 +332,20 @@ def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
         (["--reference-spp", -1], "spp -1"),
         (
             ["-o", "a.avi"],
-            "output 'a.avi': a film's name must end in .mp4 or .gif, a folder's in none (rename",
+            "output 'a.avi': must end in .mp4 or .gif, or name a folder (rename",
         ),
         (["-o", "no/a.gif"], "output folder 'no': not found"),
         (["-o", "no/a"], "output folder 'no': not found"),
         (["-o", "file"], "output folder 'file': is a file"),
         (["-o", "full"], "output folder 'full': holds something else: x (choose another with -o"),
-        (["--set", "time=1"], "parameter time 1.0: each picture has its own (use --start and --seconds"),
+        (["--set", "time=1"], "parameter time 1.0: every frame has its own (use --start and --seconds"),
         (["--yaw", 999], "yaw_deg 999.0: must be a number from -180 to 180"),
-        (["--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lamps are 1 to 2"),
+        (["--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lights are 1 to 2"),
         (["--set", "fps=1"], "parameter 'fps': unknown to scene minicubes (choose one of time, warm"),
         (["--set", "warm=1"], "parameter warm 1.0: scene minicubes needs three numbers"),
         (
             ["--fps", 0.001, "--seconds", 2000, "-o", "a.gif"],
-            "--fps 0.001: a GIF shows each picture for 655.35 s at most (use more, or .mp4",
+            "--fps 0.001: a GIF shows each frame for 655.35 s at most (use more, or .mp4",
         ),
         (["--fps", 60, "-o", "a.gif"], "--fps 60.0: a GIF has 50 at most (use fewer, or .mp4"),
     ],

@@ -104,8 +104,8 @@ def test_predicted_stands_beside_measured(found) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--size", "0"], "size of the picture 0: must be from 1 to 8192 pixels"),
-        (["--sizes", "64,9000"], "size of the picture 9000"),
+        (["--size", "0"], "size of the image 0: must be from 1 to 8192 pixels"),
+        (["--sizes", "64,9000"], "size of the image 9000"),
         (["--sizes", "64 128"], "--sizes '64 128': must be integers with commas"),
         (["--repeats", "0"], "--repeats 0: must be from 1 to 1000"),
         (["--budget", "nan"], "--budget nan: must be positive and finite"),

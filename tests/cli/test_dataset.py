@@ -141,7 +141,7 @@ def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
     outcome = wamnet("dataset", "--check", "-o", "a")
     assert outcome.status == 2
     assert outcome.out == "a/train/00001-target.exr: damaged\n"
-    assert outcome.err.startswith("wamnet: error: data set 'a': 1 of its pictures are not as manifest.json")
+    assert outcome.err.startswith("wamnet: error: data set 'a': 1 of its images do not match manifest.json")
     assert path.read_bytes() == b"x"
     outcome = wamnet("dataset", *TINY, "-o", "a")
     assert outcome.out.startswith("a/train/00001-target.exr: damaged, is made again\n")

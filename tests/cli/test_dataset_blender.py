@@ -99,7 +99,7 @@ def test_refusals(wamnet, refused, blend, blender, monkeypatch):
     assert "'--percent': has no meaning without --from-blender" in refused(
         "dataset", "cornell", "--percent", 9
     )
-    assert "the film has 10 frames" in refused(*by, "--frames", 12)
+    assert "the animation has 10 frames" in refused(*by, "--frames", 12)
     assert "none.blend" in refused("dataset", "--from-blender", "none.blend")
     assert "not found" in refused("dataset", "--from-blender", blend, "--blender", "none")
     monkeypatch.setenv("BLENDER_FAULT", "refuse")

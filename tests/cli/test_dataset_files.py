@@ -133,9 +133,7 @@ def test_damage_is_found_and_mended(tmp_path, whole) -> None:
     third.unlink()
     wrong = files.verify(tmp_path, files.read_manifest(tmp_path))
     assert list(wrong.values()) == ["damaged", "damaged", "missing"]
-    with pytest.raises(
-        InputError, match=r"3 of its pictures .*, first train/00000-noisy.exr: damaged \(make"
-    ):
+    with pytest.raises(InputError, match=r"3 of its images .*, first train/00000-noisy.exr: damaged \(make"):
         files.read_pairs(tmp_path)
     assert len(files.read_pairs(tmp_path, "test")) == 1
     with contextlib.suppress(Killed), files.Store.open(tmp_path, REQUEST, plan(REQUEST)) as store:

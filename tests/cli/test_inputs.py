@@ -148,7 +148,7 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         (
             {"scene": "empty", "feature_spp": "16"},
             {"scene": "empty", "spp": "1"},
-            ["its features are of --feature-spp 1, those that the model learned from of 16"],
+            ["its features are of --feature-spp 1, those of the training of 16"],
         ),
         # Four rays that are spread stand for sixteen at random, but not the other way round.
         (
@@ -159,19 +159,19 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         (
             {"scene": "empty", "feature_spp": "16"},
             {"scene": "empty", "spp": "1", "feature_spp": "3", "feature_sampler": "net"},
-            ["its features are of --feature-spp 3, those that the model learned from of 16"],
+            ["its features are of --feature-spp 3, those of the training of 16"],
         ),
         (
             {"scene": "empty", "feature_spp": "4", "feature_sampler": "net"},
             {"scene": "empty", "spp": "1", "feature_spp": "4"},
-            ["its features are of --feature-spp 4 at random, those that the model learned from of 4"],
+            ["its features are of --feature-spp 4 at random, those of the training of 4"],
         ),
         (
             {"scene": "empty"},
             {"scene": "cornell", "spp": "1", "feature_spp": "4"},
             [
                 "it shows cornell",
-                "its features are of --feature-spp 4, those that the model learned from of 1",
+                "its features are of --feature-spp 4, those of the training of 1",
             ],
         ),
     ],
@@ -223,7 +223,7 @@ def test_frames_outside_of_the_ranges_of_the_training(samples, shown, told) -> N
     learned = {"trained_on_scene": "minicubes", "trained_on_ranges": RANGES.to_json()}
     own = {"scene": "minicubes", "lights": json.dumps([scenes.WARM, scenes.COOL])}
     found = inputs.unlike_training(replace(model, info=learned), {**own, **shown})
-    assert found == [f"outside of what the model has learned: {', '.join(told)}; expect errors"][: len(told)]
+    assert found == [f"outside the training ranges: {', '.join(told)}; expect errors"][: len(told)]
     assert inputs.unlike_training(model, {**own, **shown}) == [], "a model without ranges says nothing"
     other = inputs.unlike_training(replace(model, info=learned), {**own, **shown, "scene": "cornell"})
     assert [text.split(",")[0] for text in other] == ["it shows cornell"], "ranges are of its own scenes"
@@ -247,7 +247,7 @@ def test_a_frame_outside_of_the_ranges_is_denoised_with_a_warning(wamnet, here) 
         outcome = wamnet("denoise", "narrow.safetensors", "frame.exr")
         assert outcome.status == 0
         warned = [line for line in outcome.out.splitlines() if "outside of what" in line]
-        wanted = [f"frame.exr: outside of what the model has learned: {text}; expect errors" for text in told]
+        wanted = [f"frame.exr: outside the training ranges: {text}; expect errors" for text in told]
         assert warned == wanted
 
 

@@ -93,7 +93,7 @@ def test_depth_counts_edges(printed) -> None:
         ("render --by ,", "--by ',': must be one or more of numpy"),
         ("render --workers 1,x", "--workers '1,x': must be integers from 1 to"),
         ("render --workers 0", "--workers '0': must be integers from 1 to"),
-        ("render --size 9000", "size of the picture 9000: must be from 1 to 8192 pixels"),
+        ("render --size 9000", "size of the image 9000: must be from 1 to 8192 pixels"),
         ("render --spp 0", "--spp 0: must be from 1 to"),
         ("render --depth 0", "--depth 0: must be from 1 to"),
         ("render --repeats 0", "--repeats 0: must be from 1 to"),

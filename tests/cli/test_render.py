@@ -176,9 +176,9 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "--light", "1=0,0,0"], "its channels must be finite, 0 or more, and not all 0"),
         (["minicubes", "--light", "1=1,-1,0"], "its channels must be finite, 0 or more, and not all 0"),
         (["minicubes", "--light", "1=1,nan,0"], "its channels must be finite, 0 or more, and not all 0"),
-        (["minicubes", "--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lamps are 1 to 2 (choose"),
-        (["minicubes", "--light", "0=1,1,1"], "--light '0=1,1,1': the scene's lamps are 1 to 2 (choose"),
-        (["daylight", "--light", "1=1,1,1"], "--light '1=1,1,1': the scene has no lamps (leave it out"),
+        (["minicubes", "--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lights are 1 to 2 (choose"),
+        (["minicubes", "--light", "0=1,1,1"], "--light '0=1,1,1': the scene's lights are 1 to 2 (choose"),
+        (["daylight", "--light", "1=1,1,1"], "--light '1=1,1,1': the scene has no lights (leave it out"),
         (
             ["minicubes", "--light", "1=1,1,1", "--light", "1=1,1,0"],
             "--light '1=1,1,0': light 1 already has a colour (give one per light",

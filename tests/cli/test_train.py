@@ -134,7 +134,7 @@ def test_training_on_a_data_set(wamnet, refused, tmp_path) -> None:
     assert text in refused("train", "--dataset", "set", *named)
     assert "training frames: missing (give -i and -t, or --dataset" in refused("train")
     (tmp_path / "set/train/00001-target.exr").write_bytes(b"x")
-    text = "data set 'set': 1 of its pictures are not as manifest.json says, first train/00001-target.exr"
+    text = "data set 'set': 1 of its images do not match manifest.json, first train/00001-target.exr"
     assert text in refused("train", "--dataset", "set")
     assert "data set 'none': has no manifest.json" in refused("train", "--dataset", "none")
 

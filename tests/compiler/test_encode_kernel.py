@@ -152,7 +152,7 @@ def test_refusals():
 @pytest.mark.parametrize("name", PICTURES_BEFORE)
 def test_features_of_pictures_before_are_refused(name):
     """HIS-7: a path kernel makes no history."""
-    with pytest.raises(InputError, match=f"features '{name}': a path kernel makes layers of one picture"):
+    with pytest.raises(InputError, match=f"features '{name}': a path kernel computes layers of one frame"):
         layers_of(("color", name))
 
 

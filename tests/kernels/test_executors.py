@@ -269,7 +269,7 @@ def test_too_wide_a_layer_is_refused_on_a_processor(executor_named, kit):
         pytest.skip(f"{executor.device} is not a processor: its arrays lie on no stack")
     with pytest.raises(
         CompileError,
-        match=r"arrays take 1200004 bytes per pixel: at most 1048576",
+        match=r"arrays take 1200004 bytes per pixel; at most 1048576",
     ):
         executor.build(compile_program(wide(kit, 150_000), "opencl"))
 
@@ -289,7 +289,7 @@ def test_picture_beyond_a_buffer_is_refused_before_it_is_copied(executor_named, 
     artifact = compile_program(kit.program(lambda x: x[..., 0], {"a": 2}), "opencl")
     with pytest.raises(
         InputError,
-        match=rf"size of the picture on .* '{size[1]} x {size[0]} with 2 channels': one image must",
+        match=rf"size of the image on .* '{size[1]} x {size[0]} with 2 channels': one image must",
     ):
         executor.check_size(artifact, size)
 
@@ -304,7 +304,7 @@ def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit,
 
     monkeypatch.setattr(executor, "_store", full)
     with pytest.raises(
-        InputError, match=r"is 3 x 2: the device does not run it \(no memory\); split the picture"
+        InputError, match=r"is 3 x 2: the device does not run it \(no memory\); split the image"
     ):
         executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
 

@@ -178,5 +178,5 @@ def test_animation_times() -> None:
     for wrong in ((0.0, -1.0, 5.0), (0.0, 1.0, 0.0), (float("inf"), 1.0, 5.0)):
         with pytest.raises(InputError, match=r"must be finite and last \(change it"):
             frame_plan.animation_times(*wrong)
-    with pytest.raises(InputError, match="number of pictures 1000000: a film has 100000 at most"):
+    with pytest.raises(InputError, match="number of frames 1000000: an animation has 100000 at most"):
         frame_plan.animation_times(0.0, 1000.0, 1000.0)

@@ -247,7 +247,7 @@ def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of
         Pipeline(*given, feature_spp=4, feature_sampler="sobol")
     with pytest.raises(InputError, match="whole True: kernels of render_on trace no rays of features"):
         Pipeline(*given, feature_spp=4, whole=True)
-    with pytest.raises(InputError, match="feature_spp 4: in a pipeline what is seen past mirrors"):
+    with pytest.raises(InputError, match="feature_spp 4: in a pipeline the paths see through mirrors"):
         Pipeline(*given, feature_spp=4, show=("seen_albedo",))
     with pytest.raises(InputError, match="whole True: a frame's kernel writes the first hits, and what is"):
         Pipeline(*given, whole=True, show=("seen_albedo",))
@@ -268,7 +268,7 @@ def test_what_writes_encoded_images_is_refused_elsewhere(executor_named):
     with pytest.raises(CompileError, match="write sums, not encoded images"):
         compile_path(programs, "opengl", "ieee", 1, *given)
     kernel = compile_path(programs, "opencl", "ieee", 1, *given)
-    with pytest.raises(InputError, match="rows of the picture '0 to 3 of 4': a kernel"):
+    with pytest.raises(InputError, match="rows of the image '0 to 3 of 4': a kernel"):
         executor_named("opencl").paint(kernel, Part(4, 4, 0, 3, 0, 1, 0))
 
 
@@ -519,9 +519,7 @@ def test_too_large_a_picture_is_refused(executor_named, model_of):
         InputError, match=r"texture for 'image_color' '65536 x 1 with 4 channels': this OpenGL"
     ):
         Pipeline(executor_named("opengl-egl"), scene("empty"), model, (1, 65536))
-    with pytest.raises(
-        InputError, match=r"size of the picture on .* '65536 x 65536 with 3 channels': one im"
-    ):
+    with pytest.raises(InputError, match=r"size of the image on .* '65536 x 65536 with 3 channels': one im"):
         Pipeline(executor_named("opencl"), scene("empty"), model, (65536, 65536))
 
 

@@ -523,7 +523,7 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
             train_on(opencl, SMALL, PAIRS)
     monkeypatch.setattr("wamnet.kernels.devices.opencl_trainer.INDEX_LIMIT", 100)
     with pytest.raises(
-        InputError, match=r"numbers of all training pictures .*: the device takes fewer than 100"
+        InputError, match=r"values of all training images .*: the device takes fewer than 100"
     ):
         train_on(opencl, SMALL, PAIRS)
 

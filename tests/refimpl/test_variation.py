@@ -83,7 +83,7 @@ def test_a_frame_says_what_was_varied() -> None:
         ({"yaw_deg": 181.0}, "yaw_deg 181.0: must be a number from -180 to 180"),
         ({"pitch_deg": float("nan")}, "pitch_deg nan"),
         ({"distance": 0.0}, "distance 0.0: must be a number from 0.1 to 10"),
-        ({"lights": ((1.0, 1.0, 1.0),)}, "number of lamps' colours 1: the scene has 2"),
+        ({"lights": ((1.0, 1.0, 1.0),)}, "number of light colours 1: the scene has 2"),
     ],
 )
 def test_variations_that_are_refused(change, text) -> None:

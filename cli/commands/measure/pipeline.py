@@ -70,11 +70,10 @@ def pipeline(
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 
     [bold]ours, moving[/] is one pipeline on a device in which every frame has another time; the table
-    has its stages. [bold]separate[/] traces all layers, reads them back, encodes, uploads, denoises and
-    reads back. Other renderers show the same times: [bold]mitsuba[/] is Mitsuba 3 with Open Image
-    Denoise, [bold]cycles[/] is Blender's renderer with its own (package bpy). All are interleaved. The
-    first frame of a new scene waits for its kernel; with empty caches, in a separate process, for all
-    kernels. The network has random weights.
+    has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
+    [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
+    own (package bpy). All are interleaved. The first frame waits for its kernel; with empty caches, in a
+    separate process, for all. The network has random weights.
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring

@@ -395,7 +395,7 @@ def test_noise_fills_the_picture_within_the_ranges(size) -> None:
 
 @pytest.mark.parametrize("size", [0, -1, 8193])
 def test_sizes_without_a_picture_are_refused(size) -> None:
-    with pytest.raises(InputError, match=r"size of the picture -?\d+: must be from 1 to 8192"):
+    with pytest.raises(InputError, match=r"size of the image -?\d+: must be from 1 to 8192"):
         workload.noise(size)
 
 

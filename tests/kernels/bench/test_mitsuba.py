@@ -120,7 +120,7 @@ ROOM = scenes.furnace()
 @pytest.mark.parametrize(
     ("scene", "settings", "message"),
     [
-        (ROOM, Settings(roulette_depth=2), "the peer combines both strategies by the power heuristic"),
+        (ROOM, Settings(roulette_depth=2), "Mitsuba combines both strategies by the power heuristic"),
         (ROOM, Settings(strategy="light"), "use the default ones except for max_depth"),
         (
             scenes.daylight(sun_concentration=3000.0),
@@ -130,7 +130,7 @@ ROOM = scenes.furnace()
         (
             replace(ROOM, spheres=(Sphere((0.0, 0.5, 0.0), 0.2, (0.9,) * 3, (0.1,) * 3, Dielectric()),)),
             Settings(),
-            r"glass Sphere.*: no light may begin inside of it \(move the lamp out",
+            r"glass Sphere.*: no light may start inside \(move the light out",
         ),
         (
             replace(
@@ -139,7 +139,7 @@ ROOM = scenes.furnace()
                 lights=(Light((0.0, 0.5, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.1), (1.0, 1.0, 1.0), 1.0),),
             ),
             Settings(),
-            "glass Box.*: no light may begin inside of it",
+            "glass Box.*: no light may start inside",
         ),
         (ROOM, Settings(heuristic="balance"), r"without roulette \(use the default ones"),
         (

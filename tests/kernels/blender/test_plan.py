@@ -62,8 +62,8 @@ def test_every_frame_of_a_film_may_be_drawn():
     ("changed", "told"),
     [
         ({"frames": 0}, "frames 0: must be 1 or more"),
-        ({"frames": 34}, "number of frames and test frames 37: the film has 36 frames"),
-        ({"outside_frames": 13}, "frames outside, which --arc holds 13: the film has 12"),
+        ({"frames": 34}, "number of frames and test frames 37: the animation has 36 frames"),
+        ({"outside_frames": 13}, "frames outside, which --arc holds 13: the animation has 12"),
         ({"arc_s": 2.0}, "arc_s 2.0"),
         ({"percent": 0}, "percent 0"),
         ({"percent": 10_000}, "at most 16384 pixels"),

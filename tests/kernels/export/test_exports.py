@@ -435,7 +435,7 @@ def test_a_tool_that_is_missing_is_named(monkeypatch, tmp_path):
 def test_a_kernel_that_a_tool_refuses(tmp_path):
     if not tools.have("glslangValidator"):
         pytest.skip("glslangValidator is not installed")
-    with pytest.raises(CompileError, match=r"glslangValidator refuses the kernel: .*error"):
+    with pytest.raises(CompileError, match=r"glslangValidator rejects the kernel: .*error"):
         tools.spirv("#version 450\nvoid main() { flaot x; }")
 
 

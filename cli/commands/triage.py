@@ -105,8 +105,8 @@ def triage(
     """Run a model on every backend, and find the one that exceeds its error bound.
 
     Each kernel is compared with the float64 reference, within its schedule's bound for this frame. If
-    one deviates, the first deviating stage is found, and the smallest part of the frame that reproduces
-    it is stored in FOLDER with the kernel's source. The exit status is 1 if a kernel deviates.
+    one deviates, FOLDER gets the first deviating stage and the smallest part of the frame that
+    reproduces it, with the kernel's source. The exit status is 1 if a kernel deviates.
     """
     from ...compiler.core.profiles import profile_named
     from ...kernels.run.denoise_on import images_of

@@ -222,7 +222,7 @@ class OpenCLExecutor(Executor):
             raise InputError(
                 f"size of the image on {self.device}",
                 f"{size[1]} x {size[0]}",
-                f"the device does not run it ({' '.join(str(error).split())})",
+                f"the device does not run it: {' '.join(str(error).split())}",
                 "split the image, or use executor numpy",
             ) from None
 

@@ -144,7 +144,7 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         ({"scene": "cornell"}, {}, []),
         ({"scene": "cornell"}, {"scene": "cornell", "spp": "1"}, []),
         ({"scene": "cornell, empty"}, {"scene": "empty", "spp": "1"}, []),
-        ({"scene": "cornell"}, {"scene": "empty", "spp": "1"}, ["it shows empty, and the model has learned"]),
+        ({"scene": "cornell"}, {"scene": "empty", "spp": "1"}, ["it shows empty, but the model was trained"]),
         (
             {"scene": "empty", "feature_spp": "16"},
             {"scene": "empty", "spp": "1"},
@@ -256,5 +256,5 @@ def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> No
     save_model(here / "other.safetensors", replace(model, info={"trained_on_scene": "cornell"}))
     outcome = wamnet("denoise", "other.safetensors", "noisy.exr")
     assert outcome.status == 0
-    assert "noisy.exr: it shows minicubes, and the model has learned only cornell" in outcome.out
+    assert "noisy.exr: it shows minicubes, but the model was trained only on cornell" in outcome.out
     assert (here / "denoised.png").exists()

@@ -132,7 +132,7 @@ def test_figures_are_pictures(tmp_path):
     figures.curves(tmp_path / "curves.png", {"a": [(1, [2.0, 3.0])], "b": [(1, [1.0])]}, ("x", "y"))
     for name in ("sheet.png", "curves.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match=r"pictures in each row is \[1, 2\]"):
+    with pytest.raises(InputError, match=r"pictures in each row \[1, 2\]"):
         figures.sheet(tmp_path / "x.png", [("", [("", image)]), ("", [("", image), ("", image)])])
 
 

@@ -128,9 +128,7 @@ def test_no_test_frame_has_the_geometry_of_another(scale):
 def test_frames_that_are_alike_are_refused():
     split = rows.split_of(TINY)
     turned = replace(split.train[0], time=split.train[0].time + rows.TURN_SECONDS / 4)
-    with pytest.raises(
-        InputError, match=r"test frame is test frame 0 .*: normals and depths are those of tr"
-    ):
+    with pytest.raises(InputError, match=r"test frame 'test frame 0 .*: normals and depths are those of tr"):
         rows.compared(replace(split, test=(turned,)))
 
 

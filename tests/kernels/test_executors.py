@@ -229,7 +229,7 @@ def test_kernel_in_another_language_is_refused(small, kit):
     executor, _ = small
     other = "opencl" if executor.name == "numpy" else "numpy"
     artifact = compile_program(kit.program(lambda x: x * 2.0, {"a": 3}), other)
-    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"):
+    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target '{other}'"):
         executor.run(artifact, {"a": np.zeros((2, 2, 3), np.float32)})
 
 
@@ -304,7 +304,7 @@ def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit,
 
     monkeypatch.setattr(executor, "_store", full)
     with pytest.raises(
-        InputError, match=r"is 3 x 2: the device does not run it \(no memory\); split the image"
+        InputError, match=r"'3 x 2': the device does not run it: no memory \(split the image"
     ):
         executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
 
@@ -347,7 +347,7 @@ def test_a_refused_texture_gives_the_others_back(executor_named, kit, monkeypatc
         return made[-1]
 
     monkeypatch.setattr(executor, "_texture", texture)
-    with pytest.raises(InputError, match="texture is b"):
+    with pytest.raises(InputError, match="texture 'b"):
         executor.run(artifact, {name: np.zeros((3, 3, 1), np.float32) for name in "ab"})
     assert [type(thing.mglo).__name__ for thing in made] == ["InvalidObject"]
 

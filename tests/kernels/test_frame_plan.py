@@ -63,7 +63,7 @@ def test_splits_and_draws() -> None:
 def test_frames_that_are_alike_are_refused() -> None:
     """A scene that does not move has no unseen frames, unless its camera does."""
     still = replace(TINY, scene="daylight")
-    with pytest.raises(InputError, match="test frame is test/00000"):
+    with pytest.raises(InputError, match="test frame 'test/00000"):
         frame_plan.compared(plan(still))
     assert frame_plan.compared(plan(replace(still, test_frames=0))) == {}
     assert set(frame_plan.compared(plan(replace(still, yaw_deg=(-20.0, 20.0))))) == {"test"}

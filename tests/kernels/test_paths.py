@@ -145,7 +145,7 @@ def test_double_precision_is_refused(executor):
 def test_kernel_in_another_language_is_refused(executor):
     other = "opencl" if executor.name == "numpy" else "numpy"
     kernel = compile_path(lower_scene(scene("empty"), Settings()), other)
-    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"):
+    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target '{other}'"):
         executor.trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
 
 

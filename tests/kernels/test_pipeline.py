@@ -508,7 +508,7 @@ def test_kernels_in_another_language_are_refused(executor, model_of):
     with (
         open_executor(other) as elsewhere,
         Pipeline(elsewhere, scene("empty"), model, (2, 2)) as pipeline,
-        pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"),
+        pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target '{other}'"),
     ):
         executor.passes(pipeline.encode, pipeline.denoise, (2, 2))
 

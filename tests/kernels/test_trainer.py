@@ -491,7 +491,7 @@ def test_frames_that_are_not_finite_leave_no_good_state(opencl: Any) -> None:
     kept: list[TrainState] = []
     noisy, reference = PAIRS[0]
     bad = Frame({"color": np.full_like(noisy["color"], np.nan)})
-    with pytest.raises(InputError, match=r"pair 0: layer 'color' at x=0, y=0 .* is nan"):
+    with pytest.raises(InputError, match=r"pair 0: layer 'color' at x=0, y=0 .* nan"):
         train_on(opencl, SMALL, [(bad, reference)], on_checkpoint=kept.append)
     assert kept == []
 

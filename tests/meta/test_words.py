@@ -290,10 +290,10 @@ def test_what_is_kept_is_there_and_wrong(house):
 PLANTED = {
     "What is missing is told.": "told",
     "Matt surfaces": "Matt",
-    "The bug is\nmended.": "mended",
+    "The bug is mended.": "mended",
     "All frames that there can be.": "that there can be",
     "Files of strangers.": "strangers",
-    "A whole number of steps": "whole number",
+    "A whole\nnumber of steps": "whole number",
 }
 """Sentences with a word that is refused."""
 
@@ -348,7 +348,7 @@ def test_plain_words_and_code_pass(text):
 
 def test_texts_of_python_are_prose_and_its_names_are_not():
     text = 'mend = 1  # now mend\n\n\ndef f():\n    """Mend it."""\n    return f"{x} matt"\n'
-    assert [line.partition(": ")[0] for line in wrong_words("x.py", text)] == ["x.py:1", "x.py:5", "x.py:6"]
+    assert sorted(line.partition(": ")[0] for line in wrong_words("x.py", text)) == ["x.py:1", "x.py:5", "x.py:6"]
 
 
 @pytest.mark.parametrize(

@@ -263,7 +263,7 @@ def test_normalization_without_layers_or_hits_divides_by_one() -> None:
     ],
 )
 def test_normalization_is_checked(values: Any) -> None:
-    with pytest.raises(InputError, match=f"{next(iter(values))} is .*finite"):
+    with pytest.raises(InputError, match=f"{next(iter(values))} .*must be"):
         dataset.check_normalization(Normalization(**values))
 
 
@@ -280,7 +280,7 @@ def test_normalization_text_is_checked(text: str) -> None:
 
 @pytest.mark.parametrize("size", [0, -1, 65, 1.5])
 def test_window_sizes_are_checked(size: Any) -> None:
-    with pytest.raises(InputError, match=r"window size is .*an integer from 1 to 64"):
+    with pytest.raises(InputError, match=r"window size .*must be an integer from 1 to 64"):
         dataset.check_window(Window(size))
 
 

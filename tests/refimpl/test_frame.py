@@ -71,7 +71,7 @@ def test_other_element_types_are_refused(values: object) -> None:
 @pytest.mark.parametrize("shape", [(2, 2), (2, 2, 1), (2, 2, 4), (0, 2, 3), (2, 0, 3)])
 def test_wrong_shapes_are_refused(shape: tuple[int, ...]) -> None:
     """Wrong number of axes, of channels, and no pixel."""
-    with pytest.raises(InputError, match=r"shape of layer 'color' is \(.*it must be \(height, width, 3\)"):
+    with pytest.raises(InputError, match=r"shape of layer 'color' \(.*must be \(height, width, 3\)"):
         validate(Frame({"color": np.zeros(shape)}))
 
 
@@ -100,5 +100,5 @@ def test_one_bad_pixel_is_told_in_the_singular() -> None:
     """One pixel, no plural."""
     frame = full_frame(1, 1)
     frame.layers["depth"][0, 0, 0] = np.nan
-    with pytest.raises(InputError, match=r"layer 'depth' at x=0, y=0 \(first of 1 such pixel\) is nan"):
+    with pytest.raises(InputError, match=r"layer 'depth' at x=0, y=0 \(first of 1 such pixel\) nan"):
         validate(frame)

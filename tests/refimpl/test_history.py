@@ -421,5 +421,5 @@ def test_pictures_that_do_not_fit_are_refused():
 @pytest.mark.parametrize("value", [0, 0.5, H.MOST_LIMIT + 1, np.nan])
 def test_limits_beyond_the_bound_s_reach_are_refused(name, value):
     """HIS-6."""
-    with pytest.raises(InputError, match=f"^limit `{name}` is .*from 1 to {H.MOST_LIMIT}"):
+    with pytest.raises(InputError, match=f"^limit `{name}` .*from 1 to {H.MOST_LIMIT}"):
         H.Limits(**{name: value})

@@ -272,5 +272,5 @@ def test_refuses_row_ranges(rows):
 
 
 def test_refuses_tiles_of_no_pixel():
-    with pytest.raises(InputError, match="tile_pixels is 0"):
+    with pytest.raises(InputError, match="tile_pixels 0"):
         R.render(CORNELL, R.Job(4, 4), tile_pixels=0)

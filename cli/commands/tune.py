@@ -66,8 +66,7 @@ def tune(
 ) -> None:
     """Measure which schedule of the denoiser is fastest on this machine, and cache the result.
 
-    Every schedule that the device can run is checked against the reference, then timed. Other commands
-    use the fastest one for networks of this shape and images of about this size.
+    Schedules are checked against the reference first. Other commands use the result for similar networks.
     """
     from ...compiler.variants import FULL, plan_model, with_rank
     from ...kernels import open_executor

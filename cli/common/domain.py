@@ -43,7 +43,7 @@ def check_domain(
             f"reads {read}; {farthest(found)}"
         )
         way_out = "export it as the training frames were, or give --anyway"
-        raise InputError(f"{path}: distance from the model's domain", f"{found.distance:.3g}", rule, way_out)
+        raise InputError(f"{path}: distance from the model's domain", round(found.distance, 2), rule, way_out)
     if foreign:
         say(f"{path}: another program's frame, of which the model reads {read}")
     if found and domain and is_outside:

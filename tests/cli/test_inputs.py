@@ -246,7 +246,7 @@ def test_a_frame_outside_of_the_ranges_is_denoised_with_a_warning(wamnet, here) 
         assert wamnet(*small, "--yaw", yaw, "-o", "frame.exr").status == 0
         outcome = wamnet("denoise", "narrow.safetensors", "frame.exr")
         assert outcome.status == 0
-        warned = [line for line in outcome.out.splitlines() if "outside of what" in line]
+        warned = [line for line in outcome.out.splitlines() if "outside the training" in line]
         wanted = [f"frame.exr: outside the training ranges: {text}; expect errors" for text in told]
         assert warned == wanted
 

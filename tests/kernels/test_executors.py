@@ -303,9 +303,7 @@ def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit,
         raise MemoryError("no\nmemory")
 
     monkeypatch.setattr(executor, "_store", full)
-    with pytest.raises(
-        InputError, match=r"'3 x 2': the device does not run it: no memory \(split the image"
-    ):
+    with pytest.raises(InputError, match=r"'3 x 2': the device does not run it: no memory \(split the image"):
         executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
 
 

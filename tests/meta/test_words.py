@@ -348,7 +348,11 @@ def test_plain_words_and_code_pass(text):
 
 def test_texts_of_python_are_prose_and_its_names_are_not():
     text = 'mend = 1  # now mend\n\n\ndef f():\n    """Mend it."""\n    return f"{x} matt"\n'
-    assert sorted(line.partition(": ")[0] for line in wrong_words("x.py", text)) == ["x.py:1", "x.py:5", "x.py:6"]
+    assert sorted(line.partition(": ")[0] for line in wrong_words("x.py", text)) == [
+        "x.py:1",
+        "x.py:5",
+        "x.py:6",
+    ]
 
 
 @pytest.mark.parametrize(

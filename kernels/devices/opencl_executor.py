@@ -186,7 +186,7 @@ class OpenCLExecutor(Executor):
             items = min(items, STACK_BYTES // max(used, 1))
         if not items:
             raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes per pixel: at most {STACK_BYTES} fit "
+                f"{self.device}: the kernel's arrays take {used} bytes per pixel; at most {STACK_BYTES} fit "
                 "a processor's stack; use narrower layers, or a GPU, or executor numpy"
             )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE

@@ -230,7 +230,7 @@ def test_other_files_are_refused(tmp_path, changes, text):
 def test_what_is_no_vector_is_refused(tmp_path, text):
     path = tmp_path / "a.json"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"no JSON|its format must be"):
+    with pytest.raises(InputError, match=r"acceptable JSON|its format must be"):
         case.load(path)
 
 

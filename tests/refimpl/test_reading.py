@@ -253,7 +253,7 @@ def test_a_value_of_another_type_is_refused_with_its_path(key, value, path):
 
 
 def test_a_missing_key_is_refused():
-    with pytest.raises(InputError, match=r"it\.count is missing"):
+    with pytest.raises(InputError, match=r"it\.count: missing"):
         to_dataclass(Outer, {"number": 1, "text": ""}, "it")
 
 

@@ -517,14 +517,18 @@ def test_a_truncated_file_is_no_certificate(path, changed, cut):
 
 @pytest.mark.parametrize("data", [b"", b"\xff\x00", b"[]", b"{}", b"null", b'{"schema": 1}', b"[" * 100000])
 def test_garbage_is_no_certificate(changed, data):
-    with pytest.raises((InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"):
+    with pytest.raises(
+        (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
+    ):
         checker.check(changed(denoise_certificate_json=data))
 
 
 def test_any_key_left_out_is_told(path, changed):
     held = certificate_of(path)
     for name in held:
-        with pytest.raises((InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"):
+        with pytest.raises(
+            (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
+        ):
             checker.check(changed(denoise_certificate_json={k: v for k, v in held.items() if k != name}))
 
 

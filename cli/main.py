@@ -135,7 +135,7 @@ def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: 
 
 def root(
     context: typer.Context,
-    version: Annotated[bool, typer.Option(VERSION, help="Show the version and end.")] = False,
+    version: Annotated[bool, typer.Option(VERSION, help="Print the version and exit.")] = False,
 ) -> None:
     """Render a scene, train a small network that denoises it, and run that network anywhere.
 
@@ -206,9 +206,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except WamnetError as error:
         return _fail(str(error))
     except MemoryError:
-        return _fail(
-            "the memory does not suffice; use smaller frames or fewer --workers, or end other programs"
-        )
+        return _fail("out of memory (use smaller frames or fewer --workers, or close other programs)")
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}")

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..refimpl.errors import CompileError
+from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
 from .languages import opencl_path, planes
@@ -238,7 +238,7 @@ def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
     known = {**DENOISERS, **EXPORTED}
     if name not in known:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(known)}")
+        raise CompileError(f"target {name!r}: unknown ({choice(name, known)})")
     return known[name]
 
 

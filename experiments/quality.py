@@ -518,7 +518,7 @@ def work(options: argparse.Namespace) -> None:
     for what, chosen, known in (("row", options.only, ROWS), ("set", options.sets, SETS)):
         for name in chosen:
             if name not in known:
-                raise InputError(what, name, "there is none of this name", f"use some of {', '.join(known)}")
+                raise InputError(what, name, "unknown", f"choose some of {', '.join(known)}")
     plan = PLANS[options.scale]
     settings = {"scale": options.scale, **asdict(plan), "executor": options.executor}
     kept = Results.open(options.output / "quality.json", "quality", settings)

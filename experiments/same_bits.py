@@ -170,7 +170,7 @@ def dxc_runner() -> WgpuRunner:
             made.write_text(tools.hlsl(tools.spirv(source), "dxc"), encoding="utf-8")
             done = subprocess.run([*DXC, "-Fo", written, made], capture_output=True, text=True, check=False)
             if done.returncode:
-                raise CompileError(f"dxc refuses the kernel: {done.stderr}")
+                raise CompileError(f"dxc rejects the kernel: {done.stderr}")
             return written.read_bytes()
 
     return WgpuRunner("glsl-vulkan", translated)

@@ -266,9 +266,7 @@ def _write(path: Path, content: bytes) -> None:
         write_bytes(path, content)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(
-            "output file", str(path), f"cannot be written ({reason})", "choose another"
-        ) from None
+        raise InputError("output file", str(path), f"cannot be written: {reason}", "choose another") from None
 
 
 def _read(
@@ -280,7 +278,7 @@ def _read(
     try:
         found = deserialize(content)  # type: ignore[no-untyped-call]
     except (SafetensorError, *BROKEN) as error:
-        raise InputError(f"{kind} file", str(path), f"not a safetensors file ({error})", way_out) from None
+        raise InputError(f"{kind} file", str(path), f"is not a safetensors file: {error}", way_out) from None
     texts = _header_texts(path, content)
     tensors = {
         name: np.frombuffer(entry["data"], _TYPES[entry["dtype"]]).reshape(entry["shape"])
@@ -306,11 +304,10 @@ def _header_texts(path: Path, content: bytes) -> dict[str, str]:
 def _check_entry(what: str, entry: Any, way_out: str) -> None:
     """Refuse a tensor's entry with other keys than these three, or a type that is not known."""
     if not isinstance(entry, dict) or set(entry) != _ENTRY:
-        rule = f"it must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
+        rule = f"must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
         raise InputError(what, entry, rule, way_out)
     if entry["dtype"] not in _TYPES:
-        rule = f"no such type of numbers; known are {', '.join(_TYPES)}"
-        raise InputError(f"{what}.dtype", entry["dtype"], rule, way_out)
+        raise InputError(f"{what}.dtype", entry["dtype"], f"must be one of {', '.join(_TYPES)}", way_out)
 
 
 def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) -> None:
@@ -344,7 +341,7 @@ def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) ->
     except InputError as error:
         raise _inside(path, error) from None
     except BROKEN as error:
-        raise InputError(f"{path}: {name}", texts[name], f"cannot be read ({error})", "train again") from None
+        raise InputError(f"{path}: {name}", texts[name], f"cannot be read: {error}", "train again") from None
 
 
 def _activation(path: Path, texts: Texts) -> str:

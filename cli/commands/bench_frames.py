@@ -74,7 +74,7 @@ def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
 
     pairs = dataset_files.read_pairs(folder, split, tell=say)
     if not pairs:
-        raise InputError("data set", str(folder), f"it has no {split} frames", "make one with --test 1")
+        raise InputError("data set", str(folder), f"has no {split} frames", "make one with --test 1")
     for noisy, _ in pairs:
         exr.need_layers(
             folder, noisy, model.features, "the model was trained with it", "make another data set"

@@ -107,29 +107,32 @@ def demo(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="Folder for all results.",
+            help="Output folder.",
             show_default=f"{FOLDER}, or {QUICK_FOLDER} with --quick",
         ),
     ] = None,
     size: Annotated[
         int | None,
         typer.Option(
-            help="Width and height of the frames, in pixels; not with --quick.",
+            help="Width and height of the frames, in pixels; cannot be combined with --quick.",
             show_default=str(Plan.size_px),
         ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Tiny frames: try whether everything works.")
+        bool,
+        typer.Option(
+            "--quick", help="Use tiny frames, as a quick check that everything works (one to two minutes)."
+        ),
     ] = False,
 ) -> None:
-    """Render, train, compile, denoise unseen frames and write a report, in a few minutes.
+    """Render, train, compile, denoise unseen frames and write a report, in about five minutes.
 
-    Open FOLDER/report.html afterwards. After Ctrl-C, the same command resumes where it was.
+    Then open FOLDER/report.html. After Ctrl-C, the same command resumes where it stopped.
     """
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report")
     if quick and size is not None:
-        raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
+        raise InputError("--size", size, "cannot be combined with --quick", "leave out one of them")
     sizes = QUICK if quick else Plan(size_px=Plan.size_px if size is None else size)
     plan = for_this_machine(of_scene(sizes, scene))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
@@ -184,7 +187,7 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
 
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
     if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
     text = json.dumps(asdict(plan), indent=2) + "\n"
     _check_note(folder, text)
     with working_in(folder, "making a demonstration"):
@@ -205,7 +208,7 @@ def _check_note(folder: Path, text: str) -> bool:
     except InputError:
         found = ""
     if found != text:
-        rule = "it holds results of another plan" if found else "it holds files that are not the demo's"
+        rule = "holds results of another plan" if found else "it holds files that are not the demo's"
         raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
     return True
 

@@ -62,7 +62,9 @@ wamnet executors"""
 
 KeepLayers = Annotated[
     bool,
-    typer.Option("--keep-layers", help="Write all layers of FRAME too, and the picture as layer wamnet."),
+    typer.Option(
+        "--keep-layers", help="Also copy all layers of FRAME, and write the result as layer wamnet."
+    ),
 ]
 ViewLayer = Annotated[
     str,
@@ -133,7 +135,8 @@ def denoise(
         list[Path],
         typer.Argument(
             metavar="FRAME...",
-            help="Noisy frames with the model's layers (.exr); shot.*.exr and shot.%04d.exr are sequences.",
+            help="Noisy frames with the layers that the model reads (.exr); shot.*.exr and "
+            "shot.%04d.exr are sequences.",
             show_default=False,
         ),
     ],
@@ -143,8 +146,8 @@ def denoise(
             "-o",
             "--output",
             metavar="FILE",
-            help="Linear colour (.exr) or display-encoded image (.png); for several frames a folder, or a "
-            "name with %04d for their numbers.",
+            help="Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
+            "folder or a pattern with %04d for the frame number.",
         ),
     ] = Path("denoised.png"),
     executor: options.Executor = ExecutorChoice.auto,
@@ -153,7 +156,10 @@ def denoise(
     rank: options.CutRank = 0,
     variant: options.Variant = None,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Denoise another program's frame that is unlike the training's.")
+        bool,
+        typer.Option(
+            "--anyway", help="Denoise frames of other programs even if they lie outside the training domain."
+        ),
     ] = False,
     keep_layers: KeepLayers = False,
     view_layer: ViewLayer = "",
@@ -161,10 +167,9 @@ def denoise(
 ) -> None:
     """Denoise frames with a trained model.
 
-    The kernel's schedule is the one that suits the device, unless another is named. An
-    integer network (variant whole8) gives the same bits on every executor; their digest is printed, to be
-    compared. Kernels are kept: a second command compiles nothing. Of a sequence, results that are there are
-    not made again.
+    The schedule is the fastest known for the device, unless --schedule names one. An integer network
+    (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for comparison.
+    Kernels are cached: a second run compiles nothing. In a sequence, existing results are not computed again.
     """
     from ...kernels import open_executor
     from ...kernels.run.denoise_on import Denoiser
@@ -292,7 +297,7 @@ def chosen_variant(variant: str | None, rank: int) -> str:
 
 
 def executors() -> None:
-    """List what can run a kernel here, or what is missing for it."""
+    """List the available backends, and what the others lack."""
     found = [probe(name.value) for name in ExecutorName]
     heads = ("name", "state", "schedule", "device, or what is missing")
     table("Executors", heads, found, texts=4)

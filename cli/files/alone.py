@@ -115,7 +115,7 @@ def _open(path: Path) -> int:
         if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
             raise _strange(path) from None
         raise InputError(
-            "lock file", str(path), f"cannot be written ({error.strerror})", "choose another output with -o"
+            "lock file", str(path), f"cannot be written: {error.strerror}", "choose another output with -o"
         ) from None
     found = os.fstat(handle)
     if not stat.S_ISREG(found.st_mode) or found.st_size:

@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from . import sine
 from .ops import Rounding
 
@@ -145,8 +145,7 @@ def profile_named(name: str) -> Profile:
         for degree in sine.POLYNOMIALS
         if profile.sine and degree != sine.DEGREE
     ]
-    known = ", ".join([*PROFILES, *others])
-    raise CompileError(f"profile {name!r} does not exist; there are: {known}")
+    raise CompileError(f"profile {name!r}: unknown ({choice(name, [*PROFILES, *others])})")
 
 
 def with_degree(profile: Profile, degree: int) -> Profile:

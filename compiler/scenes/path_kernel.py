@@ -139,7 +139,7 @@ def compile_path(
         raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
-        raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
+        raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
     emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from ...refimpl.network import dataset
 from ..core import ir, weights
 from ..core.ir import Gather, Program
@@ -561,7 +561,7 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
-        raise CompileError(f"schedule {name!r} does not exist for this target; there are: {', '.join(known)}")
+        raise CompileError(f"schedule {name!r}: unknown to this target ({choice(name, known)})")
     chosen, first = known[name], ""
     while chosen is not schedules[0] and (reason := chosen.refusal(program)):
         first = first or reason

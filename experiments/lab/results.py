@@ -76,7 +76,7 @@ def _data(path: Path) -> dict[str, Any]:
             raise KeyError("schema")
         _ = data["experiment"], data["settings"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        rule = f"it is not a file of results ({type(error).__name__})"
+        rule = f"is not a file of results ({type(error).__name__})"
         raise InputError("file of results", str(path), rule, WAY_OUT) from None
     return data
 
@@ -87,7 +87,7 @@ def number(value: Any) -> float:
         return float(value)
     if found := re.match(r"[-+]?[\d,]*\.?\d+(?:e[-+]?\d+)?", value.strip("* ")):
         return float(found[0].replace(",", ""))
-    raise InputError("value", value, "it does not begin with a number", "show another value")
+    raise InputError("value", value, "does not begin with a number", "show another value")
 
 
 def written(data: Mapping[str, Any]) -> str:
@@ -195,7 +195,7 @@ class Results:
         """Return what the file says, or refuse it as that of something else."""
         data = _data(self.path)
         if (data["experiment"], data["settings"]) != (self.experiment, self.settings):
-            rule = f"it belongs to {data['experiment']} with settings {json.dumps(data['settings'])}"
+            rule = f"belongs to {data['experiment']} with settings {json.dumps(data['settings'])}"
             raise InputError("file of results", str(self.path), rule, WAY_OUT)
         return data
 

@@ -87,7 +87,7 @@ def quality(name: str, split: str = "test", only: Sequence[str] = (), record: st
         shown = {key: text for key, text in texts.items() if found.summary(key, "psnr")}
         if not shown:
             raise InputError(
-                f"record {record}", f"{name}, {split}", "it has no rows of these frames", "make them"
+                f"record {record}", f"{name}, {split}", "has no rows of these frames", "make them"
             )
         columns = [column for column in QUALITY if any(found.summary(key, column.value) for key in shown)]
         return tables.table(found, intervals(found, columns), shown)

@@ -59,7 +59,7 @@ def figure(records: Records, name: str, figures: Mapping[str, Callable[[Records]
     path, _, form = name.rpartition(":")
     parts = path.split("/")
     if len(parts) != 3:
-        rule = "it must be record/configuration/value:format, or the name of a function in lab/shown.py"
+        rule = "must be record/configuration/value:format, or the name of a function in lab/shown.py"
         raise InputError("figure", name, rule, "correct it")
     record, configuration, value = parts
     end, _, rest = value.partition(" ")

@@ -78,7 +78,7 @@ def _check_llvm() -> None:
 def check(scene: Scene, settings: Settings) -> None:
     """Refuse a scene or settings that Mitsuba would show differently."""
     if settings.roulette_depth is not None or settings.strategy != "mis" or settings.heuristic != "power":
-        rule = "the peer combines both strategies by the power heuristic, without roulette"
+        rule = "Mitsuba combines both strategies by the power heuristic, without roulette"
         raise InputError("settings", settings, rule, "use the default ones except for max_depth")
     parts: tuple[Box | Sphere | Quad | Light, ...] = (
         *scene.boxes,
@@ -125,7 +125,7 @@ def _check_glass(scene: Scene) -> None:
     for part in glass:
         if any(_surrounds(part, point) for point in inner):
             raise InputError(
-                "glass", part, "no light may begin inside of it", "move the lamp out, or remove its emission"
+                "glass", part, "no light may start inside", "move the light out, or remove its emission"
             )
 
 

@@ -170,7 +170,7 @@ class Executor(ABC):
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
-        rule = "it has no compiled trainer"
+        rule = "has no compiled trainer"
         raise InputError(
             "executor that trains", self.name, rule, "use executor opencl, or refimpl.network.train"
         )
@@ -314,8 +314,8 @@ class Executor(ABC):
         self._check_target(kernel)
         if (part.first_row, part.rows) != (0, part.height):
             rows = f"{part.first_row} to {part.first_row + part.rows} of {part.height}"
-            rule = "a kernel that writes encoded images does the whole picture"
-            raise InputError("rows of the picture", rows, rule, "trace the part by a kernel of sums")
+            rule = "a kernel that writes encoded images computes the full image"
+            raise InputError("rows of the image", rows, rule, "trace the part by a kernel of sums")
         self.build(kernel)
         return self._paint(kernel, part, numbers)
 

@@ -26,7 +26,7 @@ def checked(artifact: Denoiser, inputs: Images) -> Images:
     if sorted(inputs) != sorted(image.name for image in wanted):
         raise InputError(
             "images for the kernel",
-            ", ".join(inputs) or "none",
+            ", ".join(inputs),
             f"must be {', '.join(image.name for image in wanted)}",
             "give each encoded feature once, by name",
         )

@@ -159,10 +159,10 @@ class OpenCLExecutor(Executor):
         count, largest = height * width * most, self._device.max_mem_alloc_size
         if count >= INDEX_LIMIT or 4 * count > largest:
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{width} x {height} with {most} channels",
                 f"one image must hold fewer than {INDEX_LIMIT} numbers and at most {largest} bytes",
-                "split the picture, or use executor numpy",
+                "split the image, or use executor numpy",
             )
 
     def _local_size(self, artifact: Denoiser) -> tuple[int, int]:
@@ -175,7 +175,7 @@ class OpenCLExecutor(Executor):
             items = min(items, STACK_BYTES // max(used, 1))
         if not items:
             raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes per pixel: at most {STACK_BYTES} fit "
+                f"{self.device}: the kernel's arrays take {used} bytes per pixel; at most {STACK_BYTES} fit "
                 "a processor's stack; use narrower layers, or a GPU, or executor numpy"
             )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
@@ -209,10 +209,10 @@ class OpenCLExecutor(Executor):
             if size is None:
                 raise
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{size[1]} x {size[0]}",
-                f"the device does not run it ({' '.join(str(error).split())})",
-                "split the picture, or use executor numpy",
+                f"the device does not run it: {' '.join(str(error).split())}",
+                "split the image, or use executor numpy",
             ) from None
 
     def _start(

@@ -361,7 +361,7 @@ class OpenGLExecutor(Executor):
                 f"texture for {name}",
                 f"{size[0]} x {size[1]} with {channels} channels",
                 f"this OpenGL takes at most {largest} x {largest} with 4 channels",
-                "split the picture, or use another executor",
+                "split the image, or use another executor",
             )
 
     def close(self) -> None:
@@ -373,9 +373,7 @@ class OpenGLExecutor(Executor):
 def _open(kind: str) -> tuple[str, Any]:
     """Return the kind of the context and the context, or say why there is none."""
     if kind != "auto" and kind not in CONTEXTS:
-        raise InputError(
-            "OpenGL context", kind, f"must be auto, {', '.join(CONTEXTS)}", "choose one of these"
-        )
+        raise InputError("OpenGL context", kind, "unknown", f"choose one of auto, {', '.join(CONTEXTS)}")
     reasons = []
     for name in CONTEXTS if kind == "auto" else (kind,):
         try:

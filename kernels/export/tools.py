@@ -70,7 +70,7 @@ def run(program: str, *arguments: str, folder: Path) -> str:
         ) from None
     told = " ".join((done.stdout + done.stderr).split())
     if done.returncode:
-        raise CompileError(f"{program} refuses the kernel: {told[:MOST_TOLD]}")
+        raise CompileError(f"{program} rejects the kernel: {told[:MOST_TOLD]}")
     return told
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ...models.data.frame_plan import Rows
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.environment import with_sun
 from ...refimpl.light.render import Job, Render, render
 from ...refimpl.light.scene import Scene
@@ -104,8 +104,7 @@ RENDERERS: Mapping[str, Renderer] = {
 def renderer(executor: str) -> Renderer:
     """Return how an executor renders, or refuse its name."""
     if executor not in RENDERERS:
-        rule = f"must be one of {', '.join(RENDERERS)}"
-        raise InputError("executor that renders", executor, rule, "choose one of these")
+        raise InputError("executor that renders", executor, "unknown", choice(executor, RENDERERS))
     return RENDERERS[executor]
 
 

@@ -174,7 +174,7 @@ def drawn(frames: Sequence[int], seed: int, count: int, what: str) -> list[int]:
     A frame that is there already is passed over. Raises InputError where there are not so many.
     """
     if count > len(frames):
-        rule = f"the film has {len(frames)} frames for them"
+        rule = f"the animation has {len(frames)} frames for them"
         raise InputError(f"number of {what}", count, rule, "use fewer, or a longer animation")
     places = (int(time) for time in times(seed, 0.0, float(len(frames)), 0, DRAWS * len(frames)))
     order = dict.fromkeys(min(place, len(frames) - 1) for place in places) if count else {}
@@ -187,7 +187,7 @@ def _check(request: Request) -> None:
     for name, low in {**least, "percent": 1, "seed": 0}.items():
         value = getattr(request, name)
         if value < low:
-            raise InputError(name, value, f"it must be {low} or more", "choose another number")
+            raise InputError(name, value, f"must be {low} or more", "choose another number")
     if not 0.0 <= request.arc_s < len(request.animation.frames) / request.animation.fps:
         rule = "training leaves it out of the animation: it must be 0 or more and shorter"
         raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")

@@ -37,7 +37,7 @@ def program(named: str | None) -> list[str]:
     if found is not None:
         return [found, *QUIET, str(SCRIPT)]
     if named is not None:
-        raise InputError("--blender", named, "no such program", "name Blender's program")
+        raise InputError("--blender", named, "not found", "give the path of Blender's program")
     rule = "there is no program blender, and this Python has no package bpy"
     raise ExecutorUnavailable(f"Blender: {rule}; install Blender, or pip install --no-deps bpy")
 

@@ -262,11 +262,11 @@ def animation_times(start_s: float, seconds: float, fps: float) -> list[float]:
     """Return the times of a film, 1 / fps apart, from the start to before the end; the first at least."""
     if not (all(map(math.isfinite, (start_s, seconds, fps))) and seconds > 0.0 and fps > 0.0):
         what = "animation (start, seconds, pictures per second)"
-        raise InputError(what, (start_s, seconds, fps), "it must be finite and last", "change it")
+        raise InputError(what, (start_s, seconds, fps), "must be finite and last", "change it")
     count = max(1, round(seconds * fps))
     if count > LARGEST_FRAMES:
-        rule = f"a film has {LARGEST_FRAMES} at most"
-        raise InputError("number of pictures", count, rule, "make it shorter, or use fewer per second")
+        rule = f"an animation has {LARGEST_FRAMES} at most"
+        raise InputError("number of frames", count, rule, "make it shorter, or use fewer per second")
     return [start_s + k / fps for k in range(count)]
 
 
@@ -298,16 +298,16 @@ def _check(request: Request) -> None:
     for name, low in (("frames", 1), ("test_frames", 0), ("outside_frames", 0)):
         value = getattr(request, name)
         if not low <= value <= LARGEST_FRAMES:
-            rule = f"it must be an integer from {low} to {LARGEST_FRAMES}"
+            rule = f"must be an integer from {low} to {LARGEST_FRAMES}"
             raise InputError(name, value, rule, "choose another number")
     if not (math.isfinite(request.seconds) and request.seconds > 0.0 and math.isfinite(request.start_s)):
         what = "animation (start, seconds)"
-        raise InputError(what, (request.start_s, request.seconds), "it must be finite and last", "change it")
+        raise InputError(what, (request.start_s, request.seconds), "must be finite and last", "change it")
     if not (math.isfinite(request.arc_s) and 0.0 <= request.arc_s < request.seconds):
         rule = "training leaves it out of the animation: it must be 0 or more and shorter"
         raise InputError("arc_s", request.arc_s, rule, "use a shorter --arc")
     if not 0 <= request.before <= MOST_BEFORE:
-        raise InputError("before", request.before, f"from 0 to {MOST_BEFORE} pictures", "choose fewer")
+        raise InputError("before", request.before, f"must be from 0 to {MOST_BEFORE} frames", "choose fewer")
     check_ranges(request.ranges)
     if "time" in request.parameters:
         value = request.parameters["time"]
@@ -326,7 +326,7 @@ def _check_still(request: Request) -> None:
     cameras = (request.yaw_deg, request.pitch_deg, request.distance)
     varies = any(low < high for low, high in cameras) or request.saturation or request.power
     if not varies and sum(request.counts.values()) > 1:
-        rule = "it is static, and without a range of camera or lights all its frames show the same"
+        rule = "is static, and without a range of camera or lights all its frames show the same"
         way_out = "give one, for example --yaw=-24:24 --pitch=-5:10"
         raise InputError("scene", request.scene, rule, way_out)
 

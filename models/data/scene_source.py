@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Scene, from_json
 from ...refimpl.light.scenes import CANONICAL, canonical
 from ...refimpl.reading import read_file
@@ -55,8 +55,8 @@ def scene_source(name: str, parameters: Parameters | None = None) -> SceneSource
     if path.suffix.lower() != SUFFIX:
         there = os.path.exists(name)  # noqa: PTH110 (Path.exists raises for a name that is too long)
         if name not in CANONICAL and (path.suffix or there):
-            rule = f"neither a canonical scene nor a scene file, whose name ends in {SUFFIX}"
-            raise InputError("scene", name, rule, f"use a {SUFFIX} file or one of {', '.join(CANONICAL)}")
+            rule = "is neither a canonical scene nor a scene file"
+            raise InputError("scene", name, rule, f"{choice(name, CANONICAL)}, or give a {SUFFIX} file")
         source = SceneSource(name, parameters)
         source.at()
         return source

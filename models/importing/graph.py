@@ -118,7 +118,7 @@ def read(path: Path) -> Graph:
     except InputError:
         raise
     except (*BROKEN, RuntimeError, _decoding(), onnx.checker.ValidationError) as error:
-        rule = f"it cannot be read as a graph ({error})"
+        rule = f"cannot be read as a graph: {error}"
         raise InputError("network", str(path), rule, way_out) from None
 
 

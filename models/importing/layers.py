@@ -242,7 +242,7 @@ class Carrier:
             node = next(v.node for v in self.values if v.level > value.level and v.step == step)
             assert node is not None
             what = str(value.node) if value.node else "an image"
-            rule = f"what {what} gives skips past it, which only a rectifier lets through exactly"
+            rule = f"what {what} gives skips past it, which only a ReLU passes exactly"
             node.refuse(step.kind, rule, "use Relu where values are skipped past")
         neurons = before.size * len(signs)
         self.afford(neurons)

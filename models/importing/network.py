@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.network.dataset import BORDERS, Window
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.imported import MOST_CHANNELS, Source
@@ -74,12 +74,12 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
     where the graph pads what it computes; "" refuses such a graph.
     """
     if border and border not in BORDERS:
-        raise InputError("--border", border, "a known rule", f"use one of {', '.join(BORDERS)}")
+        raise InputError("--border", border, "unknown", choice(border, BORDERS))
     graph = read(path)
     for name in ranges:
         if name and name not in graph.inputs:
             known = ", ".join(graph.inputs)
-            raise InputError("--range", name, "the network has no such input", f"inputs are {known}")
+            raise InputError("--range", name, "the network has no such input", f"choose one of {known}")
     reader = Reader(graph, border)
     sources: list[Source] = []
     for name, each in graph.inputs.items():
@@ -95,7 +95,7 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
     for node in graph.nodes:
         run(reader, node)
     if graph.output not in reader.fields:
-        raise InputError("output", graph.output, "it must depend on an input", "export the network again")
+        raise InputError("output", graph.output, "must depend on an input", "export the network again")
     output, margin = _centred(reader, reader.fields[graph.output])
     layers = layered(reader.values, output, sources)
     window = Window(layers.size, reader.border or "clamp")

@@ -103,7 +103,7 @@ class Reader:
         """Return an input that is computed."""
         if at < len(node.inputs) and node.inputs[at] in self.fields:
             return self.fields[node.inputs[at]]
-        return node.refuse(f"input {at}", "it must come from the network's inputs", "change the network")
+        return node.refuse(f"input {at}", "must come from the network's inputs", "change the network")
 
     def constant(self, node: GraphNode, at: int, default: Any = None) -> NDArray[Any]:
         """Return an input that is constant; without one that is left out it is the default."""
@@ -111,14 +111,14 @@ class Reader:
         if not name and default is not None:
             return np.asarray(default)
         if name not in self.graph.constants:
-            node.refuse(f"input {at}", "it must be constant: a weight of the graph", "export the network so")
+            node.refuse(f"input {at}", "must be constant: a weight of the graph", "export the network so")
         return self.graph.constants[name]
 
     def weight(self, node: GraphNode, at: int, default: Any = None) -> Array:
         """Return an input of constant floating-point numbers, as float64."""
         array = self.constant(node, at, default)
         if array.dtype.kind != "f":
-            node.refuse(f"input {at} of {array.dtype}", "it must be float16, float32 or float64", AGAIN)
+            node.refuse(f"input {at} of {array.dtype}", "must be float16, float32 or float64", AGAIN)
         return array.astype(np.float64)
 
     def option(self, node: GraphNode, name: str, at: int, since: int, default: Any = None) -> NDArray[Any]:

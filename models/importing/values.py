@@ -31,7 +31,7 @@ def _same(reader: Reader, node: GraphNode) -> Field:
 def _dropout(reader: Reader, node: GraphNode) -> Field:
     """Return the input, which Dropout changes in training mode only."""
     if np.any(reader.constant(node, 2, False)):
-        node.refuse("training_mode=1", "it must be 0", "export a network in inference mode")
+        node.refuse("training_mode=1", "must be 0", "export a network in inference mode")
     return reader.field(node)
 
 

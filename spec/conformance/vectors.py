@@ -182,6 +182,6 @@ def write(folder: Path) -> int:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            "folder of vectors", str(folder), f"it cannot be written ({reason})", "choose another"
+            "folder of vectors", str(folder), f"cannot be written: {reason}", "choose another"
         ) from None
     return len(found)

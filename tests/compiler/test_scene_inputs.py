@@ -172,7 +172,7 @@ def test_a_kernel_with_inputs_draws_what_the_constant_one_draws(executor_named, 
     assert np.array_equal(found, expected)
     own = compile_path(lower_scene(at("minicubes", 0.05), settings), executor.name, lanes=lanes)
     assert np.array_equal(executor.trace(kernel, part), executor.trace(own, part))
-    with pytest.raises(InputError, match=r"numbers of the scene is float32 of shape \(1,\): must be float32"):
+    with pytest.raises(InputError, match=r"numbers of the scene 'float32 of shape \(1,\)': must be float32"):
         executor.trace(kernel, part, np.zeros(1, np.float32))
 
 

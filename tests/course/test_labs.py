@@ -90,7 +90,7 @@ def test_a_lab_has_many_names(word, name):
 
 def test_an_unknown_lab_is_refused():
     with pytest.raises(
-        InputError, match=r"lab is 13: there is none .* known are lab1, lab2, .* extra3, and all"
+        InputError, match=r"lab '13': there is none .* \(known are lab1, lab2, .* extra3, and all"
     ):
         lab_named("13")
 

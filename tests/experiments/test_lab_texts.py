@@ -67,10 +67,10 @@ def test_tables_and_figures_are_filled_in(kept):
         ("<!--= study/a/ssim:.1f -->0<!--/-->", "has no such value"),
         ("<!--= study/b/psnr:.1f -->0<!--/-->", "has no such value"),
         ("<!--= study@scipy -->0<!--/-->", "does not know that package"),
-        ("<!--= psnr -->0<!--/-->", "it must be record/configuration/value:format"),
+        ("<!--= psnr -->0<!--/-->", "must be record/configuration/value:format"),
         ("<!-- table: all -->\nno end", "has a beginning and an end"),
         ("<!--= study/a/psnr:.1f -->0", "has a beginning and an end"),
-        ("<!--= other/a/psnr:.1f -->0<!--/-->", "record is other: it is not there"),
+        ("<!--= other/a/psnr:.1f -->0<!--/-->", "record 'other': not found"),
     ],
 )
 def test_marks_that_lead_nowhere_are_refused(kept, text, match):

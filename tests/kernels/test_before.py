@@ -70,7 +70,7 @@ def test_a_request_says_what_is_before_only_if_something_is():
 
 @pytest.mark.parametrize("count", [-1, frame_plan.MOST_BEFORE + 1])
 def test_numbers_that_mean_nothing_are_refused(count):
-    with pytest.raises(InputError, match=f"before is {count}: from 0 to 256 pictures"):
+    with pytest.raises(InputError, match=f"before {count}: must be from 0 to 256 frames"):
         frame_plan.plan(replace(REQUEST, before=count))
 
 

@@ -290,7 +290,7 @@ def test_arrays_too_large_for_a_stack(executor_named, kit):
     wide = np.ones((2**18, 1), np.float32)
     program = kit.program(lambda x: np.matmul(np.sin(np.matmul(x, wide.T)), wide) * 0.5, {"a": 1})
     with pytest.raises(
-        CompileError, match=r"arrays take \d+ bytes a pixel: at most 1048576 fit a thread's stack"
+        CompileError, match=r"arrays take \d+ bytes per pixel; at most 1048576 fit a thread's stack"
     ):
         executor_named("c").build(compile_program(program, "c", "native"))
 
@@ -299,7 +299,7 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
     monkeypatch.setattr(c_executor, "INDEX_LIMIT", 10)
     artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
     with pytest.raises(
-        InputError, match="size of the picture for C is 4 x 3 with 1 channels: one image must hold"
+        InputError, match="size of the image for C '4 x 3 with 1 channels': one image must hold"
     ):
         executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})
 

@@ -233,5 +233,5 @@ def test_a_loss_that_is_not_finite_keeps_the_last_good_state(opencl: Any) -> Non
 
 
 def test_a_rank_that_no_layer_has_is_refused(opencl: Any) -> None:
-    with pytest.raises(InputError, match=r"rank is 16: a window of 5 rows, .* has ranks from 1 to 15"):
+    with pytest.raises(InputError, match=r"rank 16: a window of 5 rows, .* has ranks from 1 to 15"):
         train_on(opencl, replace(SMALL, rank=16), PAIRS)

@@ -276,7 +276,7 @@ def test_apart_is_as_inside(executor_named, model, images, way):
             assert runner.picked(size) == inside.picked(size)
         assert np.array_equal(runner.run(artifact, images).image, inside.run(artifact, images).image)
         refused = runner.run(artifact, {"color": images["color"]})
-        assert "images for the kernel is color: must be color, normal" in refused.refusal
+        assert "images for the kernel 'color': must be color, normal" in refused.refusal
     runner.close()  # again costs nothing
 
 

@@ -223,7 +223,8 @@ def project() -> dict[str, Any]:
 def test_base_installation_names_the_extra_in_one_line(wheel, outside):
     """It was a traceback."""
     ((status, error),) = outside(project()["dependencies"], wheel.filename, "wamnet demo")
-    line = "Python package 'typer' is missing: the command needs it; install it: pip install 'wamnet[full]'"
+    rule = "missing, and needed for the command"
+    line = f"Python package 'typer': {rule} (install it: pip install 'wamnet[full]')"
     assert (status, error) == (2, f"wamnet: error: {line}\n")
 
 

@@ -142,5 +142,5 @@ def test_seeds_differ_and_single_values_are_exact() -> None:
 def test_nothing_is_outside_of_everything() -> None:
     """Frames that differ in time only, all of which is trained on."""
     assert draws.drawn_outside(0, Ranges(), 0.0, CUBES.lights, 0, 0) == []
-    with pytest.raises(InputError, match="number of frames outside is 2: a data set whose frames differ"):
+    with pytest.raises(InputError, match="number of frames outside 2: a data set whose frames differ"):
         draws.drawn_outside(0, Ranges(), 0.0, CUBES.lights, 0, 2)

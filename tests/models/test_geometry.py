@@ -22,7 +22,7 @@ def test_a_quarter_turn_of_the_lattice_is_alike() -> None:
     """The fault that was found: frames two seconds apart differ in colours only."""
     one, other = (G.first_hits(canonical("minicubes", time=t)) for t in (0.7, 2.7))
     assert G.difference(one, other) < G.ALIKE
-    text = "test frame is test/00000 .2.7 s.: normals and depths are those of train/00000 .0.7 s."
+    text = "test frame 'test/00000 .2.7 s.': normals and depths are those of train/00000 .0.7 s."
     with pytest.raises(InputError, match=text):
         G.compare([shown("train/00000", 0.7)], {"test": [shown("test/00000", 2.7)]})
 
@@ -41,7 +41,7 @@ def test_a_degree_is_not_alike_and_a_hundredth_is() -> None:
 def test_test_frames_are_compared_among_each_other_over_splits() -> None:
     """Also a frame outside with one inside."""
     train = [shown("train/00000", 0.0)]
-    with pytest.raises(InputError, match=r"test frame is outside/00000 \(3.1 s\).*of test/00000"):
+    with pytest.raises(InputError, match=r"test frame 'outside/00000 \(3.1 s\).*of test/00000"):
         G.compare(train, {"test": [shown("test/00000", 1.1)], "outside": [shown("outside/00000", 3.1)]})
 
 

@@ -96,7 +96,7 @@ def test_the_library_reads_what_is_written(tmp_path: Path) -> None:
 
 def test_a_broken_model_is_not_saved(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
-    with pytest.raises(InputError, match="features is : at least one"):
+    with pytest.raises(InputError, match="features '': must be at least one"):
         model_file.save_model(path, replace(model_of(), features=()))
     assert list(tmp_path.iterdir()) == []
 
@@ -122,16 +122,14 @@ def test_a_failed_or_interrupted_write_leaves_the_old_file(
     with pytest.raises(KeyboardInterrupt):
         model_file.save_model(path, model_of(size=3))
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(InputError, match=r"output file is .*cannot be written \(No space left on device\)"):
+    with pytest.raises(InputError, match=r"output file .*cannot be written: No space left on device"):
         model_file.save_model(path, model_of(size=3))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_missing_folder_is_told(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"output file is .*: cannot be written \(No such file or directory\)"
-    ):
+    with pytest.raises(InputError, match=r"output file '.*': cannot be written: No such file or directory"):
         model_file.save_model(tmp_path / "missing" / "model.safetensors", model_of())
 
 
@@ -160,58 +158,58 @@ def with_tensor(name: str, values: Any) -> Callable[[Any, Any], None]:
 DAMAGE = {
     "no tensors": (
         lambda tensors, texts: tensors.clear(),
-        "list of tensors is empty: 'layer0.weight' must be",
+        "list of tensors 'empty': 'layer0.weight' must be",
     ),
-    "no bias": (without("layer1.bias"), "list of tensors is .*: 'layer1.bias' must be among them"),
+    "no bias": (without("layer1.bias"), "list of tensors '.*': 'layer1.bias' must be among them"),
     "a layer left out": (
         with_tensor("layer3.weight", np.zeros((3, 3), np.float32)),
         "'layer2.weight' must be",
     ),
-    "no features": (without("features"), "list of header texts is .*: 'features' must be among them"),
+    "no features": (without("features"), "list of header texts '.*': 'features' must be among them"),
     "features unknown": (
         with_text("features", '["glow"]'),
-        r"model: feature name is glow: not a known feature",
+        "model: feature 'glow': unknown",
     ),
-    "features no list": (with_text("features", '"color"'), "features is .*: cannot be read .a list of names"),
-    "features no JSON": (with_text("features", "color"), "features is color: no JSON"),
+    "features no list": (with_text("features", '"color"'), "features '.*': cannot be read: a list of names"),
+    "features no JSON": (with_text("features", "color"), "features 'color': is not acceptable JSON"),
     "other features": (
         with_text("features", '["color"]'),
-        "inputs of the first layer is 16: 2 x 2 pixels of color",
+        "inputs of the first layer 16: 2 x 2 pixels of color",
     ),
-    "window": (with_text("window", '{"size": 0, "border": "zero"}'), "window size is 0"),
-    "window no JSON": (with_text("window", "12"), "window is 12: it must be a JSON object"),
-    "window parts": (with_text("window", '{"width": 12}'), "window.width is 12: Window has no such key"),
+    "window": (with_text("window", '{"size": 0, "border": "zero"}'), "window size 0"),
+    "window no JSON": (with_text("window", "12"), "window 12: must be a JSON object"),
+    "window parts": (with_text("window", '{"width": 12}'), "window.width 12: Window has no such key"),
     "window without a border": (
         with_text("window", '{"size": 2}'),
-        "window.border is missing: it is required",
+        "window.border: missing",
     ),
-    "omega": (with_text("omega_0_first", "0.0"), "omega_0_first is 0.0: finite and > 0"),
+    "omega": (with_text("omega_0_first", "0.0"), "omega_0_first 0.0: must be positive"),
     "omega of Python": (
         with_text("omega_0_first", "1_0"),
-        r"1_0: cannot be read \(a decimal number is needed\)",
+        "1_0': cannot be read: a decimal number is needed",
     ),
-    "omega no decimal": (with_text("omega_0_first", "nan"), "omega_0_first is nan: cannot be read"),
-    "omega no number": (with_text("omega_0_hidden", "big"), "omega_0_hidden is big: cannot be read"),
+    "omega no decimal": (with_text("omega_0_first", "nan"), "omega_0_first 'nan': cannot be read"),
+    "omega no number": (with_text("omega_0_hidden", "big"), "omega_0_hidden 'big': cannot be read"),
     "scales": (
         with_text("normalization", "{}"),
-        "model: normalization.exposure_stops is missing: it is required",
+        "model: normalization.exposure_stops: missing",
     ),
     "not finite": (
         with_tensor("layer1.bias", np.array([0, np.nan, np.inf], np.float32)),
-        "layer 1: number of NaN or infinite parameters, or huge ones, is 2",
+        "layer 1: number of NaN or infinite parameters, or huge ones, 2",
     ),
-    "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 is weights \(3, 5\)"),
-    "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters is float32, int64"),
-    "format": (with_text("format", "other"), "format is other: must be wamnet-model"),
-    "version": (with_text("version", "5"), "version is 5: this program reads version 1 and 2 and 3 and 4"),
+    "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 'weights \(3, 5\)"),
+    "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters 'float32, int64"),
+    "format": (with_text("format", "other"), "format 'other': must be wamnet-model"),
+    "version": (with_text("version", "5"), "version '5': this program reads version 1 and 2 and 3 and 4"),
     "activation missing": (with_text("version", "2"), "'activation' must be among them"),
     "activation in version 1": (
         with_text("activation", "relu"),
-        "model: activation is relu: a model of version 1 has the sine; train again",
+        r"model: activation 'relu': a model of version 1 has the sine \(train again",
     ),
     "activation unknown": (
         with_text("activation", "tanh", version="2"),
-        "model: activation is tanh: not a known activation; use one of sine, relu",
+        r"model: activation 'tanh': unknown \(choose one of sine, relu",
     ),
 }
 
@@ -234,7 +232,7 @@ def test_a_damaged_model_is_refused_in_one_line(case: str, tmp_path: Path) -> No
 def test_a_file_of_another_kind_is_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=r"wamnet-model file is .*: not a safetensors file"):
+    with pytest.raises(InputError, match=r"wamnet-model file '.*': is not a safetensors file"):
         model_file.load_model(path)
 
 
@@ -268,23 +266,26 @@ def test_a_tensor_of_another_type_is_ignored(dtype: str, count: int, tmp_path: P
 def test_a_tensor_of_a_type_that_numpy_lacks_counts_as_a_layer(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     of_container(path, {**ENTRY, "dtype": "BF16", "shape": [1, 4]}, name="layer2.weight")
-    with pytest.raises(InputError, match=r"list of tensors is .*: 'layer2.bias' must be among them"):
+    with pytest.raises(InputError, match=r"list of tensors '.*': 'layer2.bias' must be among them"):
         model_file.load_model(path)
 
 
 @pytest.mark.parametrize(
     ("entry", "rule"),
     [
-        (["F32", [2], "MORE"], "more is .*: it must be an object with the keys data_offsets, dtype, shape"),
-        ({**ENTRY, "strides": [1]}, "more is .*: it must be an object with the keys .* and no others"),
-        ({**ENTRY, "dtype": "C64", "shape": [1]}, "more.dtype is C64: no such type of numbers; known are"),
+        (["F32", [2], "MORE"], "more .*: must be an object with the keys data_offsets, dtype, shape"),
+        ({**ENTRY, "strides": [1]}, "more .*: must be an object with the keys .* and no others"),
+        (
+            {**ENTRY, "dtype": "C64", "shape": [1]},
+            "more.dtype 'C64': must be one of BOOL",
+        ),
     ],
 )
 def test_an_entry_of_another_form_is_refused(entry: Any, rule: str, tmp_path: Path) -> None:
     """The library takes the first two, and from some version on the third."""
     path = tmp_path / "model.safetensors"
     of_container(path, entry)
-    with pytest.raises(InputError, match=f"{rule}|not a safetensors file .*unknown variant"):
+    with pytest.raises(InputError, match=f"{rule}|not a safetensors file: .*unknown variant"):
         model_file.load_model(path)
 
 
@@ -292,14 +293,14 @@ def test_a_header_that_begins_with_a_space_is_refused(tmp_path: Path) -> None:
     """The library has taken it since a version; the format's own page says that it must not."""
     path = tmp_path / "model.safetensors"
     of_container(path, ENTRY, b" ")
-    with pytest.raises(InputError, match=r"header is .*: its first byte must be \{|not a safetensors file"):
+    with pytest.raises(InputError, match=r"header .*: its first byte must be \{|not a safetensors file"):
         model_file.load_model(path)
 
 
 def test_a_file_without_texts_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_bytes((2).to_bytes(8, "little") + b"{}")
-    with pytest.raises(InputError, match="format is missing: must be wamnet-model"):
+    with pytest.raises(InputError, match="format 'missing': must be wamnet-model"):
         model_file.load_model(path)
 
 
@@ -314,9 +315,9 @@ def test_a_truncated_file_is_refused_at_every_length(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_and_a_folder_are_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"cannot be read \(No such file or directory\); check the path"):
+    with pytest.raises(InputError, match=r"not found \(check the path"):
         model_file.load_model(tmp_path / "none")
-    with pytest.raises(InputError, match=r"wamnet-model file is .*it is a folder"):
+    with pytest.raises(InputError, match=r"wamnet-model file '.*is a folder"):
         model_file.load_model(tmp_path)
 
 
@@ -325,7 +326,7 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     model_file.save_model(path, model_of())
     with path.open("ab") as file:
         file.truncate(2**40)
-    rule = rf"size of .*model in bytes is {2**40}: at most {2**28} bytes are read"
+    rule = rf"size of .*model in bytes {2**40}: at most {2**28} bytes are read"
     with pytest.raises(InputError, match=rule):
         model_file.load_model(path)
 
@@ -357,14 +358,14 @@ def test_training_through_a_file_gives_the_same_bits(tmp_path: Path) -> None:
 
 
 CHECKPOINT_DAMAGE = {
-    "no moments": (without("adam.v3"), "list of entries is .*: 'adam.v3' must be among them"),
-    "no step": (without("step"), "list of entries is .*: 'step' must be among them"),
-    "step": (with_text("step", "ten"), "content is .*ten.*: cannot be read"),
-    "step too large": (with_text("step", "21"), "run: step is 21: from 0 to 20"),
-    "recipe": (with_text("recipe", "{}"), "run: recipe.features is missing: it is required"),
-    "shape": (with_tensor("layer0.bias", np.zeros(3, np.float32)), r"run: parameter 2 is float32 \(3,\)"),
-    "history": (with_tensor("history.step", np.zeros(1, np.int64)), "content is .*: cannot be read"),
-    "model": (with_text("format", "wamnet-model"), "format is wamnet-model: must be wamnet-checkpoint"),
+    "no moments": (without("adam.v3"), "list of entries '.*': 'adam.v3' must be among them"),
+    "no step": (without("step"), "list of entries '.*': 'step' must be among them"),
+    "step": (with_text("step", "ten"), "content '.*ten.*': cannot be read"),
+    "step too large": (with_text("step", "21"), "run: step 21: must be from 0 to 20"),
+    "recipe": (with_text("recipe", "{}"), "run: recipe.features: missing"),
+    "shape": (with_tensor("layer0.bias", np.zeros(3, np.float32)), r"run: parameter 2 'float32 \(3,\)"),
+    "history": (with_tensor("history.step", np.zeros(1, np.int64)), "content '.*': cannot be read"),
+    "model": (with_text("format", "wamnet-model"), "format 'wamnet-model': must be wamnet-checkpoint"),
 }
 
 

@@ -40,36 +40,39 @@ wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32
 def pipeline(
     scene: SceneShown = "minicubes",
     executors: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What runs the kernels: numpy, opencl, opengl, c.")
+        str, typer.Option(metavar="NAME,...", help="Backends to measure: numpy, opencl, opengl, c.")
     ] = "opencl,opengl",
     sizes: Annotated[
-        str, typer.Option(metavar="N,...", help="Widths and heights of the picture, in pixels.")
+        str, typer.Option(metavar="N,...", help="Image sizes (width and height), in pixels.")
     ] = "256,512",
     features: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What the network sees.")
+        str, typer.Option(metavar="NAME,...", help="Input features of the network.")
     ] = "color,normal",
-    hidden: Annotated[str, typer.Option(metavar="N,...", help="Neurons of each hidden layer.")] = (
+    hidden: Annotated[str, typer.Option(metavar="N,...", help="Width of each hidden layer, in neurons.")] = (
         "32,32,32,32"
     ),
     window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
     feature_rays: Annotated[
-        int, typer.Option(metavar="N", help="Camera rays per pixel of the features; 0: the paths' own.")
+        int,
+        typer.Option(
+            metavar="N", help="Camera rays per pixel for the features; 0 uses the paths themselves."
+        ),
     ] = 0,
     repeats: Repeats = 5,
     peers: Annotated[
         str,
         typer.Option(
-            metavar="NAME,...", help="Other makers of pictures: mitsuba, cycles.", show_default="none"
+            metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
         ),
     ] = "",
 ) -> None:
-    """Measure whole pictures of a scene that moves: one path per pixel and its denoising.
+    """Measure full frames of an animated scene: one path per pixel, and denoising.
 
-    One pipeline on a device is ours, moving: every picture shows another moment; the table has its parts.
-    Separate: trace all layers, read them back, encode, upload, denoise, read back. Peers show the same
-    moments: mitsuba is Mitsuba 3 and Open Image Denoise, cycles is Blender's renderer with its own
-    (package bpy). All take turns. The first picture of a new scene waits for its kernel; with empty
-    caches, in a process of its own, for all kernels. The network has random weights.
+    [bold]ours, moving[/] is one pipeline on a device in which every frame has another time; the table
+    has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
+    [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
+    own (package bpy). All are interleaved. The first frame waits for its kernel; with empty caches, in a
+    separate process, for all. The network has random weights.
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring

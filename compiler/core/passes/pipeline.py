@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ....refimpl.errors import CompileError
+from ....refimpl.errors import CompileError, choice
 from ..ir import Program
 from ..profiles import EXPAND_SINE
 from ..sine import POLYNOMIALS
@@ -38,6 +38,6 @@ def run(program: Program, names: Sequence[str]) -> Program:
     verify(program, "before the passes")
     for name in names:
         if name not in PASSES:
-            raise CompileError(f"pass {name!r} does not exist; there are: {', '.join(PASSES)}")
+            raise CompileError(f"pass {name!r}: unknown ({choice(name, PASSES)})")
         program = verify(PASSES[name](program), f"after pass {name}")
     return program

@@ -87,7 +87,7 @@ def test_exports_are_of_kernels_only():
     made = export(Request(model, "c"))
     assert "encoded for the display" not in made.contents()["README.md"].decode()
     assert made.manifest["images"][0]["encoding"] == "as the network was trained"
-    with pytest.raises(InputError, match="--target is onnx: the model was imported from a graph"):
+    with pytest.raises(InputError, match="--target 'onnx': the model was imported from a graph"):
         export(Request(model, "onnx"))
-    with pytest.raises(InputError, match="variant is hidden2: an imported network has none"):
+    with pytest.raises(InputError, match="variant 'hidden2': an imported network has none"):
         export(Request(model, "c", variant="hidden2"))

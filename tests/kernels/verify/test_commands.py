@@ -201,7 +201,7 @@ def test_our_own_tracer_as_a_program():
 @pytest.mark.parametrize(
     ("command", "rule"),
     [
-        ("mine 'half", "it is not a command"),
+        ("mine 'half", "is not a command"),
         ("", "{scene} and {output}"),
         ("mine {scene}", "{scene} and {output}"),
         ("mine {output}", "{scene} and {output}"),

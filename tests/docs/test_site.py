@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import cells
@@ -87,6 +88,35 @@ def test_formulas_are_set_and_none_is_left(site):
     texts = [path.read_text() for path in site.rglob("*.html")]
     assert sum(text.count("<math") for text in texts) > 0
     assert not any('class="arithmatex"' in text for text in texts)
+
+
+class Torn(HTMLParser):
+    """The marks of figures that no paragraph, item or cell holds."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.held: list[str] = []
+        self.found: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("p", "li", "td"):
+            self.held.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self.held:
+            self.held.remove(tag)
+
+    def handle_comment(self, data: str) -> None:
+        if data.startswith(("=", "/")) and not self.held:
+            self.found.append(data.strip())
+
+
+def test_no_paragraph_is_torn_by_a_mark(site):
+    """A comment at the start of a line ends a paragraph in Markdown."""
+    assert Torn("<p>in</p>\n<!--= a --> 3 <!--/--> of").found == ["= a", "/"]
+    for path in site.rglob("*.html"):
+        assert Torn(path.read_text()).found == [], path
 
 
 def outside(asked: list[str]) -> list[str]:

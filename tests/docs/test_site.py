@@ -119,18 +119,24 @@ def test_no_paragraph_is_torn_by_a_mark(site):
         assert Torn(path.read_text()).found == [], path
 
 
+def test_captions_appear_once(site):
+    for path in site.rglob("*.html"):
+        assert not re.search(r"</figcaption></figure>\s*<p><em>", path.read_text()), path
+
+
 def outside(asked: list[str]) -> list[str]:
     """Return the addresses that are not of the site."""
     return [address for address in asked if not address.startswith(("file:", "data:", "about:"))]
 
 
-CUT = """[...document.querySelectorAll(".highlight code, .output pre")]
+CUT = """[...document.querySelectorAll(".highlight code, .output pre, .md-typeset__scrollwrap")]
     .filter((piece) => piece.scrollWidth > piece.clientWidth + 1)
+    .filter((piece) => getComputedStyle(piece).overflowX !== "auto" || piece.closest("[tabindex]") === null)
     .map((piece) => piece.textContent.trim().slice(0, 60))"""
-"""The beginnings of the pieces of code of a page that are wider than what is shown of them."""
+"""The beginnings of the code and tables of a page that are cut, or that the keyboard cannot scroll."""
 
 
-def test_no_page_is_wider_than_a_telephone_and_no_code_is_cut(site, chromium):
+def test_no_page_is_wider_than_a_phone_and_no_code_is_cut(site, chromium):
     """Without a server, 400 pixels wide; and none asks for anything of another host."""
     with chromium.tab(site / "index.html", viewport={"width": 400, "height": 800}) as tab:
         for path in sorted(site.rglob("*.html")):
@@ -213,7 +219,7 @@ def test_scripts_and_styles_name_no_host(tmp_path, name, text, hosts):
 def test_a_cell_shows_what_it_gives():
     text = "```python cell\nx = 2\nprint(x < 3)\n```\n\n```python cell\nshow([[0.0, x / 2]], 'two')\n```\n"
     found = cells.executed(text, "page.md")
-    assert "<pre>True\n</pre>" in found
+    assert '<pre tabindex="0">True\n</pre>' in found
     assert 'alt="two" src="data:image/png;base64,' in found
 
 

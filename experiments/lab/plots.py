@@ -1,6 +1,6 @@
 """Plots in git: SVG drawn from records, the same bytes wherever the same versions draw them.
 
-1. A plot is a function of the records that returns a figure of matplotlib [`shown.PLOTS`]; its file is
+1. A plot is a function of the records that returns a figure of matplotlib [`gallery.PLOTS`]; its file is
    docs/images/<name>.svg.
 2. Its last line has a digest of the records behind it and of the text of these functions [`digest`]: a plot
    of other records or by other code is seen without drawing it again, whatever version of matplotlib drew it
@@ -45,7 +45,7 @@ def digest(plot: Plot, records: Records) -> str:
     made = hashlib.sha256()
     for path in (records.folder / f"{name}.json" for name in plot.records):
         made.update(path.read_bytes())
-    for path in (Path(__file__), *map(Path(__file__).with_name, ("shown.py", "speeds.py"))):
+    for path in (Path(__file__), *map(Path(__file__).with_name, ("gallery.py", "speeds.py"))):
         made.update(path.read_bytes())
     return made.hexdigest()
 

@@ -6,7 +6,7 @@ import hashlib
 
 import pytest
 import rewrite
-from lab import plots, records, shown, texts
+from lab import gallery, plots, records, shown, texts
 from lab.records import Records, checked
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -34,7 +34,7 @@ def test_texts_are_what_the_records_give():
 
 
 def test_plots_are_what_the_records_give():
-    stale = [path.name for path, _ in plots.stale(Records(), shown.PLOTS)]
+    stale = [path.name for path, _ in plots.stale(Records(), gallery.PLOTS)]
     assert not stale, f"{stale}: run python experiments/rewrite.py, and look at them"
 
 
@@ -51,7 +51,7 @@ def test_what_is_pending_is_not_there_and_is_waited_for():
     assert not there, f"pending.txt: {there} are there; remove the lines"
     filler = texts.Filler(kept, shown.TABLES, shown.FIGURES)
     assert not list(texts.stale(filler))
-    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
     idle = sorted(set(waiting) - filler.missing - drawn)
     assert not idle, f"pending.txt: no text waits for {idle}; remove the lines"
 
@@ -60,7 +60,7 @@ def test_every_record_is_shown():
     kept = Records()
     filler = texts.Filler(Counting(kept.folder), shown.TABLES, shown.FIGURES)
     list(texts.stale(filler))
-    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
     idle = sorted(set(kept.names()) - Counting.asked - drawn)
     assert not idle, f"no text shows the records {idle}: show them or remove them"
 
@@ -89,7 +89,7 @@ def test_pictures_are_small_and_come_from_records():
     for path in found:
         place = path.relative_to(records.ROOT).as_posix()
         if path.suffix == ".svg":
-            assert path.stem in shown.PLOTS, f"{place}: no function of lab/shown.py draws it"
+            assert path.stem in gallery.PLOTS, f"{place}: no function of lab/gallery.py draws it"
         elif not path.name.startswith(OTHERS):
             digest = hashlib.sha256(path.read_bytes()).hexdigest()
             assert named.get(place) == digest, f"{place}: no record names it; publish it with --picture"

@@ -18,7 +18,6 @@ from typing import Any
 from wamnet.refimpl.errors import InputError
 
 from . import printed, same, tables
-from .gallery import pictures
 from .intervals import paired
 from .records import Records
 from .results import PER_FRAME, Results, number
@@ -73,13 +72,13 @@ QUALITY = (
     Column("psnr", "PSNR, dB", 2),
     Column("ssim", "SSIM", 3),
     Column("flip", "FLIP", 3),
-    Column("spp", "worth, spp", 0),
+    Column("spp", "equivalent spp", 0),
 )
 """Columns of the scores of pictures."""
 
 
 def quality(name: str, split: str = "test", only: Sequence[str] = (), record: str = "quality") -> TableOf:
-    """Return the rows of a set's frames, inside of its ranges or outside; all rows unless some are named."""
+    """Return the rows of a set's frames, inside its ranges or outside; all rows unless some are named."""
 
     def made(records: Records) -> str:
         module, found = importlib.import_module("quality"), records[record]
@@ -126,14 +125,14 @@ README_ROWS = ("input", "oidn-color", "oidn-prefiltered1", "oidn-clean16", "best
 """Rows of `quality` that the README shows."""
 
 AHEAD = (
-    ("minicubes", "best-16", "camera moves"),
-    ("minicubes", "page-16", "the same, the page's inputs and steps"),
-    ("minicubes", "page48-16", "the same, 48 neurons a layer"),
-    ("minicubes-page", "shipped", "camera all around the front, lamps of any hue: the network that ships"),
-    ("minicubes-page", "smooth-page-16", "the same cameras and lamps, colour smoothed"),
-    ("cornell", "best-16", "`cornell`, camera moves"),
-    ("glossy", "lit-16", "`glossy`, camera moves, features past mirrors and glass for both"),
-    ("daylight", "sun-16", "`daylight`, the same; ours sees where the sun is"),
+    ("minicubes", "best-16", "`minicubes`, preset `best`"),
+    ("minicubes", "page-16", "`minicubes`, inputs and steps of the web page"),
+    ("minicubes", "page48-16", "the same, 48 neurons per layer"),
+    ("minicubes-page", "shipped", "`minicubes`, any front camera, any light hue: the bundled network"),
+    ("minicubes-page", "smooth-page-16", "the same cameras and lights, filtered colour"),
+    ("cornell", "best-16", "`cornell`, preset `best`"),
+    ("glossy", "lit-16", "`glossy`, preset `mirrors`; both get specular features"),
+    ("daylight", "sun-16", "`daylight`, preset `sky`; both get specular features"),
 )
 """Sets and rows that docs/results.md compares with Open Image Denoise, given the same features."""
 
@@ -230,7 +229,7 @@ def table1_readme(records: Records) -> str:
         "MSE modulo 256; the paper",
         "SSIM; the paper",
         "FLIP",
-        "worth",
+        "equivalent spp",
     ]
     return tables.markdown(heads, cells)
 
@@ -463,7 +462,6 @@ TABLES: Mapping[str, TableOf] = {
     "lamps": study("lamps", "`minicubes`, camera at rest"),
     "learning-curve": learning_curve,
     "losses": study("losses", "loss"),
-    "pictures": pictures,
     "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-lamps": quality("minicubes-page"),

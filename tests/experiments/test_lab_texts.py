@@ -123,7 +123,7 @@ def test_plots_are_the_same_bytes_and_say_what_they_show(kept, tmp_path):
         plots.bars(axis, {"a": (30.0, 29.0, 31.0)}, "dB")
         return figure
 
-    plot = plots.Plot(draw, ("study",), "A plot.")
+    plot = plots.Plot(draw, ("study",))
     path = tmp_path / plots.IMAGES / "one.svg"
     path.parent.mkdir(parents=True)
     ((target, made),) = plots.stale(kept, {"one": plot}, tmp_path)
@@ -139,7 +139,7 @@ def test_plots_are_the_same_bytes_and_say_what_they_show(kept, tmp_path):
 
 def test_a_plot_without_a_record_must_wait_for_one(tmp_path):
     (tmp_path / "pending.txt").write_text("study | python experiments/study.py | a minute\n")
-    plot = plots.Plot(lambda found: None, ("study",), "")
+    plot = plots.Plot(lambda found: None, ("study",))
     assert not plots.ready(plot, Records(tmp_path), tmp_path)
     (tmp_path / "pending.txt").write_text("# nothing\n")
     with pytest.raises(Missing, match="it is not there"):

@@ -21,7 +21,7 @@ from . import printed, same, tables
 from .intervals import paired
 from .records import Records
 from .results import PER_FRAME, Results, number
-from .speeds import TableOf, speed_against_error, speed_readme, speed_short
+from .speeds import TableOf, speed_against_error, speed_short
 from .tables import Column
 
 
@@ -202,11 +202,11 @@ PAPER_ROWS = (
     *("input", "dncnn", "dncnn-shrunk", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own"),
     *("wamnet-short", "wamnet-best", "pix2pix", "svgf", "nlm", "oidn", "render30"),
 )
-"""Rows of Table 1 that docs/results.md shows."""
+"""Rows of Table 1 that docs/results/paper.md shows."""
 
 
 def table1_readme(records: Records) -> str:
-    """Return the rows of Table 1 of docs/results.md, beside what the paper prints."""
+    """Return the rows of Table 1 of docs/results/paper.md, beside what the paper prints."""
     found, rows = records["table1"], importlib.import_module("baselines.rows").ROWS
     cells = []
     for row in (row for row in PAPER_ROWS if row in found.configurations()):
@@ -287,17 +287,17 @@ def generalisation(records: Records) -> str:
 
 
 BENCH = {
-    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer from spectra",
+    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer by FFT",
     "opencl:tile16": "OpenCL, PoCL, `tile16`: register tiles",
-    "opencl:plain": "OpenCL, PoCL, `plain`: the kernel to be read",
+    "opencl:plain": "OpenCL, PoCL, `plain`: the human-readable kernel",
     "opengl:inlined": "OpenGL, llvmpipe, `inlined`",
     "torch.compile": "`torch.compile`",
     "torch": "PyTorch, eager",
     "onnxruntime": "ONNX Runtime",
-    "oidn:fast": "Open Image Denoise, fast; another denoiser",
+    "oidn:fast": "Open Image Denoise, fast (another network)",
     "oidn:high": "Open Image Denoise, high",
     "c:tile16": "C, GCC, `tile16`",
-    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: products of bytes",
+    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: byte products",
     "c:dot16:whole8": "C, GCC, integers, `dot16`",
     "onnxruntime:int8": "ONNX Runtime, 8 bits",
     "openvino:int8": "OpenVINO, 8 bits",
@@ -337,7 +337,7 @@ def train_speed(records: Records) -> str:
     for at, preset in ((1, "paper"), (2, "short")):
         mine = [r["values"] for r in found.records() if r["values"]["table"] == at]
         steps = list(mine[0])[-1]
-        heads += [f"`{preset}`, ms a step", f"all {steps}"]
+        heads += [f"`{preset}`, ms per step", f"all {steps}"]
         for row in mine:
             rows.setdefault(names[row["by"]], []).extend([row["ms a step"], row[steps]])
     return tables.markdown(heads, [[name, *row] for name, row in rows.items()])
@@ -484,7 +484,6 @@ TABLES: Mapping[str, TableOf] = {
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
     "speed-against-error": speed_against_error("bench-minicubes"),
-    "speed-readme": speed_readme("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),
     "table1": table1,
     "table1-readme": table1_readme,

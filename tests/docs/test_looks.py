@@ -8,7 +8,7 @@ import pytest
 PAGES = ("index.html", "tutorial/4-frame.html", "course/lab01-sphere.html", "spec/sampling.html")
 """A page of each kind."""
 
-TABLED = ("results.html", "speed.html", "guide/kernels.html")
+TABLED = ("results.html", "results/hard-light.html", "speed.html", "speed/frames.html", "guide/kernels.html")
 """Pages with wide tables."""
 
 LARGEST_BYTES = 1_500_000

@@ -119,6 +119,36 @@ def test_no_paragraph_is_torn_by_a_mark(site):
         assert Torn(path.read_text()).found == [], path
 
 
+MOVED = {
+    "results.html": "summary how-test-frames-differ-from-training-frames how-far-ahead-of-a-general-denoiser "
+    "all-presets-beside-it other-scenes hard-light-mirrors-metal-glass-a-sky the-papers-table-1 "
+    "speed-against-error-all-rows plots-and-pictures the-web-page-before-and-after",
+    "speed.html": "summary the-network speed-against-error training the-path-tracer whole-pictures-in-motion "
+    "rays-for-features what-a-kernel-of-one-scene-saves scenes-of-many-primitives",
+}
+"""Anchors of the two pages before they were split: links from outside still lead to them."""
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_anchors_of_split_pages_remain(site, name):
+    assert set(MOVED[name].split()) <= links.Page((site / name).read_text()).anchors
+
+
+TABS = ["Start", "Learn", "Guide", "API", "Spec", "Results", "Contribute"]
+"""The parts of the site."""
+
+GROUPS = ["Scene & rendering", "Data & network", "Compiler & kernels", "Error bounds", "Conformance"]
+"""The parts of the spec."""
+
+
+def test_the_site_and_the_spec_have_named_parts(site, chromium):
+    with chromium.tab(site / "spec/index.html", viewport={"width": 1400, "height": 900}) as tab:
+        names = [text.strip() for text in tab.page.locator(".md-tabs__link").all_text_contents()]
+        assert names == TABS
+        shown = [text.strip() for text in tab.page.locator(".md-nav label .md-ellipsis").all_text_contents()]
+        assert set(GROUPS) <= set(shown)
+
+
 def test_captions_appear_once(site):
     for path in site.rglob("*.html"):
         assert not re.search(r"</figcaption></figure>\s*<p><em>", path.read_text()), path

@@ -48,7 +48,7 @@ SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
 GUIDE = re.compile(r"^\| \[.*?\]\(([\w-]+\.md)\)", re.MULTILINE)
 """A row of the guide's table of pages."""
 
-START = ("index.md", "guide/install.md", "first-kernel.md", "limits.md")
+START = ("index.md", "guide/install.md", "first-kernel.md", "support.md", "limits.md")
 """The first pages."""
 
 RESULTS = ("quality.md", "hard-light.md", "paper.md")

@@ -17,7 +17,7 @@ from typing import Any
 
 from wamnet.refimpl.errors import InputError
 
-from . import printed, same, tables
+from . import printed, same, support, tables
 from .intervals import paired
 from .records import Records
 from .results import PER_FRAME, Results, number
@@ -485,6 +485,7 @@ TABLES: Mapping[str, TableOf] = {
     "sines-octaves": as_printed("sines", 2),
     "speed-against-error": speed_against_error("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),
+    "support": support.matrix,
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,

@@ -20,7 +20,7 @@ HIGHEST_PX = 8000
 LARGEST_BYTES = 1_500_000
 """Of the live page of the shipped model [WEB-1]."""
 
-WRAPPED = """[...document.querySelectorAll(".md-content .highlight code, .md-content .output pre")]
+WRAPPED = """[...document.querySelectorAll(".md-content .highlight pre code, .md-content .output pre")]
   .filter((one) => getComputedStyle(one).whiteSpace !== "pre").length"""
 """How many pieces of code wrap their lines."""
 

@@ -159,7 +159,7 @@ def outside(asked: list[str]) -> list[str]:
     return [address for address in asked if not address.startswith(("file:", "data:", "about:"))]
 
 
-CUT = """[...document.querySelectorAll(".highlight code, .output pre, .md-typeset__scrollwrap")]
+CUT = """[...document.querySelectorAll(".highlight pre code, .output pre, .md-typeset__scrollwrap")]
     .filter((piece) => piece.scrollWidth > piece.clientWidth + 1)
     .filter((piece) => getComputedStyle(piece).overflowX !== "auto" || piece.closest("[tabindex]") === null)
     .map((piece) => piece.textContent.trim().slice(0, 60))"""

@@ -44,8 +44,8 @@ FPS = 30.0
 where their boxes are parallel to the axes."""
 
 LEAD = (
-    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "
-    "a bound on its error, makes the calm one of it. All runs on your device: nothing is loaded or sent."
+    "One random path per pixel gives the noisy image; a small neural network, compiled to a fragment shader "
+    "with a proven bound on its error, removes the noise. All runs on your device: nothing is loaded or sent."
 )
 """The sentence below the title."""
 

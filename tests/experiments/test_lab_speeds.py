@@ -40,12 +40,12 @@ def test_what_is_said_of_a_text_is_what_the_reader_does(form, way, tmp_path):
     path = tmp_path / artifact.CERTIFICATE_NAME
     assert check(path)
     bound = f"{max(plan.bound.output):.1e} †"
-    assert speeds.text_checked(form, way, bound) == ("yes" if reads(path) else "no")
+    assert speeds.source_verified(form, way, bound) == ("yes" if reads(path) else "no")
 
 
 def test_only_a_certified_kernel_s_text_is_checked():
-    assert speeds.text_checked("whole", "opencl plain", "1e-3") == "no"
-    assert speeds.text_checked("oidn:high", "–", "–") == "–"
+    assert speeds.source_verified("whole", "opencl plain", "1e-3") == "no"
+    assert speeds.source_verified("oidn:high", "–", "–") == "–"
 
 
 def test_the_first_page_names_every_certified_row():
@@ -57,4 +57,4 @@ def test_the_first_page_names_every_certified_row():
     certified = [names[row["by"]] for row in found if row["bound, all frames"].endswith("†")]
     assert sorted(certified) == sorted(CERTIFIED)
     assert all(row["schedule"] == names[row["by"]][1] for row in found)
-    assert {names[row["by"]] for row in found if row["text checked"] == "yes"} <= set(CERTIFIED)
+    assert {names[row["by"]] for row in found if row["source verified"] == "yes"} <= set(CERTIFIED)

@@ -25,7 +25,18 @@ from .languages.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages.metal import Metal
 from .languages.opencl import OpenCL
 from .languages.wgsl import WGSL
-from .schedules.schedules import Dot, Fourier, GroupDot, Grouped, Inline, Packed, Plain, Printed, Schedule, Tile
+from .schedules.schedules import (
+    Dot,
+    Fourier,
+    GroupDot,
+    Grouped,
+    Inline,
+    Packed,
+    Plain,
+    Printed,
+    Schedule,
+    Tile,
+)
 
 
 @dataclass(frozen=True)
@@ -78,7 +89,8 @@ FFT_IDEA = "products of spectra in place of sums over the window, in tiles of 32
 def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedules for processors: register tiles in each width of vector that the language has."""
     found = [
-        Tile(f"tile{lanes}", TILE_IDEAS[lanes][1], dialect, lanes, TILE_IDEAS[lanes][0]) for lanes in dialect.tiles
+        Tile(f"tile{lanes}", TILE_IDEAS[lanes][1], dialect, lanes, TILE_IDEAS[lanes][0])
+        for lanes in dialect.tiles
     ]
     if 16 not in dialect.tiles or not dialect.wide:
         return tuple(found)
@@ -115,7 +127,10 @@ def groups(dialect: Dialect, name: str = "group") -> tuple[Schedule, ...]:
     """Return the schedules for graphics processors; none of them has been measured on one."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
     four = "the same with 4 pixels an item, which share each weight"
-    found: list[Schedule] = [Grouped(name, one, dialect, 1), Grouped(f"{name}4", four, dialect, 4, instead=name)]
+    found: list[Schedule] = [
+        Grouped(name, one, dialect, 1),
+        Grouped(f"{name}4", four, dialect, 4, instead=name),
+    ]
     if dialect.words:
         idea = f"group4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
         found.append(GroupDot("groupdot", idea, dialect, 4, instead="group4"))
@@ -158,8 +173,8 @@ HOMES = {
         },
     ),
 }
-"""Other places for weights than a target's usual one: a table in the source, or a uniform block; what callers are
-told, and how a weight is read there, by language.
+"""Other places for weights than a target's usual one: a table in the source, or a uniform block; what
+callers are told, and how a weight is read there, by language.
 
 Fragment shaders of GLSL have constants as straight code instead; compute shaders have no table: Mesa had not
 compiled one of 770 numbers after a minute, and a buffer is there wherever they are.

@@ -168,8 +168,9 @@ def denoise(
     """Denoise frames with a trained model.
 
     The schedule is the fastest known for the device, unless --schedule names one. An integer network
-    (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for comparison.
-    Kernels are cached: a second run compiles nothing. In a sequence, existing results are not computed again.
+    (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for
+    comparison. Kernels are cached: a second run compiles nothing. In a sequence, existing results are not
+    computed again.
     """
     from ...kernels import open_executor
     from ...kernels.run.denoise_on import Denoiser

@@ -4,8 +4,8 @@
 
 1. A schedule builds a kernel from a program and names no language. A renderer prints a kernel in one language
    and knows no schedule [languages/renderer.py].
-2. A kernel is a tree of statements. Memory changes by `Store` alone; `add=True` is the only way to sum, so the
-   order of each sum can be read from the kernel.
+2. A kernel is a tree of statements. Memory changes by `Store` alone; `add=True` is the only way to sum, so
+   the order of each sum can be read from the kernel.
 3. Every kernel runs in NumPy [run.py], and is checked for names, types and constant indices [verify.py].
 
 Indices count elements of an array's own type. An array of vectors may also be read as single components: then
@@ -117,7 +117,8 @@ class Let:
 class Array:
     """Memory of an item, or of its group; without `sizes` it is one variable, with its first value.
 
-    `register`: all of its indices are known once its loops are unrolled, so that compilers keep it in registers.
+    `register`: all of its indices are known once its loops are unrolled, so that compilers keep it in
+    registers.
     """
 
     name: str
@@ -208,7 +209,7 @@ Body = tuple[Statement, ...]
 
 @dataclass(frozen=True)
 class Function:
-    """A function of values (`takes`: names and types, with a `result`), or of the views it reads and writes."""
+    """A function of values (`takes`: names and types, with a `result`), or of views."""
 
     name: str
     takes: tuple[tuple[str, Type], ...]
@@ -357,7 +358,12 @@ def values(statement: Statement) -> list[Expr]:
         sizes = [size for size in statement.sizes if isinstance(size, Expr)]
         return [*sizes, *([statement.value] if statement.value else [])]
     if isinstance(statement, For):
-        return [statement.start, statement.count, statement.step, *([statement.until] if statement.until else [])]
+        return [
+            statement.start,
+            statement.count,
+            statement.step,
+            *([statement.until] if statement.until else []),
+        ]
     if isinstance(statement, If):
         return [statement.condition]
     if isinstance(statement, Call):
@@ -383,7 +389,9 @@ def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
             index = tuple(map(change, statement.index))
             return replace(statement, index=index, value=change(statement.value))
         if isinstance(statement, Write):
-            return Write(change(statement.row), change(statement.column), tuple(map(change, statement.values)))
+            return Write(
+                change(statement.row), change(statement.column), tuple(map(change, statement.values))
+            )
         if isinstance(statement, Array):
             return replace(statement, value=statement.value and change(statement.value))
         if isinstance(statement, For):
@@ -391,12 +399,17 @@ def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
             ends = {"count": change(statement.count), "start": change(statement.start), "until": until}
             return replace(statement, body=rewritten(statement.body, change), **ends)  # type: ignore[arg-type]
         if isinstance(statement, If):
-            bodies = {"body": rewritten(statement.body, change), "otherwise": rewritten(statement.otherwise, change)}
+            bodies = {
+                "body": rewritten(statement.body, change),
+                "otherwise": rewritten(statement.otherwise, change),
+            }
             return replace(statement, condition=change(statement.condition), **bodies)
         if isinstance(statement, Block):
             return Block(rewritten(statement.body, change))
         if isinstance(statement, Call):
-            views = (replace(v, index=tuple(map(change, v.index)), step=change(v.step)) for v in statement.views)
+            views = (
+                replace(v, index=tuple(map(change, v.index)), step=change(v.step)) for v in statement.views
+            )
             return replace(statement, views=tuple(views))
         return statement
 

@@ -380,7 +380,10 @@ class C(Arguments):
             top = [*head, FUSED, sizes, STRAIGHT, VECTORS]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
         if kernel.step[0].value != 1:
-            said = "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written\n   to `result`, the whole picture's array."
+            said = (
+                "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are "
+                "written\n   to `result`, the whole image's array."
+            )
         unused = "    (void)weights;" if interface.named("weights") else ""
         return [*top, *self.functions(interface, said, kernel), unused]
 

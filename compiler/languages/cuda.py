@@ -80,12 +80,11 @@ class CUDA(Arguments):
     clamp = "wamnet_clamp"
     max_output_channels = 2**16
     group = (16, 8)
-    grouped = {
-        "heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'
-    }
+    grouped = {"heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'}
     launches = (
         LAUNCH.format(rows="height"),
-        "Launch blocks of any size that together cover (ceil(width / {columns}), ceil(height / {rows})) threads",
+        "Launch blocks of any size that together cover (ceil(width / {columns}), ceil(height / {rows})) "
+        "threads",
         GROUPED,
     )
     aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")

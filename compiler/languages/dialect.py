@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..core.ir import Node
 from ..core.profiles import SineContract
+
 if TYPE_CHECKING:
     from ..kernel.kernel import Kernel, Type
 
@@ -283,7 +284,10 @@ class Dialect:
     def group_memory(self, kernel: Kernel) -> list[str]:
         """Return the declarations of memory that a group shares."""
         arrays = [s for s in kernel.body if getattr(s, "space", "") == "group"]
-        return [self.shared_array.format(kind=self.scalars[a.type.dtype], name=a.name, count=a.sizes[0].value) for a in arrays]
+        return [
+            self.shared_array.format(kind=self.scalars[a.type.dtype], name=a.name, count=a.sizes[0].value)
+            for a in arrays
+        ]
 
     def item_place(self) -> list[str]:
         """Return the declarations of where an item is in its group, and of its first pixel."""

@@ -69,7 +69,8 @@ def fetch(kind: str, index: str, place: str, part: str) -> list[str]:
 def said_of_weights(texture: str) -> str:
     """Return what the texture of the weights is, of this format."""
     return (
-        f"weight_texture: {texture}, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill (the last\n"
+        f"weight_texture: {texture}, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill "
+        "(the last\n"
         "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
     )
 
@@ -105,12 +106,15 @@ class GLSL(Dialect):
     texel = "texelFetch(image_{image}, ivec2({column}, {row}), 0).{part}"
     weight_vector = "weights({index})"
     vector_operations = {
-        **{name: f"{text}({{0}}, {{1}})" for name, text in (
-            ("less", "lessThan"),
-            ("less_equal", "lessThanEqual"),
-            ("greater", "greaterThan"),
-            ("greater_equal", "greaterThanEqual"),
-        )},
+        **{
+            name: f"{text}({{0}}, {{1}})"
+            for name, text in (
+                ("less", "lessThan"),
+                ("less_equal", "lessThanEqual"),
+                ("greater", "greaterThan"),
+                ("greater_equal", "greaterThanEqual"),
+            )
+        },
         "select": "mix({2}, {1}, {0})",
     }
     said = {
@@ -157,16 +161,18 @@ class GLSL(Dialect):
     }
 
     def called(self, kernel: Kernel) -> str:
-        """Return how a denoiser is called: its weights' texture has one or four to a texel, or is not there."""
+        """Return how a denoiser is called: the texture of its weights, if any, has one or four per texel."""
         said = super().called(kernel)
-        reads = WEIGHTS in {e.value for s in walk(kernel.body) for v in values(s) for e in inside(v) if e.op == "load"}
+        reads = WEIGHTS in {
+            e.value for s in walk(kernel.body) for v in values(s) for e in inside(v) if e.op == "load"
+        }
         if not reads:
             return said.replace(said_of_weights("R32F"), "")
         return said.replace("R32F", "RGBA32F") if kernel.weights.lanes > 1 else said
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type."""
-        return f"{ {'float32': '', 'int32': 'i', 'uint32': 'u', 'bool': 'b'}[dtype]}vec{lanes}"
+        return f"{ {'float32': '', 'int32': 'i', 'uint32': 'u', 'bool': 'b'}[dtype] }vec{lanes}"
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
@@ -263,7 +269,7 @@ class GLSL(Dialect):
 
 
 class GLSLCompute(GLSL):
-    """GLSL 4.30 compute shaders on textures: the result is an image, the weights are a storage buffer of `vec4`."""
+    """GLSL 4.30 compute shaders on textures: the result is an image, the weights a buffer of `vec4`."""
 
     language = f"GLSL {SHADER_VERSION / 100:.2f}, compute shader"
     suffix = ".comp"

@@ -10,8 +10,8 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from ..core.profiles import SineContract
-from .c import C
 from ..kernel.kernel import Kernel
+from .c import C
 from .cuda import GROUPED
 from .dialect import Parts
 from .glsl import GLSL
@@ -122,7 +122,9 @@ class Vulkan(Declared):
     group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
     wait = "barrier();"
     wide = False
-    words = f"GL_EXT_integer_dot_product where the compiler knows it and {PORTABLE} is not defined, else shifts"
+    words = (
+        f"GL_EXT_integer_dot_product where the compiler knows it and {PORTABLE} is not defined, else shifts"
+    )
     extensions = VULKAN_EXTENSION
     instructions = VULKAN_GROUP
     vector_kind = GLSL.vector_kind

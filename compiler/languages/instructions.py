@@ -1,8 +1,8 @@
-"""Products of bytes in each language: the texts of instructions that a kernel uses as `dot4`, `pack4`, `bits`.
+"""Products of bytes in each language: instructions that a kernel uses as `dot4`, `pack4` and `bits`.
 
 For groups kernels call functions: `wamnet_packed` makes four floats the bytes of a word, the first one the
-lowest; `wamnet_dots(sums, weights, word)` adds to each of four sums the products of one word of weights with a
-word; `wamnet_floats` makes sums floats; `wamnet_numbers` reads four words of weights as floats.
+lowest; `wamnet_dots(sums, weights, word)` adds to each of four sums the products of one word of weights with
+a word; `wamnet_floats` makes sums floats; `wamnet_numbers` reads four words of weights as floats.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ from .instructions import OPENCL_GROUP, OPENCL_TILE
 from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
 
-
 BUILTINS = """\
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
@@ -102,7 +101,8 @@ class OpenCL(Arguments):
     )
     aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
     grouped = {
-        "heading": "__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))\nvoid {entry}"
+        "heading": "__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))\n"
+        "void {entry}"
     }
     shared_array = "__local {kind} {name}[{count}];"
     local_place = ("get_local_id(0)", "get_local_id(1)")
@@ -152,7 +152,11 @@ class OpenCL(Arguments):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         if parts.kernel is not None and parts.kernel.weights.lanes > 1:
-            words = OPENCL_GROUP if parts.kernel.group else OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")
+            words = (
+                OPENCL_GROUP
+                if parts.kernel.group
+                else OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")
+            )
             instructions = [words] if parts.kernel.weights.dtype == "int32" else []
             return [BUILTINS, *instructions, *super().top(kernel, parts)]
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []

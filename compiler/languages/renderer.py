@@ -1,7 +1,7 @@
 """From a kernel to its source: one walk over the IR for all languages, with the words of a dialect.
 
-1. Expressions have as few parentheses as the order of operations needs [`Renderer.text`]; a dialect's template
-   of an operation says how strongly it binds.
+1. Expressions have as few parentheses as the order of operations needs [`Renderer.text`]; a dialect's
+   template of an operation says how strongly it binds.
 2. Images, weights and the result are where a language has them: buffers, textures, tables [`Renderer._load`,
    `Renderer._store`].
 3. Statements are printed one by one [`Renderer.statement`]; only the layout of vectors in memory needs a look
@@ -40,7 +40,6 @@ from ..kernel.kernel import (
     View,
     Write,
     const,
-    name,
     parts,
     substituted,
     values,
@@ -180,7 +179,9 @@ class Renderer(Lines):
 
     def _const(self, value: Expr) -> tuple[str, int]:
         """Return a constant."""
-        return self.dialect.number(value.value, "int32" if value.type.dtype == "uint8" else value.type.dtype), ATOM
+        return self.dialect.number(
+            value.value, "int32" if value.type.dtype == "uint8" else value.type.dtype
+        ), ATOM
 
     def _name(self, value: Expr) -> tuple[str, int]:
         """Return a name."""
@@ -268,7 +269,9 @@ class Renderer(Lines):
         channels = int(found.shape[-1])
         if lanes > 1:
             row, column = map(self.text, index)
-            return self.dialect.texel.format(image=array.removeprefix(IMAGE), row=row, column=column, part="rgba"[:lanes])
+            return self.dialect.texel.format(
+                image=array.removeprefix(IMAGE), row=row, column=column, part="rgba"[:lanes]
+            )
         if len(index) == 2:
             return f"{array}[{self.text(index[0], 11)} * width * {channels} + {self.text(index[1], 10)}]"
         row, column, channel = map(self.text, index)
@@ -331,7 +334,8 @@ class Renderer(Lines):
         """Write a change of memory."""
         value, index = statement.value, statement.index
         if statement.array == RESULT:
-            return self._result(index, value)
+            self._result(index, value)
+            return
         target = self.element(statement.array, index, value.type.lanes)
         if value.op == "dot4":
             self._line(self._dotted(target, *value.args))
@@ -400,7 +404,9 @@ class Renderer(Lines):
         if each and channels > each:
             number, of = divmod(int(channel.value), each)
             result, shown["i"] = f"{RESULT}_{number}", str(of)
-        self._line(self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown))
+        self._line(
+            self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown)
+        )
 
     def _write_write(self, statement: Write) -> None:
         """Write all channels of a pixel."""

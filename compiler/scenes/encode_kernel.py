@@ -29,9 +29,9 @@ from ..core.passes import pipeline
 from ..languages import interface
 from ..languages.dialect import Dialect, Parts
 from ..languages.interface import Interface
+from ..languages.renderer import framed
 from ..plan import sine_contract
 from ..proof import bounds
-from ..languages.renderer import framed
 from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
 from .emit_path import Encoding

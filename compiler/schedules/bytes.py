@@ -2,10 +2,10 @@
 
 1. Inputs and hidden values are bytes, weights are bytes with a sign: one instruction of many processors
    multiplies four pairs and adds the products to a sum of 32 bits (expression `dot4`).
-2. On processors [`Bytes`] the tile is that of tile.py. Values are n + 128, from 1 to 255, since the instruction
-   takes one factor without a sign; a row of weights begins its sums at -128 times the sum of its weights: then
-   they are those of n. A row of taps is filled up to fours with weights of 0; what is read beyond does not
-   count.
+2. On processors [`Bytes`] the tile is that of tile.py. Values are n + 128, from 1 to 255, since the
+   instruction takes one factor without a sign; a row of weights begins its sums at -128 times the sum of its
+   weights: then they are those of n. A row of taps is filled up to fours with weights of 0; what is read
+   beyond does not count.
 3. On graphics processors [`GroupBytes`] the tile is that of group.py. Both factors have a sign. A word of the
    tile holds four channels of a pixel, counted over all images; a word of a hidden layer is a vector of four.
 
@@ -24,7 +24,6 @@ from ..core import weights
 from ..core.ir import Image, Node, Program
 from ..kernel.kernel import (
     BYTE,
-    FLOAT,
     INT,
     Array,
     Expr,
@@ -35,7 +34,6 @@ from ..kernel.kernel import (
     Type,
     apply,
     const,
-    expr,
     load,
     name,
     splat,
@@ -46,13 +44,13 @@ from .common import kernel_gather, loop, weight
 from .group import MOST_CHANNELS, Group
 from .straight import VECTOR
 from .tile import (
+    COUNTER,
     DY,
-    I,
     LANES,
-    P,
     PATCH_WIDTH,
     PIXELS,
     Blocks,
+    P,
     Tiled,
     blocks_of,
     matrices,
@@ -151,7 +149,9 @@ def tile_of_bytes(program: Program, lanes: int, pixels: int, wide: bool) -> Kern
 class Bytes(Tiled):
     """Builds the tiled kernel of bytes."""
 
-    def __init__(self, program: Program, slots: Mapping[str, object], lanes: int, pixels: int, vectors: int, wide: bool) -> None:
+    def __init__(
+        self, program: Program, slots: Mapping[str, object], lanes: int, pixels: int, vectors: int, wide: bool
+    ) -> None:
         super().__init__(program, slots, lanes, pixels, vectors, wide)  # type: ignore[arg-type]
         self.sum_type = INT.of(lanes)
 
@@ -175,7 +175,7 @@ class Bytes(Tiled):
         found = super().patches()
         for image in self.gather.images:
             end = self.rows * PATCH_WIDTH * image.channels
-            found.append(loop("i", FOUR - 1, Store(f"patch_{image.name}", (end + I,), const(0, BYTE))))
+            found.append(loop("i", FOUR - 1, Store(f"patch_{image.name}", (end + COUNTER,), const(0, BYTE))))
         return found
 
     def copied(self, value: Expr) -> Expr:
@@ -197,8 +197,8 @@ class Bytes(Tiled):
     def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
         """Return the bytes of a layer's values, and their products."""
         count, held = PIXELS * self.total(source) * LANES, self.total(source)
-        byte = self.copied(load(f"v{source}", I))
-        copy = loop("i", count, Store(f"bytes{source}", (I,), byte))
+        byte = self.copied(load(f"v{source}", COUNTER))
+        copy = loop("i", count, Store(f"bytes{source}", (COUNTER,), byte))
         place = P * held * LANES
         return [
             Array(f"bytes{source}", BYTE, (count,)),
@@ -214,15 +214,17 @@ class Bytes(Tiled):
             count = -(-self.gather.columns * image.channels // FOUR)
             place = (DY * PATCH_WIDTH + P) * image.channels
             at = first + (DY * count + rows) * blocks.vectors
-            found.append(loop("dy", self.rows, self.of_fours(blocks, count, at, f"patch_{image.name}", place)))
+            found.append(
+                loop("dy", self.rows, self.of_fours(blocks, count, at, f"patch_{image.name}", place))
+            )
             rows += self.gather.rows * count
         return found
 
     def of_fours(self, blocks: Blocks, count: int, first: Expr, array: str, place: Expr) -> Statement:
         """Return the loop over fours of inputs: each one's weights, times the bytes at each pixel."""
         each = range(blocks.vectors)
-        row = [Let(f"w{j}", weight(first + I * blocks.vectors + j, self.sum_type)) for j in each]
-        four = load(array, place + FOUR * I, kind=BYTE.of(FOUR))
+        row = [Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.sum_type)) for j in each]
+        four = load(array, place + FOUR * COUNTER, kind=BYTE.of(FOUR))
         adds = [Store("sum", (P, const(j)), dot4(name(f"w{j}", self.sum_type), four), add=True) for j in each]
         return loop("i", count, *row, self.each_pixel(*adds))
 
@@ -292,7 +294,9 @@ class GroupBytes(Group):
         source, first = node.args[0], self.offset(node["weight"]) // 4
         zero = splat(const(0), FOUR)
         found: list[Statement] = [self.mapped(index, node)]
-        found += [Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True) for p, j in self.places(index)]
+        found += [
+            Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True) for p, j in self.places(index)
+        ]
         if self.program.nodes[source].op == "input":
             found += self.of_window(index, first)
         else:
@@ -301,7 +305,9 @@ class GroupBytes(Group):
                 for p, each in enumerate(names):
                     found.append(Let(each, packed([self.at(source, p, k).lane(c) for c in range(FOUR)])))
                 sums = self.names(f"s{index}", index)
-                found += self.multiplied(self.weights_row(index, const(first), k), sums, list(map(name, names)))
+                found += self.multiplied(
+                    self.weights_row(index, const(first), k), sums, list(map(name, names))
+                )
         for p, j in self.places(index):
             total = apply("convert", name(f"s{index}_{p}_{j}", self.weights), value="float32")
             found.append(Array(self.variable(index, p, j), VECTOR, value=total))

@@ -1,7 +1,7 @@
 """What all schedules share: which program a kernel can hold, groups of nodes, and elementwise statements.
 
-1. Nodes are grouped in their order [`groups_of`]: neighbouring elementwise nodes of one shape share a loop, an
-   affine node is a loop nest of its own.
+1. Nodes are grouped in their order [`groups_of`]: neighbouring elementwise nodes of one shape share a loop,
+   an affine node is a loop nest of its own.
 2. A value that another group reads is an array `v<node>`; a value that only its own loop reads is `t<node>`
    [`Nest`]. The numbers are those of the printed program.
 """
@@ -17,13 +17,11 @@ from ..core.weights import Slot, tables
 from ..kernel.kernel import (
     FLOAT,
     INT,
-    Array,
     Body,
     Comment,
     Constant,
     Expr,
     For,
-    Index,
     Kernel,
     Let,
     Statement,
@@ -118,7 +116,11 @@ class Nest:
             self.row, self.column = name("CENTRE_ROW"), name("CENTRE_COLUMN")
         found = {self.rows.value: (gather.rows, ""), self.columns.value: (gather.columns, "")}
         found |= {self.row.value: (gather.rows // 2, pixel)}
-        found = {**found, **{self.column.value: (gather.columns // 2, "")}, self.row.value: (gather.rows // 2, pixel)}
+        found = {
+            **found,
+            self.column.value: (gather.columns // 2, ""),
+            self.row.value: (gather.rows // 2, pixel),
+        }
         return [Constant(name, const(value), text) for name, (value, text) in found.items()]
 
     def kernel(self, body: Sequence[Statement], constants: Sequence[Constant], **more: object) -> Kernel:

@@ -11,8 +11,8 @@
    whose rows OUT are kept, and one of each row give both.
 5. What a row of all tiles gives goes through the other layers as in the tiled schedule, PIXELS at a time.
 
-The transforms are functions of the kernel, traced from `fourier.transform` [`codelet`]. Weights are transformed
-when they are packed, in float64 [`fourier.spectrum`]. The bound is that of fourier.py.
+The transforms are functions of the kernel, traced from `fourier.transform` [`codelet`]. Weights are
+transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is that of fourier.py.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from ..kernel.kernel import (
 from ..languages.interface import RESULT
 from . import fourier
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
-from .tile import BLOCK, I, LANES, P, PIXELS, Tiled, all_stored, placed, readers_of_window
+from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, placed, readers_of_window
 
 PARTS = 2
 """Values of a complex one: its real and its imaginary part."""
@@ -92,10 +92,14 @@ def sizes_of(program: Program, lanes: int, points: int, tiles: int) -> Sizes:
     gather, (layer,) = kernel_gather(program), readers_of_window(program)
     pairs = -(-gather.channels // 2)
     neurons = -(-layer.type.shape[0] // (2 * lanes))
-    return Sizes(pairs, -(-tiles * pairs // lanes), neurons, points - gather.rows + 1, fourier.block_of(pairs))
+    return Sizes(
+        pairs, -(-tiles * pairs // lanes), neurons, points - gather.rows + 1, fourier.block_of(pairs)
+    )
 
 
-def spectra_stored(program: Program, lanes: int, points: int, tiles: int) -> Mapping[str, NDArray[np.float32]]:
+def spectra_stored(
+    program: Program, lanes: int, points: int, tiles: int
+) -> Mapping[str, NDArray[np.float32]]:
     """Return all weights as they are stored: of the matrix that reads the window its spectra.
 
     Those are columns, groups, rows, pairs, channels, parts and neurons.
@@ -176,7 +180,9 @@ def codelet(title: str, points: int, kept: int, sign: int, kind: Type) -> Functi
     found = fourier.transform(inputs, sign)[:kept]  # type: ignore[arg-type]
     outputs = [part.value for number in found for part in number]
     stores = [
-        Store("to", (LEAP * (PARTS * k) + i,), part.value) for k, number in enumerate(found) for i, part in enumerate(number)
+        Store("to", (LEAP * (PARTS * k) + i,), part.value)
+        for k, number in enumerate(found)
+        for i, part in enumerate(number)
     ]
     return Function(title, (("from", kind), ("to", kind)), (*traced.needed(outputs), *stores))
 
@@ -194,7 +200,14 @@ class Spectral(Tiled):
     """Builds the kernel with Fourier transforms."""
 
     def __init__(
-        self, program: Program, slots: Mapping[str, Slot], lanes: int, pixels: int, points: int, tiles: int, wide: bool
+        self,
+        program: Program,
+        slots: Mapping[str, Slot],
+        lanes: int,
+        pixels: int,
+        points: int,
+        tiles: int,
+        wide: bool,
     ) -> None:
         super().__init__(program, slots, lanes, pixels, 2, wide)
         self.points, self.tiles = points, tiles
@@ -259,15 +272,15 @@ class Spectral(Tiled):
                 place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
                 lines.append(Store("gathered", (place,), value))
             first += image.channels
-        start, count = I * POINTS * 2, INPUTS * POINTS * 2
-        to = View("rows", ((I * POINTS + name("dy")) * STRIDE,), const(1))
+        start, count = COUNTER * POINTS * 2, INPUTS * POINTS * 2
+        to = View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,), const(1))
         call = self.transform("forward", View("gathered", (start,), const(1)), to)
         gather = loop("tile", TILES, loop("dx", POINTS, *lines))
         return [
             Comment("rows of the images around the tiles, transformed"),
             Array("gathered", self.vector, (count,)),
             Array("rows", self.vector, (INPUTS * POINTS * STRIDE,)),
-            loop("i", count, Store("gathered", (I,), self.zero)),
+            loop("i", count, Store("gathered", (COUNTER,), self.zero)),
             loop(
                 "dy",
                 POINTS,
@@ -281,10 +294,12 @@ class Spectral(Tiled):
     def columns_of_frequencies(self) -> list[Statement]:
         """Return the loop over columns of frequencies: forward, products with the weights, back."""
         vector, opposite = self.vector, name("opposite")
-        row, one = I * POINTS * STRIDE, const(1)
+        row, one = COUNTER * POINTS * STRIDE, const(1)
         forward = [
             self.transform(
-                "forward", View("rows", (row + 2 * k,), POINTS + 1), View("columns", (const(n), const(0)), one)
+                "forward",
+                View("rows", (row + 2 * k,), POINTS + 1),
+                View("columns", (const(n), const(0)), one),
             )
             for n, k in enumerate((K, opposite))
         ]
@@ -293,7 +308,7 @@ class Spectral(Tiled):
         lets = [Let(n, value) for n, value in zip("abcd", (a, b, c, d), strict=True)]
         a, b, c, d = (name(n, vector) for n in "abcd")
         both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
-        place = (I * POINTS + F) * 4
+        place = (COUNTER * POINTS + F) * 4
         stores = [Store("spectra", (place + n,), value) for n, value in enumerate(both)]
         unpack = loop("f", POINTS, Let("g", (POINTS - F) % POINTS), *lets, *stores)
         mirrored = apply("not_equal", opposite, K)
@@ -374,7 +389,10 @@ class Spectral(Tiled):
     def zeros(self, names: tuple[str, ...]) -> list[Statement]:
         """Return the sums of all tiles, which start with zeros."""
         arrays = [Array(part, self.vector, (TILES, 2), register=True) for part in names]
-        return [*arrays, self.each_tile([Store(part, (T, const(v)), self.zero) for part in names for v in range(2)])]
+        return [
+            *arrays,
+            self.each_tile([Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]),
+        ]
 
     def each_tile(self, lines: list[Statement]) -> For:
         """Return a loop over tiles that keeps each tile's sums in registers of their own."""
@@ -391,7 +409,7 @@ class Spectral(Tiled):
         if blocks * self.pixels > of_row:
             # The last block reaches beyond the tiles: its values there are read, and none is written.
             beyond = (blocks * PIXELS - TILES * OUT) * NEURONS * 2
-            found.append(loop("i", beyond, Store("sums", (TILES * OUT * NEURONS * 2 + I,), self.zero)))
+            found.append(loop("i", beyond, Store("sums", (TILES * OUT * NEURONS * 2 + COUNTER,), self.zero)))
         at = (TILE // NEURONS * OUT * NEURONS + TILE % NEURONS) * 2
         source = View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
         rows = loop("tile", TILES * NEURONS, self.transform("backward", source, View("sums", (at,), NEURONS)))
@@ -421,6 +439,6 @@ class Spectral(Tiled):
     def outputs(self) -> Body:
         """Return the statements that write the output of each pixel of the block in tiles and image."""
         output, index = self.program.outputs[0]
-        value = load(f"v{index}", P * self.total(index) * LANES + I)
-        write = loop("i", self.program.nodes[index].type.shape[0], Store(RESULT, (Y, X + P, I), value))
-        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=X + P < name("last"))
+        value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
+        write = loop("i", self.program.nodes[index].type.shape[0], Store(RESULT, (Y, X + P, COUNTER), value))
+        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=name("last") > X + P)

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
-from ..core.ir import Gather, Image, Node, Program
+from ..core.ir import Gather, Node, Program
 from ..core.weights import Slot
 from ..kernel.kernel import (
     FLOAT,
@@ -31,13 +31,11 @@ from ..kernel.kernel import (
     Let,
     Statement,
     Store,
-    Type,
     apply,
     const,
     load,
     name,
 )
-from ..languages.interface import IMAGE
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
 from .straight import VECTOR, ZERO, Straight, variables
 from .tile import all_stored, placed
@@ -54,8 +52,10 @@ LARGEST_STATEMENTS = 2**15
 """Most products of four in straight code: more take drivers minutes to compile."""
 
 GROUP_WIDTH, GROUP_HEIGHT, PIXELS = map(name, ("GROUP_WIDTH", "GROUP_HEIGHT", "PIXELS"))
-TILE_WIDTH, TILE_HEIGHT, PLANE, TILE_NUMBERS = map(name, ("TILE_WIDTH", "TILE_HEIGHT", "PLANE", "TILE_NUMBERS"))
-I, DX, DY, AT, LOCAL_X, LOCAL_Y = map(name, ("i", "dx", "dy", "at", "local_x", "local_y"))
+TILE_WIDTH, TILE_HEIGHT, PLANE, TILE_NUMBERS = map(
+    name, ("TILE_WIDTH", "TILE_HEIGHT", "PLANE", "TILE_NUMBERS")
+)
+COUNTER, DX, DY, AT, LOCAL_X, LOCAL_Y = map(name, ("i", "dx", "dy", "at", "local_x", "local_y"))
 TILE, FIRST = "tile", name("first")
 
 
@@ -151,7 +151,9 @@ class Group(Straight):
             body.append(If(inside, (self.written(Y, column, p),)))
         functions = tuple(self.functions())
         step = (PIXELS, const(1))
-        return self.kernel(body, constants, functions=functions, step=step, group=self.size, weights=self.weights)
+        return self.kernel(
+            body, constants, functions=functions, step=step, group=self.size, weights=self.weights
+        )
 
     weights = VECTOR
 
@@ -200,15 +202,15 @@ class Group(Straight):
         """Return the copy of a pixel's values for all that the group's windows touch, by all its items."""
         tile_row, tile_column = name("tile_row"), name("tile_column")
         lines: list[Statement] = [
-            Let("tile_row", name("top") + I // TILE_WIDTH),
-            Let("tile_column", name("left") + I % TILE_WIDTH),
+            Let("tile_row", name("top") + COUNTER // TILE_WIDTH),
+            Let("tile_column", name("left") + COUNTER % TILE_WIDTH),
             Let("row", clamp(tile_row, HEIGHT)),
             Let("column", clamp(tile_column, WIDTH)),
         ]
         if self.gather.window.border == "zero":
             same = apply("equal", name("row"), tile_row) & apply("equal", name("column"), tile_column)
             lines.append(Let("inside", same))
-        lines += [Store(TILE, (const(plane) * PLANE + I,), value) for plane, value in enumerate(values)]
+        lines += [Store(TILE, (const(plane) * PLANE + COUNTER,), value) for plane, value in enumerate(values)]
         share = For("i", PLANE, tuple(lines), start=name("item"), step=GROUP_WIDTH * GROUP_HEIGHT)
         return [Barrier(), share, Barrier()]
 
@@ -234,5 +236,7 @@ class Group(Straight):
             for p, each in enumerate(names):
                 place = const(c) * PLANE + AT + const(p) * GROUP_WIDTH
                 lines.append(Let(each, load(TILE, place, kind=self.element)))
-            lines += self.multiplied(self.weights_row(index, FIRST, c), sums, [name(n, self.element) for n in names])
+            lines += self.multiplied(
+                self.weights_row(index, FIRST, c), sums, [name(n, self.element) for n in names]
+            )
         return loop("dx", self.columns, *lines)

@@ -79,7 +79,9 @@ class Inlined(Straight):
 
     def added(self, sums: str, column: NDArray[np.float32], value: Expr) -> list[Statement]:
         """Return the additions of a column of weights (D_out,) times a value to all vectors."""
-        products = [apply("multiply", numbers(column, j), splat(value, 4)) for j in range(-(-len(column) // 4))]
+        products = [
+            apply("multiply", numbers(column, j), splat(value, 4)) for j in range(-(-len(column) // 4))
+        ]
         return [Store(f"{sums}_{j}", (), product, add=True) for j, product in enumerate(products)]
 
     def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[Statement]:
@@ -93,19 +95,33 @@ class Inlined(Straight):
                     lines += variables([f"{part}_{j}" for j in range(self.vectors(index))], ZERO)
                 for column in range(gather.columns):
                     tap = (row * gather.columns + column) * gather.channels
-                    lines.append(self.tap(row, column, [(image, matrix[:, tap + first :]) for image, first in group], part if split else f"v{index}"))
+                    lines.append(
+                        self.tap(
+                            row,
+                            column,
+                            [(image, matrix[:, tap + first :]) for image, first in group],
+                            part if split else f"v{index}",
+                        )
+                    )
                 if split:
-                    names = [(self.variable(index, 0, j), name(f"{part}_{j}", VECTOR)) for j in range(self.vectors(index))]
+                    names = [
+                        (self.variable(index, 0, j), name(f"{part}_{j}", VECTOR))
+                        for j in range(self.vectors(index))
+                    ]
                     lines += [Store(total, (), value, add=True) for total, value in names]
                 found.append(Block(tuple(lines)))
         return found
 
-    def tap(self, row: int, column: int, images: list[tuple[Image, NDArray[np.float32]]], sums: str) -> Statement:
+    def tap(
+        self, row: int, column: int, images: list[tuple[Image, NDArray[np.float32]]], sums: str
+    ) -> Statement:
         """Return the products of a tap's channels with their columns of weights."""
         at = Y + row - self.gather.rows // 2, X + column - self.gather.columns // 2
         lines: list[Statement] = [Let("row", clamp(at[0], HEIGHT)), Let("column", clamp(at[1], WIDTH))]
         if self.gather.window.border == "zero":
-            lines.append(Let("inside", apply("equal", name("row"), at[0]) & apply("equal", name("column"), at[1])))
+            lines.append(
+                Let("inside", apply("equal", name("row"), at[0]) & apply("equal", name("column"), at[1]))
+            )
         for image, columns in images:
             value = self.texel(image)
             texel = name(image.name, value.type)

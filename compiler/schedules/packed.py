@@ -1,8 +1,8 @@
-"""The packed schedule: four weights per read, loops over taps and inputs; values are arrays of vectors of four.
+"""The packed schedule: four weights per read; values are arrays of vectors of four.
 
-The weights are stored as a row of neurons for each input, filled up to a multiple of four. The source is short,
-so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a graphics
-processor).
+The weights are stored as a row of neurons for each input, filled up to a multiple of four. The source is
+short, so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a
+graphics processor).
 """
 
 from __future__ import annotations
@@ -15,7 +15,22 @@ from numpy.typing import NDArray
 from ..core import weights
 from ..core.ir import Image, Node, Program
 from ..core.sums import is_split
-from ..kernel.kernel import Array, Body, Comment, Expr, Kernel, Let, Statement, Store, Write, apply, const, load, name, splat
+from ..kernel.kernel import (
+    Array,
+    Body,
+    Comment,
+    Expr,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Write,
+    apply,
+    const,
+    load,
+    name,
+    splat,
+)
 from .common import X, Y, loop, weight
 from .plain import Plainly
 from .straight import VECTOR, ZERO
@@ -24,7 +39,7 @@ from .tile import placed
 WEIGHTS_A_TEXEL = "weights_a_texel"
 """Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""
 
-I, J = name("i"), name("j")
+COUNTER, J = name("i"), name("j")
 
 
 def packed_weights(program: Program) -> Mapping[str, NDArray[np.float32]]:
@@ -65,7 +80,10 @@ class Packed(Plainly):
     def outputs(self) -> Body:
         """Return the statements that write the output."""
         index = self.program.outputs[0][1]
-        values = [self.read(index, const(i // 4)).lane(i % 4) for i in range(self.program.nodes[index].type.shape[0])]
+        values = [
+            self.read(index, const(i // 4)).lane(i % 4)
+            for i in range(self.program.nodes[index].type.shape[0])
+        ]
         return Comment(f"output {self.program.outputs[0][0]}"), Write(Y, X, tuple(values))
 
     def count(self, index: int) -> int:
@@ -82,11 +100,14 @@ class Packed(Plainly):
             return [*found, *self.of_window(index, count, first)]
         whole, rest = divmod(source.type.shape[0], 4)
         if whole:
-            lines = self.products(v, first, I * 4, load(f"v{node.args[0]}", I, kind=VECTOR), 4, count)
-            found.append(loop("i", whole, lines))
+            lines = self.products(
+                v, first, COUNTER * 4, load(f"v{node.args[0]}", COUNTER, kind=VECTOR), 4, count
+            )
+        found.append(loop("i", whole, lines))
+
         if rest:
             last = load(f"v{node.args[0]}", const(whole), kind=VECTOR)
-            found.append(self.products(v, first, const(4 * whole), last, rest, count))
+        found.append(self.products(v, first, const(4 * whole), last, rest, count))
         return found
 
     def of_window(self, index: int, count: int, first: int) -> list[Statement]:
@@ -97,7 +118,11 @@ class Packed(Plainly):
         found: list[Statement] = [Array(part, VECTOR, (count,))] if split else []
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
-            inner = [line for image, at in group for line in self.channels(image, at, part if split else v, first, count)]
+            inner = [
+                line
+                for image, at in group
+                for line in self.channels(image, at, part if split else v, first, count)
+            ]
             row = loop("dx", self.columns, *self.tap_column(), Let("tap", tap), *inner)
             found.append(loop("dy", self.rows, self.tap_row(), *zero, row, *add))
         return found
@@ -106,7 +131,10 @@ class Packed(Plainly):
         """Return the products of a tap's channels of an image."""
         value = self.texel(image)
         texel = name(image.name, value.type)
-        return [Let(image.name, value), self.products(sums, first, name("tap") + at, texel, image.channels, count)]
+        return [
+            Let(image.name, value),
+            self.products(sums, first, name("tap") + at, texel, image.channels, count),
+        ]
 
     def products(self, sums: str, first: int, row: Expr, value: Expr, inputs: int, count: int) -> Statement:
         """Return the additions of rows of weights times each component of a value."""

@@ -1,7 +1,7 @@
-"""The plain schedule: one pixel per work item, loops over taps and neurons; the kernel that is made for reading.
+"""The plain schedule: one pixel per work item, loops over taps and neurons; made for reading.
 
-An affine map that reads the window accumulates straight from the images, a partial sum for each row of taps of
-an image [core/sums.py]; the window is an array only if something else reads it.
+An affine map that reads the window accumulates straight from the images, a partial sum for each row of taps
+of an image [core/sums.py]; the window is an array only if something else reads it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ..core.ir import Node, Program
 from ..core.sums import is_split
 from ..core.weights import layout
 from ..kernel.kernel import Array, Body, Comment, Expr, Kernel, Let, Statement, Store, Type, const, load, name
-from .common import X, Y, Nest, loop, output, weight
+from .common import Nest, X, Y, loop, output, weight
 
 
 def plain(program: Program) -> Kernel:
@@ -81,7 +81,9 @@ class Plainly(Nest):
 
     def stacked(self, index: int, node: Node) -> list[Statement]:
         """Return the copy of numbers side by side."""
-        stores = [Store(f"v{index}", (const(i),), self.operand(arg, self.read)) for i, arg in enumerate(node.args)]
+        stores = [
+            Store(f"v{index}", (const(i),), self.operand(arg, self.read)) for i, arg in enumerate(node.args)
+        ]
         return [Comment(f"%{index}: {len(node.args)} numbers side by side"), self.array(index), *stores]
 
     def materialised(self, index: int) -> list[Statement]:

@@ -59,7 +59,15 @@ from .group import (
 from .inlined import LARGEST_WEIGHTS, inlined
 from .packed import WEIGHTS_A_TEXEL, packed, packed_weights
 from .plain import plain
-from .tile import LARGEST_PRIVATE, all_stored, placed, readers_of_window, refused_by_vectors, shared_matrix, tile
+from .tile import (
+    LARGEST_PRIVATE,
+    all_stored,
+    placed,
+    readers_of_window,
+    refused_by_vectors,
+    shared_matrix,
+    tile,
+)
 
 Images = Mapping[str, NDArray[np.float32]]
 
@@ -80,8 +88,8 @@ class Schedule:
     """One way to order a kernel's work; `idea` is the sentence that sets it apart from the one before.
 
     `instead` names the schedule of programs that it refuses; `order` says how a matrix is stored among the
-    weights. `bytewise`: its array of weights holds bytes. A schedule of kernels builds them as data, and prints
-    them in its language [`kernel`].
+    weights. `bytewise`: its array of weights holds bytes. A schedule of kernels builds them as data, and
+    prints them in its language [`kernel`].
     """
 
     name: str
@@ -218,7 +226,9 @@ class Tile(Stored):
         "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int = 2) -> None:
+    def __init__(
+        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int = 2
+    ) -> None:
         self.name, self.idea, self.dialect = name, idea, dialect
         self.lanes, self.pixels, self.vectors = lanes, pixels, vectors
 
@@ -243,12 +253,20 @@ class Grouped(Stored):
     """A tile of the image for each group of items, `pixels` of a row for each item [group.py]."""
 
     order = (
-        "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads the "
-        f"window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, then "
-        "channel by channel"
+        "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads "
+        f"the window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, "
+        "then channel by channel"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, pixels: int, size: tuple[int, int] | None = None, instead: str = PLAIN) -> None:
+    def __init__(
+        self,
+        name: str,
+        idea: str,
+        dialect: Dialect,
+        pixels: int,
+        size: tuple[int, int] | None = None,
+        instead: str = PLAIN,
+    ) -> None:
         self.name, self.idea, self.dialect, self.instead = name, idea, dialect, instead
         size = size or dialect.group
         assert size is not None, f"{dialect.language} has no work groups"
@@ -567,5 +585,7 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
         first = first or reason
         chosen = known[chosen.instead]
     if chosen is schedules[0] and (reason := chosen.impossible(program)):
-        raise CompileError(f"no schedule of this target holds the program: {reason}; compile for another target")
+        raise CompileError(
+            f"no schedule of this target holds the program: {reason}; compile for another target"
+        )
     return Pick(chosen, name, chosen.extent(program), first, chosen.details(program))

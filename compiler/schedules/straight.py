@@ -77,7 +77,9 @@ class Straight(Nest):
     def functions(self) -> list[Function]:
         """Return the functions of elementwise groups."""
         elementwise = [g for g in self.groups if self.program.nodes[g[0]].op not in ("input", "affine")]
-        return [f for group in elementwise for result in self.results(group) for f in self.function(group, result)]
+        return [
+            f for group in elementwise for result in self.results(group) for f in self.function(group, result)
+        ]
 
     def function(self, group: Sequence[int], result: int) -> list[Function]:
         """Return the function that computes one value of a group, and that of its components where needed."""
@@ -105,7 +107,9 @@ class Straight(Nest):
 
     # ---- sums --------------------------------------------------------------------------------------------
 
-    def multiplied(self, weights: Sequence[Expr], sums: Sequence[Sequence[str]], factors: Sequence[Expr]) -> list[Statement]:
+    def multiplied(
+        self, weights: Sequence[Expr], sums: Sequence[Sequence[str]], factors: Sequence[Expr]
+    ) -> list[Statement]:
         """Return the additions of a row of weights times each pixel's value, each weight read once.
 
         `sums`: names, by vector and pixel.
@@ -113,7 +117,9 @@ class Straight(Nest):
         found: list[Statement] = []
         for weight, names in zip(weights, sums, strict=True):
             m = name("m", weight.type)
-            adds = [Store(s, (), self.product(m, x, s), add=True) for s, x in zip(names, factors, strict=True)]
+            adds = [
+                Store(s, (), self.product(m, x, s), add=True) for s, x in zip(names, factors, strict=True)
+            ]
             found.append(Block((Let("m", weight), *adds)))
         return found
 

@@ -1,7 +1,7 @@
 """The tiled schedule: a work item computes a row of pixels, and keeps their sums in vector registers.
 
-1. The images around the pixels are copied to a patch that belongs to the work item; the border rule is applied
-   there, and the loops that follow know no border [`Tiled.patches`].
+1. The images around the pixels are copied to a patch that belongs to the work item; the border rule is
+   applied there, and the loops that follow know no border [`Tiled.patches`].
 2. The neurons of a layer stand side by side in vectors of `lanes`, the last one filled up with neurons whose
    weights are 0: nothing reads them.
 3. An affine map works on blocks of `vectors` vectors: all pixels' sums of a block are in registers while the
@@ -27,7 +27,6 @@ from ..core.sums import is_split
 from ..core.weights import Slot
 from ..kernel.kernel import (
     FLOAT,
-    INT,
     Array,
     Block,
     Body,
@@ -43,16 +42,15 @@ from ..kernel.kernel import (
     Type,
     apply,
     const,
-    expr,
     load,
     name,
     splat,
 )
 from ..languages.interface import IMAGE, RESULT
-from .common import HEIGHT, WIDTH, X, Y, Nest, clamp, groups_of, kernel_gather, loop, output_channels, weight
+from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, groups_of, kernel_gather, loop, output_channels, weight
 
 PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
-I, J, P, DX, DY, LEFT, TOP, BLOCK = map(name, ("i", "j", "p", "dx", "dy", "left", "top", "block"))
+COUNTER, J, P, DX, DY, LEFT, TOP, BLOCK = map(name, ("i", "j", "p", "dx", "dy", "left", "top", "block"))
 
 
 LARGEST_PRIVATE = 2**20
@@ -251,8 +249,8 @@ class Tiled(Nest):
         """Return the copy of a row of the patch: at once inside the image, else pixel by pixel."""
         patch, channels, row = f"patch_{image.name}", image.channels, name("row")
         first = DY * PATCH_WIDTH * channels
-        at_once = load(f"{IMAGE}{image.name}", row, LEFT * channels + I)
-        fast = loop("i", PATCH_WIDTH * channels, Store(patch, (first + I,), self.copied(at_once)))
+        at_once = load(f"{IMAGE}{image.name}", row, LEFT * channels + COUNTER)
+        fast = loop("i", PATCH_WIDTH * channels, Store(patch, (first + COUNTER,), self.copied(at_once)))
         column = [Let("column", clamp(LEFT + DX, WIDTH))]
         if self.gather.window.border == "zero":
             same = apply("equal", row, TOP + DY) & apply("equal", name("column"), LEFT + DX)
@@ -283,18 +281,22 @@ class Tiled(Nest):
         for let in self.statements(group, self.read, self.element.lanes):
             lines.append(let)
             if int(let.name[1:]) in kept:
-                lines.append(Store(f"v{let.name[1:]}", (I,), name(let.name, self.element)))
-        return [self.span(group), *map(self.array, kept), loop("i", count if self.wide else count * LANES, *lines)]
+                lines.append(Store(f"v{let.name[1:]}", (COUNTER,), name(let.name, self.element)))
+        return [
+            self.span(group),
+            *map(self.array, kept),
+            loop("i", count if self.wide else count * LANES, *lines),
+        ]
 
     def read(self, index: int) -> Expr:
         """Return element `i` of another group's value."""
         node = self.program.nodes[index]
         if node.op != "parameter":
-            return load(f"v{index}", I, kind=self.element)
+            return load(f"v{index}", COUNTER, kind=self.element)
         total, offset = self.blocks(node.type.shape[0]).total, self.offset(node["name"])
         if self.wide:
-            return weight(offset // self.lanes + I % total, self.vector)
-        return weight(offset + I % (total * LANES))
+            return weight(offset // self.lanes + COUNTER % total, self.vector)
+        return weight(offset + COUNTER % (total * LANES))
 
     def fuses(self, index: int) -> bool:
         """Return whether this is a product that one sum reads: compilers fuse what one expression holds."""
@@ -319,7 +321,11 @@ class Tiled(Nest):
         else:
             products = self.layer(blocks, first, node.args[0], n_in)
         ends = [
-            Store(f"v{index}", (P * blocks.total + at + j,), self.ended(load("sum", P, const(j), kind=self.sum_type)))
+            Store(
+                f"v{index}",
+                (P * blocks.total + at + j,),
+                self.ended(load("sum", P, const(j), kind=self.sum_type)),
+            )
             for j in range(blocks.vectors)
         ]
         body = (*sums, self.each_pixel(*starts), *products, self.each_pixel(*ends))
@@ -332,7 +338,7 @@ class Tiled(Nest):
 
     def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
         """Return the products of a layer's values."""
-        value = load(f"v{source}", P * self.total(source) * LANES + I)
+        value = load(f"v{source}", P * self.total(source) * LANES + COUNTER)
         return [self.multiplied(blocks, const(numbers), first, value, "sum")]
 
     @property
@@ -356,25 +362,31 @@ class Tiled(Nest):
         for image in self.gather.images:
             inputs = self.gather.columns * image.channels
             at = first + (DY * inputs + rows) * blocks.vectors
-            value = load(f"patch_{image.name}", (DY * PATCH_WIDTH + P) * image.channels + I)
+            value = load(f"patch_{image.name}", (DY * PATCH_WIDTH + P) * image.channels + COUNTER)
             sums = "part" if split else "sum"
             lines: list[Statement] = [self.multiplied(blocks, self.columns * image.channels, at, value, sums)]
             if split:
                 zero = self.each_pixel(*(Store("part", (P, const(j)), self.zero) for j in each))
                 part = [load("part", P, const(j), kind=self.vector) for j in each]
                 add = self.each_pixel(*(Store("sum", (P, const(j)), part[j], add=True) for j in each))
-                lines = [Array("part", self.vector, (PIXELS, blocks.vectors), register=True), zero, *lines, add]
+                lines = [
+                    Array("part", self.vector, (PIXELS, blocks.vectors), register=True),
+                    zero,
+                    *lines,
+                    add,
+                ]
             found.append(loop("dy", self.rows, *lines))
             rows += self.gather.rows * inputs
         return found
 
     def multiplied(self, blocks: Blocks, inputs: Expr, first: Expr, value: Expr, sums: str) -> Statement:
-        """Return the loop over inputs: each one's row of a block of weights, times its value at each pixel."""
+        """Return the loop over inputs: the row of weights of each, times its value at each pixel."""
         each = range(blocks.vectors)
-        row = [Let(f"w{j}", weight(first + I * blocks.vectors + j, self.vector)) for j in each]
+        row = [Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.vector)) for j in each]
         factor = splat(name("value", FLOAT), self.lanes)
         products = [
-            Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True) for j in each
+            Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True)
+            for j in each
         ]
         return loop("i", inputs, *row, self.each_pixel(Let("value", value), *products))
 
@@ -386,6 +398,6 @@ class Tiled(Nest):
         """Return the statements that write the output of each pixel that lies in the image."""
         output, index = self.program.outputs[0]
         channels = self.program.nodes[index].type.shape[0]
-        value = load(f"v{index}", P * self.total(index) * LANES + I)
-        write = loop("i", channels, Store(RESULT, (Y, X + P, I), value))
+        value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
+        write = loop("i", channels, Store(RESULT, (Y, X + P, COUNTER), value))
         return Comment(f"output {output}"), For("p", PIXELS, (write,), until=X + P < WIDTH)

@@ -16,8 +16,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
 from ...compiler.schedules.common import kernel_gather
-from ...compiler.schedules.schedules import Dot
-from ...compiler.schedules.schedules import PLAIN
+from ...compiler.schedules.schedules import PLAIN, Dot
 from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model

@@ -15,11 +15,11 @@ from wamnet.compiler.core.enclosure import round_up
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.proof import bounds, spectra
 from wamnet.compiler.kernel.kernel import FLOAT, Let, parts
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.proof import bounds, spectra
 from wamnet.compiler.schedules import fft, fourier, schedules
 from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
@@ -394,7 +394,9 @@ def test_operations_are_those_of_the_text() -> None:
     function = fft.codelet("f", 32, 32, 1, FLOAT.of(16))
     computed = [let.value for let in function.body if isinstance(let, Let)]
     operations = ("add", "subtract", "multiply")
-    assert sum(part.op in operations for value in computed if value.op != "load" for part in parts(value)) == 456
+    assert (
+        sum(part.op in operations for value in computed if value.op != "load" for part in parts(value)) == 456
+    )
     one, spectra = FFT32.operations(emitted(paper()))
     assert one == 864 * 2
     assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

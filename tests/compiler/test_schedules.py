@@ -211,7 +211,9 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
 
 
 @given(
-    schedule=st.sampled_from([s for t in ("opencl", "c") for s in target_named(t).schedules if type(s) is Tile]),
+    schedule=st.sampled_from(
+        [s for t in ("opencl", "c") for s in target_named(t).schedules if type(s) is Tile]
+    ),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),
     hidden=st.integers(1, 70),
@@ -248,13 +250,17 @@ def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, h
     assert np.count_nonzero(packed) == used
 
 
-@pytest.mark.parametrize(("target", "array"), [("opencl", r"float number|float16 v\d+"), ("c", r"float v\d+")])
+@pytest.mark.parametrize(
+    ("target", "array"), [("opencl", r"float number|float16 v\d+"), ("c", r"float v\d+")]
+)
 def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
     artifact = compile_program(small(), target, "ieee", "tile16")
     sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
     arrays = re.findall(rf"(float patch_\w+|{array})\[([^]]+)\];", artifact.source)
     counts = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for _, text in arrays]
-    numbers = [16 * n if kind.startswith("float16") else n for (kind, _), n in zip(arrays, counts, strict=True)]
+    numbers = [
+        16 * n if kind.startswith("float16") else n for (kind, _), n in zip(arrays, counts, strict=True)
+    ]
     assert len(numbers) == 2 + 4
     assert artifact.manifest["private_bytes"] == 4 * sum(numbers)
 

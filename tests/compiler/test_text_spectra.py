@@ -10,13 +10,13 @@ from texts import NAME, changed, parts, unnoticed
 from wamnet.compiler import artifact, targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.proof import checker, spectra_checker
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
-from wamnet.compiler.languages.c import C
-from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.schedules import schedules
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window

@@ -13,13 +13,13 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Program, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.plan import analysed, plan_program
-from wamnet.compiler.proof import whole
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.cuda import CUDA
 from wamnet.compiler.languages.glsl_buffers import Vulkan
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.wgsl import WGSL
+from wamnet.compiler.plan import analysed, plan_program
+from wamnet.compiler.proof import whole
 from wamnet.compiler.schedules.schedules import Dot, GroupDot
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.network import siren

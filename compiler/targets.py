@@ -163,7 +163,7 @@ def processor(dialect: Dialect) -> Target:
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
 """A weight in a block of `vec4`, as std140 wants it; one in a table, or in memory of numbers."""
 
-HOMES = {
+HOMES: Mapping[str, tuple[str, Mapping[type[Dialect], str]]] = {
     TABLE: ("are in the source", dict.fromkeys((Metal, CUDA, OpenCL, C, GodotDenoise), PLAIN_INDEX)),
     BLOCK: (
         "are a uniform block, or constant memory, of vectors of 4",

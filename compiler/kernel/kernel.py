@@ -245,6 +245,11 @@ class Kernel:
     weights: Type = FLOAT
     tables: tuple[tuple[str, Any], ...] = ()
 
+    @property
+    def shared(self) -> tuple[Array, ...]:
+        """Return the arrays that a group shares."""
+        return tuple(s for s in self.body if isinstance(s, Array) and s.space == "group")
+
 
 # ---- making expressions ----------------------------------------------------------------------------------
 

@@ -134,7 +134,7 @@ class CUDA(Arguments):
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of values, or of one in all lanes."""
         made = "wamnet_made" if kind == "wamnet_vector" else f"make_{kind}"
-        return f"{made}({', '.join(values if len(values) > 1 else values * 4)})"
+        return f"{made}({', '.join(values if len(values) > 1 else [*values] * 4)})"
 
     def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
         """Return the first lines of a function of values."""

@@ -283,11 +283,13 @@ class Dialect:
 
     def group_memory(self, kernel: Kernel) -> list[str]:
         """Return the declarations of memory that a group shares."""
-        arrays = [s for s in kernel.body if getattr(s, "space", "") == "group"]
-        return [
-            self.shared_array.format(kind=self.scalars[a.type.dtype], name=a.name, count=a.sizes[0].value)
-            for a in arrays
-        ]
+        found = []
+        for array in kernel.shared:
+            (size,) = array.sizes
+            count = size if isinstance(size, int) else size.value
+            kind = self.scalars[array.type.dtype]
+            found.append(self.shared_array.format(kind=kind, name=array.name, count=count))
+        return found
 
     def item_place(self) -> list[str]:
         """Return the declarations of where an item is in its group, and of its first pixel."""

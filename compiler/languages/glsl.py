@@ -135,7 +135,7 @@ class GLSL(Dialect):
         ),
     }
     max_output_channels = 4 * MOST_RESULTS
-    channels_per_result = 4
+    channels_per_result: int | None = 4
     planes_per_buffer = 4
     max_planes = 4 * MOST_RESULTS
     max_images = MOST_RESULTS  # of GLSL ES too: most devices draw into more buffers than it promises

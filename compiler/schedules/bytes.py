@@ -4,8 +4,7 @@
    multiplies four pairs and adds the products to a sum of 32 bits (expression `dot4`).
 2. On processors [`Bytes`] the tile is that of tile.py. Values are n + 128, from 1 to 255, since the
    instruction takes one factor without a sign; a row of weights begins its sums at -128 times the sum of its
-   weights: then they are those of n. A row of taps is filled up to fours with weights of 0; what is read
-   beyond does not count.
+   weights: then they are those of n. A row of taps is filled up to fours with weights of 0.
 3. On graphics processors [`GroupBytes`] the tile is that of group.py. Both factors have a sign. A word of the
    tile holds four channels of a pixel, counted over all images; a word of a hidden layer is a vector of four.
 

@@ -370,7 +370,7 @@ class Spectral(Tiled):
         whole = names
         if split:
             whole = ("whole_real", "whole_imaginary")
-            adds = [
+            adds: list[Statement] = [
                 Store(total, (T, const(v)), load(part, T, const(v), kind=self.vector), add=True)
                 for total, part in zip(whole, names, strict=True)
                 for v in range(2)

@@ -87,7 +87,8 @@ class Inlined(Straight):
     def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[Statement]:
         """Return the products of all taps: a partial sum for each row of taps of an image."""
         gather, split = self.gather, is_split(self.gather)
-        part, found = f"part{index}", []
+        part = f"part{index}"
+        found: list[Statement] = []
         for group in gather.groups:
             for row in range(gather.rows):
                 lines: list[Statement] = []

@@ -1,8 +1,8 @@
 """The packed schedule: four weights per read; values are arrays of vectors of four.
 
 The weights are stored as a row of neurons for each input, filled up to a multiple of four. The source is
-short, so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a
-graphics processor).
+short, so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a graphics
+processor).
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ class Packed(Plainly):
         count, bias, source = self.vectors(index), node.get("bias"), self.program.nodes[node.args[0]]
         v, first = f"v{index}", self.offset(node["weight"]) // 4
         start = weight(self.offset(bias) // 4 + J, VECTOR) if bias else ZERO
-        found = [self.mapped(index, node), self.array(index), loop("j", count, Store(v, (J,), start))]
+        starts = loop("j", count, Store(v, (J,), start))
+        found: list[Statement] = [self.mapped(index, node), self.array(index), starts]
         if source.op == "input":
             return [*found, *self.of_window(index, count, first)]
         whole, rest = divmod(source.type.shape[0], 4)
@@ -103,11 +104,10 @@ class Packed(Plainly):
             lines = self.products(
                 v, first, COUNTER * 4, load(f"v{node.args[0]}", COUNTER, kind=VECTOR), 4, count
             )
-        found.append(loop("i", whole, lines))
-
+            found.append(loop("i", whole, lines))
         if rest:
             last = load(f"v{node.args[0]}", const(whole), kind=VECTOR)
-        found.append(self.products(v, first, const(4 * whole), last, rest, count))
+            found.append(self.products(v, first, const(4 * whole), last, rest, count))
         return found
 
     def of_window(self, index: int, count: int, first: int) -> list[Statement]:
@@ -138,7 +138,7 @@ class Packed(Plainly):
 
     def products(self, sums: str, first: int, row: Expr, value: Expr, inputs: int, count: int) -> Statement:
         """Return the additions of rows of weights times each component of a value."""
-        lines = []
+        lines: list[Statement] = []
         for c in range(inputs):
             factor = value.lane(c) if value.type.lanes > 1 else value
             product = apply("multiply", weight(first + (row + c) * count + J, VECTOR), splat(factor, 4))

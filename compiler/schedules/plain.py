@@ -96,7 +96,8 @@ class Plainly(Nest):
         n_out, j, v = node.type.shape[0], name("j"), f"v{index}"
         first, bias, source = self.offset(node["weight"]), node.get("bias"), self.program.nodes[node.args[0]]
         start = weight(self.offset(bias) + j) if bias else const(0.0)
-        found = [self.mapped(index, node), self.array(index), loop("j", n_out, Store(v, (j,), start))]
+        starts = loop("j", n_out, Store(v, (j,), start))
+        found: list[Statement] = [self.mapped(index, node), self.array(index), starts]
 
         def accumulated(sums: str, row: Expr) -> Statement:
             """Return the loop that adds `value` times one row of weights to all neurons' sums."""
@@ -122,7 +123,7 @@ class Plainly(Nest):
 
         `body` takes the index into the window; `before` and `after` surround an image's row of taps.
         """
-        found = []
+        found: list[Statement] = []
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
             channels = []

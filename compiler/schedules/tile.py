@@ -150,7 +150,8 @@ def stored(program: Program, parameter: str, lanes: int, vectors: int) -> NDArra
     filled[:, : rows.shape[1]] = rows
     if program.parameters[parameter].ndim == 1:
         return filled[0]
-    return np.ascontiguousarray(filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2))
+    found: NDArray[np.float32] = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
+    return np.ascontiguousarray(found)
 
 
 def placed(arrays: Mapping[str, NDArray[np.float32]]) -> Mapping[str, Slot]:
@@ -334,7 +335,7 @@ class Tiled(Nest):
 
     def inputs(self, node: Node) -> int:
         """Return the rows of weights of an affine map."""
-        return self.program.parameters[str(node["weight"])].shape[1]
+        return int(self.program.parameters[str(node["weight"])].shape[1])
 
     def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
         """Return the products of a layer's values."""
@@ -357,7 +358,8 @@ class Tiled(Nest):
 
     def windowed(self, blocks: Blocks, first: Expr) -> list[Statement]:
         """Return the sums over the window: a partial sum for each image and row, which stays in registers."""
-        split, found, rows = is_split(self.gather), [], 0
+        found: list[Statement] = []
+        split, rows = is_split(self.gather), 0
         each = range(blocks.vectors)
         for image in self.gather.images:
             inputs = self.gather.columns * image.channels

@@ -1,8 +1,8 @@
 """The packed schedule: four weights per read; values are arrays of vectors of four.
 
 The weights are stored as a row of neurons for each input, filled up to a multiple of four. The source is
-short, so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a graphics
-processor).
+short, so that it compiles at once however many weights there are (spec/webpage.md: in a browser without a
+graphics processor).
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ..models.writing import making_parents, write_together
 from .core.ir import Image, Program
-from .languages import interface
-from .languages.interface import Interface
+from .kernel import interface
+from .kernel.interface import Interface
 
 if TYPE_CHECKING:
     from .plan import Plan

@@ -13,6 +13,7 @@ from typing import Any
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
+from .kernel.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages import opencl_path, planes
 from .languages.c import C
 from .languages.cuda import CUDA
@@ -21,7 +22,6 @@ from .languages.glsl import GLSL, GLSLCompute
 from .languages.glsl_buffers import Compute, Vulkan
 from .languages.glsl_es import GLSLES
 from .languages.hosts import GodotDenoise, ShadertoyDenoise
-from .languages.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages.metal import Metal
 from .languages.opencl import OpenCL
 from .languages.wgsl import WGSL

@@ -288,7 +288,7 @@ def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes
 
 def chosen_variant(variant: str | None, rank: int) -> str:
     """Return the variant of a network that two options name; the compiler is imported only for one."""
-    from ...compiler.languages.interface import FULL
+    from ...compiler.kernel.interface import FULL
 
     if not rank:
         return variant or FULL

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from ..languages.interface import Interface
+from .interface import Interface
 
 Index = tuple["Expr", ...]
 
@@ -254,7 +254,10 @@ class Kernel:
 # ---- making expressions ----------------------------------------------------------------------------------
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
+"""Operations on numbers that give truth."""
+
 LOGICAL = ("logical_and", "logical_or", "logical_not")
+"""Operations on truth."""
 
 INTEGERS: Mapping[str, Callable[[int, int], int]] = {
     "add": lambda a, b: a + b,

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ops import OPS
-from ..languages.interface import IMAGE, RESULT, WEIGHTS
 from .domain import STORED, Domain, computed
+from .interface import IMAGE, RESULT, WEIGHTS
 from .kernel import (
     FLOAT,
     INTEGERS,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import ir
 from ..core.ops import OPS, TypeRuleError
-from ..languages.interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
+from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .kernel import (
     BOOL,
     BYTE,

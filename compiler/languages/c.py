@@ -14,10 +14,10 @@ import re
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from ..kernel.kernel import Kernel
 from .dialect import Dialect, Parts
 from .instructions import C_TILE
-from .interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 PRAGMAS = """\

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import CUDA_SINE
+from ..kernel.interface import DENOISE, ENCODE, PATH, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .dialect import Dialect, Parts
 from .instructions import CUDA_GROUP
-from .interface import DENOISE, ENCODE, PATH, Interface
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 CLAMP = """\

@@ -29,7 +29,7 @@ from ..core.profiles import SineContract
 if TYPE_CHECKING:
     from ..kernel.kernel import Kernel, Type
 
-from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
+from ..kernel.interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""

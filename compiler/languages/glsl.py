@@ -9,10 +9,7 @@ planes a buffer, or one buffer for each image of an encoding.
 from __future__ import annotations
 
 from ..core.profiles import SineContract
-from ..kernel.kernel import Kernel, values, walk
-from ..kernel.kernel import parts as inside
-from .dialect import Dialect, Parts
-from .interface import (
+from ..kernel.interface import (
     BLOCK,
     DENOISE,
     ENCODE,
@@ -24,6 +21,9 @@ from .interface import (
     WRITE,
     Interface,
 )
+from ..kernel.kernel import Kernel, values, walk
+from ..kernel.kernel import parts as inside
+from .dialect import Dialect, Parts
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""

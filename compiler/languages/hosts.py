@@ -12,10 +12,10 @@ the tab that is shown turns the picture.
 from __future__ import annotations
 
 from ..core.profiles import SineContract
+from ..kernel.interface import DENOISE, WEIGHTS, Interface
 from .dialect import Parts
 from .glsl import GLSL
 from .glsl_es import ASSUMES, GLSLES
-from .interface import DENOISE, WEIGHTS, Interface
 
 CHANNELS = 4
 """Inputs of a Shadertoy tab, iChannel0 to iChannel3, and buffers that feed them: A to D."""

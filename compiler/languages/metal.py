@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
 from .dialect import Parts
 from .glsl_buffers import NUMBERS_SAID
-from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from .openings import Buffers
 
 ASSUMES = (

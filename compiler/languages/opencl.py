@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.profiles import OPENCL_SINE
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
 from .instructions import OPENCL_GROUP, OPENCL_TILE
-from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
 
 BUILTINS = """\

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..kernel.interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Type
 from .dialect import Dialect, Parts
-from .interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 
 IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
 """What images are."""

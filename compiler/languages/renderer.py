@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.lines import Lines
+from ..kernel.interface import DENOISE, IMAGE, READ, RESULT, TABLE, WEIGHTS, Interface
+from ..kernel.interface import Array as Memory
 from ..kernel.kernel import (
     FLOAT,
     INT,
@@ -46,8 +48,6 @@ from ..kernel.kernel import (
     walk,
 )
 from .dialect import Dialect, Parts
-from .interface import DENOISE, IMAGE, READ, RESULT, TABLE, WEIGHTS, Interface
-from .interface import Array as Memory
 
 BINDING: Mapping[str, int] = {
     "||": 2, "&&": 3, "|": 4, "^": 5, "&": 6, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8,

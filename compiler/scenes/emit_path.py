@@ -35,9 +35,9 @@ from ..core.ir import Image, Node, Program, Type, attributes
 from ..core.lines import Lines
 from ..core.loops import Loop, Part, Walk, is_walk, loops
 from ..core.weights import tables
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import ENCODE
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import ENCODE
 from ..languages.renderer import framed
 from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, Values, kinds, names
 

@@ -26,9 +26,9 @@ from ..core import ir, profiles
 from ..core.ir import Image, Program
 from ..core.lower import images_of
 from ..core.passes import pipeline
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import Interface
 from ..languages.renderer import framed
 from ..plan import sine_contract
 from ..proof import bounds

@@ -30,8 +30,8 @@ from ..core.ir import Image
 from ..core.loops import Forms
 from ..core.passes import pipeline
 from ..core.profiles import Profile
-from ..languages import interface
-from ..languages.interface import Interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.openings import IMAGES
 from ..plan import sine_contract
 from ..schedules.schedules import PRINTED

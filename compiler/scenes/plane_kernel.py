@@ -16,9 +16,9 @@ from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..core import ir, profiles
 from ..core.ir import Program
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import Interface
 from ..languages.renderer import framed
 from ..schedules.schedules import PRINTED
 from ..targets import target_named

@@ -25,9 +25,9 @@ from ...refimpl.network.dataset import Normalization
 from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import GUIDE, LIGHT, RESULT, SMOOTH
 from ..languages.dialect import Dialect
-from ..languages.interface import GUIDE, LIGHT, RESULT, SMOOTH
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure

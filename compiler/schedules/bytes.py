@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..core import weights
 from ..core.ir import Image, Node, Program
+from ..kernel.interface import WEIGHTS
 from ..kernel.kernel import (
     BYTE,
     INT,
@@ -37,7 +38,6 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..languages.interface import WEIGHTS
 from ..proof import whole
 from .common import kernel_gather, loop, weight
 from .group import MOST_CHANNELS, Group

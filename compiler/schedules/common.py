@@ -14,6 +14,7 @@ from ...refimpl.errors import CompileError
 from ..core.ir import Gather, Image, Node, Program, users
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
+from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.kernel import (
     FLOAT,
     INT,
@@ -34,7 +35,6 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..languages.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
 
 X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
 """An item's first pixel, and the size of the images."""

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ..core.ir import Node, Program
 from ..core.weights import Slot
+from ..kernel.interface import RESULT
 from ..kernel.kernel import (
     FLOAT,
     Array,
@@ -49,7 +50,6 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..languages.interface import RESULT
 from . import fourier
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
 from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, placed, readers_of_window
@@ -61,6 +61,8 @@ POINTS, OUT, TILES, PAIRS, INPUTS, NEURONS, STRIDE = map(
     name, ("POINTS", "OUT", "TILES", "PAIRS", "INPUTS", "NEURONS", "STRIDE")
 )
 OF_BLOCK = name("BLOCK")
+"""Pairs of channels whose products are added up by themselves."""
+
 TILE, TILE_X, TILE_Y, K, F, G, Q, T, APART, LINE = map(
     name, ("tile", "tile_x", "tile_y", "k", "f", "g", "q", "t", "apart", "line")
 )

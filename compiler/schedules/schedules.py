@@ -25,11 +25,11 @@ from ..core import ir, weights
 from ..core.ir import Gather, Program
 from ..core.profiles import SineContract
 from ..core.weights import Slot
+from ..kernel.interface import PLAIN as PLAIN
 from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes, shared_bytes
 from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
-from ..languages.interface import PLAIN as PLAIN
 from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure

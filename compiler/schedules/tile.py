@@ -25,6 +25,7 @@ from ..core import weights
 from ..core.ir import DTYPES, Image, Node, Program
 from ..core.sums import is_split
 from ..core.weights import Slot
+from ..kernel.interface import IMAGE, RESULT
 from ..kernel.kernel import (
     FLOAT,
     Array,
@@ -46,7 +47,6 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..languages.interface import IMAGE, RESULT
 from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, groups_of, kernel_gather, loop, output_channels, weight
 
 PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
@@ -150,8 +150,9 @@ def stored(program: Program, parameter: str, lanes: int, vectors: int) -> NDArra
     filled[:, : rows.shape[1]] = rows
     if program.parameters[parameter].ndim == 1:
         return filled[0]
-    found: NDArray[np.float32] = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
-    return np.ascontiguousarray(found)
+    ordered = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
+    found: NDArray[np.float32] = np.ascontiguousarray(ordered)
+    return found
 
 
 def placed(arrays: Mapping[str, NDArray[np.float32]]) -> Mapping[str, Slot]:

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import (
+from ...compiler.kernel.interface import (
     DENOISE,
     ENCODE,
     FOLLOW,

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import (
+from ...compiler.kernel.interface import (
     DENOISE,
     ENCODE,
     IMAGE,
@@ -81,7 +81,7 @@ class Executor(ABC):
     `byte_schedule`: that of networks of integers, where the device multiplies bytes. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
-    [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
+    [compiler/kernel/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
     `interprets`: it runs programs as they are, without kernels. `software`: a graphics library's own renderer
     on the processor, slower than the reference.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import DENOISE, UNSIGNED, Interface
+from ...compiler.kernel.interface import DENOISE, UNSIGNED, Interface
 from ...refimpl.errors import InputError
 
 if TYPE_CHECKING:

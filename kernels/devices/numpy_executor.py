@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS
-from ...compiler.languages.interface import SUMS as PATH_SUMS
+from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS
+from ...compiler.kernel.interface import SUMS as PATH_SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms

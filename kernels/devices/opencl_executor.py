@@ -20,7 +20,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
+from ...compiler.kernel.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor

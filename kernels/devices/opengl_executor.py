@@ -19,8 +19,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.kernel.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa

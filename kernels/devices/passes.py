@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
+from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
 from .executor import Executor

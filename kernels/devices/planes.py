@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import GUIDES, IMAGE, LIGHT, PAST, RESULT
+from ...compiler.kernel.interface import GUIDES, IMAGE, LIGHT, PAST, RESULT
 from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
 from ...refimpl.network.dataset import known

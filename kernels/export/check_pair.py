@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...compiler.core.interpret import interpret
 from ...compiler.core.ir import Gather, Program
 from ...compiler.core.lower import lower
-from ...compiler.languages.interface import SCENE_NUMBERS
+from ...compiler.kernel.interface import SCENE_NUMBERS
 from ...compiler.plan import Plan, plan_program
 from ...compiler.scenes import emit_path
 from ...compiler.scenes.lower_encode import layers_of

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.kernel.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...compiler.languages.c import whole
-from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
 from ..devices.kernel import Kernel
 from . import tools

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import SCENE_NUMBERS
+from ...compiler.kernel.interface import SCENE_NUMBERS
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import numbers_of
 from ...compiler.scenes.scene_inputs import SceneInputs, varying

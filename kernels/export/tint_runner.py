@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK
+from ...compiler.kernel.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.kernel import Kernel
 from .buffer_runner import BufferRunner, Launch

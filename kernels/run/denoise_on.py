@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import schedule_text
-from ...compiler.languages.interface import FULL, PLAIN
+from ...compiler.kernel.interface import FULL, PLAIN
 from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization

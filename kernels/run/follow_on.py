@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import CAMERAS, FIRST, IMAGE, MOTIONS, PAST
+from ...compiler.kernel.interface import CAMERAS, FIRST, IMAGE, MOTIONS, PAST
 from ...compiler.scenes.emit_path import planes
 from ...compiler.scenes.history_kernel import compile_history
 from ...refimpl import vectors

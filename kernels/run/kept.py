@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import Array, Interface
+from ...compiler.kernel.interface import Array, Interface
 from .. import cache
 from ..devices.kernel import Kernel
 

@@ -11,8 +11,8 @@ import pytest
 
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.kernel.interface import DENOISE, ENCODE, PATH
 from wamnet.compiler.languages.c import C
-from wamnet.compiler.languages.interface import DENOISE, ENCODE, PATH
 from wamnet.compiler.languages.openings import Arguments
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene

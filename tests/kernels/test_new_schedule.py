@@ -10,8 +10,8 @@ import pytest
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import weights
+from wamnet.compiler.kernel.interface import WEIGHTS
 from wamnet.compiler.kernel.kernel import load, rewritten
-from wamnet.compiler.languages.interface import WEIGHTS
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.schedules import Plain
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.core.ir import Image
 from wamnet.compiler.core.weights import pack
-from wamnet.compiler.kernel.canonical import canonical
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     FLOAT,
@@ -34,16 +34,16 @@ from wamnet.compiler.kernel.kernel import (
     load,
     name,
 )
-from wamnet.compiler.kernel.parse import Unread, parse
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.cuda import CUDA
 from wamnet.compiler.languages.glsl import GLSL
 from wamnet.compiler.languages.glsl_buffers import Vulkan
-from wamnet.compiler.languages.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.languages.metal import Metal
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.languages.wgsl import WGSL
+from wamnet.compiler.parsing.canonical import canonical
+from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.tile import all_stored, tile

@@ -16,6 +16,7 @@ from wamnet.compiler.core.ir import Gather, Image
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.weights import pack
 from wamnet.compiler.kernel.domain import Domain
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     BYTE,
@@ -44,7 +45,6 @@ from wamnet.compiler.kernel.kernel import (
 from wamnet.compiler.kernel.run import Runner, run
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.languages.c import C
-from wamnet.compiler.languages.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.schedules.bytes import bytes_stored, group_of_bytes, tile_of_bytes, words_stored

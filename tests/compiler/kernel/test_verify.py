@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.ir import Image
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     FLOAT,
@@ -33,7 +34,6 @@ from wamnet.compiler.kernel.kernel import (
     splat,
 )
 from wamnet.compiler.kernel.verify import KernelError, verify
-from wamnet.compiler.languages.interface import BUFFER, RESULT, denoiser
 
 X, Y, TURN = map(name, ("x", "y", "i"))
 V, FOUR = Array("v", FLOAT, (2,)), FLOAT.of(4)

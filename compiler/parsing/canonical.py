@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..languages.interface import DENOISE, RESULT, Interface
-from .kernel import (
+from ..kernel.interface import DENOISE, RESULT, Interface
+from ..kernel.kernel import (
     INT,
     Array,
     Block,

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .kernel import BOOL, FLOAT, INT, Type
+from ..kernel.kernel import BOOL, FLOAT, INT, Type
 
 TOKEN = re.compile(
     r"(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"

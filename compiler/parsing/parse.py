@@ -17,11 +17,8 @@ from typing import Any
 import numpy as np
 
 from ..core.ir import Image
-from ..languages.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
-from .canonical import canonical, terms
-from .frames import frame, lines_of
-from .grammar import BINARY, CONSTANT, LANGUAGES, PRODUCTS, TOKEN, Language
-from .kernel import (
+from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
+from ..kernel.kernel import (
     FLOAT,
     INT,
     Array,
@@ -41,7 +38,10 @@ from .kernel import (
     load,
     name,
 )
-from .verify import KernelError, verify
+from ..kernel.verify import KernelError, verify
+from .canonical import canonical, terms
+from .frames import frame, lines_of
+from .grammar import BINARY, CONSTANT, LANGUAGES, PRODUCTS, TOKEN, Language
 
 
 class Unread(Exception):

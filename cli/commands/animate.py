@@ -94,17 +94,18 @@ Rays = Annotated[
         show_default="equivalent to those in training",
     ),
 ]
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o", "--output", metavar="PATH", help="Output: animation (.mp4, .gif) or folder of images."
+    ),
+]
 
 
 def animate(
     model: options.ModelFile,
     scene: SceneToShow = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="PATH", help="Output: animation (.mp4, .gif) or folder of images."
-        ),
-    ] = Path("animation"),
+    output: Output = Path("animation"),
     start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
     seconds: Annotated[float, typer.Option(help="Duration in seconds; minicubes rotate in 8 s.")] = 8.0,
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 10.0,

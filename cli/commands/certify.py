@@ -32,6 +32,14 @@ ASSUMED = (
 )
 """What a verified source rests on."""
 
+Source = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Check this source file instead, for example one edited by hand.",
+    ),
+]
+
 
 def certify(
     file: Annotated[
@@ -42,13 +50,7 @@ def certify(
             show_default=False,
         ),
     ],
-    source: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Check this source file instead, for example one edited by hand.",
-        ),
-    ] = None,
+    source: Source = None,
     text: Annotated[
         bool, typer.Option(help="Also check that the kernel's source computes the certified program.")
     ] = True,

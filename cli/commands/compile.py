@@ -55,6 +55,11 @@ HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
 
+Lanes = Annotated[
+    int | None,
+    typer.Option(help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"),
+]
+
 
 def compile_model(
     model: Annotated[
@@ -79,12 +84,7 @@ def compile_model(
     sampler: Annotated[
         Sampler | None, typer.Option(help="Sampler (scenes only).", show_default="pcg4d")
     ] = None,
-    lanes: Annotated[
-        int | None,
-        typer.Option(
-            help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
-        ),
-    ] = None,
+    lanes: Lanes = None,
     schedule: options.Schedule = None,
     here: options.Here = False,
     variant: options.Variant = None,

@@ -144,6 +144,12 @@ BlenderProgram = Annotated[
         show_default="the bpy package, or blender on the PATH",
     ),
 ]
+TestFrames = Annotated[
+    int, typer.Option(help="Number of test frames, sampled separately within the same ranges.")
+]
+Duration = Annotated[
+    float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
+]
 
 OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
 """Options that mean nothing without --from-blender."""
@@ -163,9 +169,7 @@ def dataset(
     scene: SceneOrNone = None,
     output: Output = Path("dataset"),
     frames: Annotated[int, typer.Option(help="Number of training frames.")] = 8,
-    test: Annotated[
-        int, typer.Option(help="Number of test frames, sampled separately within the same ranges.")
-    ] = 2,
+    test: TestFrames = 2,
     outside: Outside = 0,
     size: Annotated[int, typer.Option(help="Width and height in pixels.")] = 64,
     spp: Annotated[int, typer.Option(help="Paths per pixel of each target; noisy frames have 1.")] = 64,
@@ -173,9 +177,7 @@ def dataset(
     feature_spp: options.FeatureSpp = 0,
     seen: options.Seen = False,
     start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
-    seconds: Annotated[
-        float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
-    ] = 8.0,
+    seconds: Duration = 8.0,
     arc: Arc = 0.0,
     yaw: Yaw = "0:0",
     pitch: Pitch = "0:0",
@@ -205,8 +207,6 @@ def dataset(
     After an interruption, the same command resumes, and replaces damaged files. The files do not depend
     on the number of workers.
     """
-    from ...models.data.frame_plan import plan
-
     if only_check:
         check(output, scene)
         return
@@ -221,8 +221,7 @@ def dataset(
     request = _request(command, named, (*numbers, *ways), limits, (seen, power, before))
     _check_workers(workers, scheduler)
     request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
-    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
-        make(output, request, plan(request), workers, scheduler)
+    _make_from_scene(output, request, workers, scheduler)
 
 
 def _request(
@@ -244,6 +243,14 @@ def _request(
     factors = None if power is None else options.parse_limits("--power", power)
     request = Request(source.name, source.parameters, *numbers, *ranges)
     return replace(request, seen=seen, power=factors, before=before, still=source.still)
+
+
+def _make_from_scene(folder: Path, request: Request, workers: int | None, scheduler: str | None) -> None:
+    """Make the data set of a request, and say how to resume after an interrupt."""
+    from ...models.data.frame_plan import plan
+
+    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
+        make(folder, request, plan(request), workers, scheduler)
 
 
 def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:

@@ -72,6 +72,16 @@ ViewLayer = Annotated[
         metavar="NAME", help="View, part or view layer of FRAME to denoise.", show_default="the first view"
     ),
 ]
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
+        "folder or a pattern with %04d for the frame number.",
+    ),
+]
 
 
 @dataclass
@@ -140,16 +150,7 @@ def denoise(
             show_default=False,
         ),
     ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
-            "folder or a pattern with %04d for the frame number.",
-        ),
-    ] = Path("denoised.png"),
+    output: Output = Path("denoised.png"),
     executor: options.Executor = ExecutorChoice.auto,
     profile: options.Profile = "ieee",
     schedule: options.Schedule = None,

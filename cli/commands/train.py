@@ -110,6 +110,14 @@ Restart = Annotated[
 Integers = Annotated[
     bool, typer.Option("--whole", help="Short for --variant whole8: an 8-bit integer network.")
 ]
+PresetName = Annotated[
+    Preset | None,
+    typer.Option(
+        help="Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
+        "sky (under an environment).",
+        show_default="best",
+    ),
+]
 
 
 def train(
@@ -119,14 +127,7 @@ def train(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
-    preset: Annotated[
-        Preset | None,
-        typer.Option(
-            help="Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
-            "sky (under an environment).",
-            show_default="best",
-        ),
-    ] = None,
+    preset: PresetName = None,
     features: Annotated[
         str | None,
         typer.Option(

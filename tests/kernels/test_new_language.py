@@ -35,7 +35,7 @@ class Items(Arguments):
     item = ("item_x", "item_y")
     said = {DENOISE: "images; weights; result; width; height", PATH: "{planes}", ENCODE: "{planes}"}
     pixel, weight, store, table = C.pixel, C.weight, C.store, C.table
-    operations, magnitude, native_sine = C.operations, C.magnitude, C.native_sine
+    operations, native_sine = C.operations, C.native_sine
     max_output_channels = 2**16
 
 

@@ -36,6 +36,13 @@ wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --pe
 wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
 """Shown below the help of `wamnet bench pipeline`."""
 
+Peers = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
+    ),
+]
+
 
 def pipeline(
     scene: SceneShown = "minicubes",
@@ -59,12 +66,7 @@ def pipeline(
         ),
     ] = 0,
     repeats: Repeats = 5,
-    peers: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
-        ),
-    ] = "",
+    peers: Peers = "",
 ) -> None:
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 

@@ -172,22 +172,22 @@ def trained(device: Executor) -> Array:
 def images(devices: Callable[[str], Executor]) -> Iterator[tuple[str, Callable[[int], Values]]]:
     """Yield the name of each image, and what returns its digest."""
 
-    def row(backend: str, made: Callable[[Executor], Array]) -> Callable[[int], Values]:
+    def row(backend: str, compute: Callable[[Executor], Array]) -> Callable[[int], Values]:
         def digest(seed: int) -> Values:
             device = devices(backend)
-            return {"part": "images", "backend": device.device, "sha256": digest_of(made(device))}
+            return {"part": "images", "backend": device.device, "sha256": digest_of(compute(device))}
 
         return digest
 
     for (backend, name, variant), schedules in DENOISED.items():
         for schedule in schedules:
-            made = lambda device, given=(name, variant, schedule): denoised(device, *given)  # noqa: E731
-            yield f"image: {backend} {schedule} {name} {variant}", row(backend, made)
+            compute = lambda device, inputs=(name, variant, schedule): denoised(device, *inputs)  # noqa: E731
+            yield f"image: {backend} {schedule} {name} {variant}", row(backend, compute)
     for backend in BACKENDS:
         for scene in SCENES:
             yield f"image: {backend} path {scene}", row(backend, lambda device, s=scene: traced(device, s))
-        for role, made in {"encode": encoded, "smooth": smoothed, "history": accumulated}.items():
-            yield f"image: {backend} {role}", row(backend, made)
+        for role, compute in {"encode": encoded, "smooth": smoothed, "history": accumulated}.items():
+            yield f"image: {backend} {role}", row(backend, compute)
     yield "image: opencl training, 20 steps", row("opencl", trained)
 
 
@@ -208,16 +208,16 @@ def bounds() -> Iterator[tuple[str, Callable[[int], Values]]]:
     for model, variant in product(MODELS, VARIANTS):
         for target in {**DENOISERS, **EXPORTED}.values():
             for schedule in target.schedules:
-                given = model, target.name, schedule.name, variant
-                yield f"bound: {' '.join(given)}", lambda seed, given=given: bound(*given)
+                inputs = model, target.name, schedule.name, variant
+                yield f"bound: {' '.join(inputs)}", lambda seed, inputs=inputs: bound(*inputs)
 
 
 def bound(model: str, target: str, schedule: str, variant: str) -> Values:
     """Return the largest bound of an output, and the schedule that holds the model."""
     plan = plan_model(model_named(model), target, "ieee", schedule, variant)
     proven = plan.bound.output
-    held = NO_BOUND if proven is None else max(proven)
-    return {"part": "bounds", "schedule": plan.picked.schedule.name, "bound": held}
+    largest = NO_BOUND if proven is None else max(proven)
+    return {"part": "bounds", "schedule": plan.picked.schedule.name, "bound": largest}
 
 
 # ---- speed ------------------------------------------------------------------------------------------------
@@ -261,8 +261,8 @@ def timed(devices: Callable[[str], Executor]) -> Iterator[tuple[str, Callable[[]
     for backend, schedule, variant in TIMED:
         device = devices(backend)
         kernel = compile_plan(plan_model(model, backend, "ieee", schedule, variant))
-        given = images_of(vary(parse(variant), model).model, frame)
-        yield f"{backend} {schedule} {variant}", lambda d=device, k=kernel, g=given: one(d.run(k, g))
+        inputs = images_of(vary(parse(variant), model).model, frame)
+        yield f"{backend} {schedule} {variant}", lambda d=device, k=kernel, g=inputs: one(d.run(k, g))
     device = devices("opencl")
     kernel, part = compile_scene(device, scene, job), Part(SIZE, SIZE, 0, SIZE, 0, 1, SEED)
     yield f"opencl path, {device.lanes} lanes", lambda: one(device.trace(kernel, part))
@@ -284,10 +284,10 @@ HEADS = (
 """Of the table of bugs."""
 
 
-def rows(found: Results) -> str:
+def rows(result: Results) -> str:
     """Return the table of bugs: how many of each group and origin are detected, and by what."""
     groups: dict[tuple[str, str], list[Values]] = {}
-    for record in found.records():
+    for record in result.records():
         if record["values"]["part"] == "kills":
             values = record["values"]
             groups.setdefault((values["group"], values["origin"]), []).append(values)
@@ -336,15 +336,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             reach.trace(options.output)
         if "kills" in options.parts:
             counts = dict(zip(planting.GROUPS, options.counts, strict=True))
-            for found in kills.tried(
+            for result in kills.tried(
                 options.output, counts, 60 * options.minutes, options.seed, options.again
             ):
-                print(found.state, found.name, found.by, flush=True)
-            for name, values in kills.rows(options.output):
-                results.put(name, 0, values)
+                print(result.state, result.name, result.by, flush=True)
+            results.put_all(dict(kills.rows(options.output)))
         if "speed" in options.parts:
-            for name, values in speed(devices):
-                results.put(name, 0, values)
+            results.put_all(dict(speed(devices)))
 
 
 if __name__ == "__main__":

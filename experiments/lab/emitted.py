@@ -53,8 +53,8 @@ def sources(file: str = "") -> dict[str, str]:
 
     `file`: the module that may be changed; a schedule's makes no difference to other roles.
     """
-    found = dict(chain(denoisers(), spectra()))
-    return found if file.startswith("compiler/schedules/") else found | dict(chain(paths(), others()))
+    result = dict(chain(denoisers(), spectra()))
+    return result if file.startswith("compiler/schedules/") else result | dict(chain(paths(), others()))
 
 
 def others() -> Iterator[tuple[str, str]]:

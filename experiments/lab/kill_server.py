@@ -180,7 +180,7 @@ def _run(tests: Sequence[Sequence[str]], note: Callable[..., None]) -> None:
                 tier = tiers.get(report.nodeid, "")
                 note(test=report.nodeid, tier=tier, failed=True)
                 if tier in DECISIVE:
-                    self.session.shouldstop = "found"
+                    self.session.shouldstop = "detected"
 
     options = ["-n0", "-q", "--tb=no", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]

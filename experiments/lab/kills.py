@@ -41,10 +41,10 @@ MOST_TESTS, MOST_COMPILED, AT_ONCE = 40, 5, 2
 """Tests per bug that run a kernel or check its source, and others; tests of one file before others come."""
 
 DECISIVE = ("reader", "device")
-"""Tiers whose tests tell what a kernel computes."""
+"""Tiers whose tests detect what a kernel computes wrong."""
 
-NAME_LENGTH = 160
-"""Most letters of a bug's name in a record."""
+NAME_LENGTH, LINE_LENGTH = 160, 90
+"""Most letters of a bug's name in a record, and of a line that differs."""
 
 COMMENT = re.compile(r"^(?:/\*|//|#(?!\s*(?:define|if|el|end|undef|pragma|include|version|extension))|\*)")
 """A line of a kernel that is a comment."""
@@ -101,7 +101,7 @@ def copied(tree: Path) -> None:
 # ---- which tests ------------------------------------------------------------------------------------------
 
 
-class Known:
+class Index:
     """The tests by what they reach."""
 
     def __init__(self, tests: Sequence[Traced]) -> None:
@@ -120,14 +120,14 @@ class Known:
     def of(self, fault: Fault) -> list[Traced]:
         """Return the tests that reach a bug."""
         if fault.function:
-            found = [t for n in range(fault.first, fault.last + 1) for t in self.lines[fault.file, n]]
+            result = [t for n in range(fault.first, fault.last + 1) for t in self.lines[fault.file, n]]
         elif owner := _owner(fault):
-            found = self.classes[f"{fault.file}:{owner}"]
+            result = self.classes[f"{fault.file}:{owner}"]
         else:
             users = [fault.file, *_users(fault.file)]
-            found = [t for path in users for t in self.files[path]]
-            found += [t for n, some in self.classes.items() if n.partition(":")[0] in users for t in some]
-        return list({test.name: test for test in found}.values())
+            result = [t for path in users for t in self.files[path]]
+            result += [t for n, some in self.classes.items() if n.partition(":")[0] in users for t in some]
+        return list({test.name: test for test in result}.values())
 
 
 def _owner(fault: Fault) -> str:
@@ -135,8 +135,8 @@ def _owner(fault: Fault) -> str:
     owner = ""
     for line in (ROOT / fault.file).read_text(encoding="utf-8").splitlines()[: fault.first]:
         if re.match(r"\S", line):
-            found = re.match(r"class (\w+)", line)
-            owner = found[1] if found else owner if line.startswith((")", "]", "}")) else ""
+            result = re.match(r"class (\w+)", line)
+            owner = result[1] if result else owner if line.startswith((")", "]", "}")) else ""
     return owner
 
 
@@ -155,7 +155,7 @@ def chosen(tests: Sequence[Traced]) -> list[Traced]:
 
     Two cases of each test come before the others, and so do two tests of each file.
     """
-    found: list[Traced] = []
+    result: list[Traced] = []
     for tiers, most in ((DECISIVE, MOST_TESTS), (("compile",), MOST_COMPILED)):
         seen = Counter[str]()
         ranked = []
@@ -167,8 +167,8 @@ def chosen(tests: Sequence[Traced]) -> list[Traced]:
         for *_, test in sorted(ranked, key=lambda row: row[:2])[:most]:
             if total + test.seconds <= BUDGET_S:
                 total += test.seconds
-                found.append(test)
-    return found
+                result.append(test)
+    return result
 
 
 # ---- trying -----------------------------------------------------------------------------------------------
@@ -217,11 +217,11 @@ def tried(
     """Yield the outcomes of bugs that have none yet, for so many seconds; add them to the file.
 
     `counts`: bugs per group. `again`: those that no test on a device and no source checker detects are tried
-    again, with the tests that are known by now.
+    again, with the tests that are traced by now.
     """
     path, end = folder / "kills.jsonl", time.monotonic() + seconds
     done = {name: o for name, o in outcomes(path).items() if not again or o.state not in OPEN}
-    known = Known([t for p in sorted(folder.glob("reach*.jsonl")) for t in read(p)])
+    index = Index([t for p in sorted(folder.glob("reach*.jsonl")) for t in read(p)])
     queue = [fault for fault in in_turns(counts, seed) if fault.name not in done]
     copied(folder / "tree")
     with _server(folder) as ask, path.open("a", encoding="utf-8") as file:
@@ -233,12 +233,12 @@ def tried(
                 compile(text := fault.planted(source), fault.file, "exec", dont_inherit=True)
             except SyntaxError:
                 continue
-            tests = chosen(known.of(fault))
+            tests = chosen(index.of(fault))
             request = {"file": fault.file, "text": text, "limit_s": LIMIT_S}
-            found = outcome(fault, tests, ask({**request, "tests": [[t.name, t.tier] for t in tests]}))
-            file.write(json.dumps(found) + "\n")
+            result = outcome(fault, tests, ask({**request, "tests": [[t.name, t.tier] for t in tests]}))
+            file.write(json.dumps(result) + "\n")
             file.flush()
-            yield found
+            yield result
 
 
 def in_turns(counts: Mapping[str, int], seed: int) -> list[Fault]:
@@ -284,7 +284,10 @@ class _server:  # noqa: N801 - it is used like a function
 
 def rows(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the name and the values of each bug's row in a record."""
-    for number, found in enumerate(outcomes(folder / "kills.jsonl").values()):
-        values = found._asdict()
-        del values["seconds"]
-        yield f"bug {number}: {found.name}"[:NAME_LENGTH], {"part": "kills", **values}
+    for number, result in enumerate(outcomes(folder / "kills.jsonl").values()):
+        values = result._asdict()
+        for name in ("name", "seconds"):
+            del values[name]
+        for name in ("old", "new"):
+            values[name] = values[name][:LINE_LENGTH]
+        yield f"bug {number}: {result.name}"[:NAME_LENGTH], {"part": "kills", **values}

@@ -4,7 +4,7 @@
    then does wrong, in words that hold for any emitter [`written`].
 2. The mutants of [lab/mutation.py] change the emitters' logic [`of_logic`].
 3. Templates and strings of a language's source have a number, an operator, a name or an operand exchanged
-   [`of_strings`]: mutation.py leaves strings alone, and an emitter consists of them.
+   [`of_strings`]: mutation.py changes no strings, and an emitter consists of them.
 4. A seed shuffles the last two; those by hand come first [`faults`]. Fewer are a part of more.
 """
 
@@ -115,7 +115,7 @@ def modules(group: str) -> list[str]:
 
 @functools.cache
 def faults(group: str, seed: int = 0) -> Sequence[Fault]:
-    """Return the bugs of a group: those by hand, then logic and print in turns."""
+    """Return the bugs of a group: those by hand, then logic and print interleaved."""
     byhand = [fault for fault in written() if fault.group == group]
     logic, strings = [], []
     for path in modules(group):
@@ -210,22 +210,22 @@ def _shown(body: str, first: int, last: int) -> str:
 
 def _docstrings(source: str) -> set[tuple[int, int]]:
     """Return where strings begin that are statements, names of dictionaries in messages, or annotations."""
-    found = set()
+    result = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            found.add((node.value.lineno, node.value.col_offset))
+            result.add((node.value.lineno, node.value.col_offset))
         if isinstance(node, ast.Assert | ast.Raise):
-            found |= {
+            result |= {
                 (n.lineno, n.col_offset)
                 for n in ast.walk(node)
                 if isinstance(n, ast.Constant | ast.JoinedStr)
             }
-    return found
+    return result
 
 
 def _functions(source: str) -> dict[int, str]:
     """Return the function or class of each line, innermost name last; nothing outside."""
-    found: dict[int, str] = {}
+    result: dict[int, str] = {}
 
     def walk(body: Sequence[ast.stmt], owner: str, inside: bool) -> None:
         for node in body:
@@ -233,8 +233,8 @@ def _functions(source: str) -> dict[int, str]:
                 name = f"{owner}.{node.name}".lstrip(".")
                 function = isinstance(node, ast.FunctionDef)
                 if function:
-                    found.update(dict.fromkeys(range(node.lineno, (node.end_lineno or 0) + 1), name))
+                    result.update(dict.fromkeys(range(node.lineno, (node.end_lineno or 0) + 1), name))
                 walk(node.body, name, inside or function)
 
     walk(ast.parse(source).body, "", False)
-    return found
+    return result

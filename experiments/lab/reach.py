@@ -136,10 +136,10 @@ class Reach:
         return self.line
 
     def _since(self, before: tuple[Lines, set[str]]) -> tuple[Lines, set[str]]:
-        """Return what was reached, and go on with what was reached before."""
-        found = self.lines, self.modules
-        self.lines, self.modules = before[0] | found[0], before[1] | found[1]
-        return found
+        """Return what was reached, and resume with what was reached before."""
+        result = self.lines, self.modules
+        self.lines, self.modules = before[0] | result[0], before[1] | result[1]
+        return result
 
     # ---- hooks ------------------------------------------------------------------------------------------
 

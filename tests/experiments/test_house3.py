@@ -37,16 +37,16 @@ def strings():
 
 def test_strings_have_other_operators_numbers_names_and_operands():
     """Docstrings, messages of errors and names in braces are left alone."""
-    found = strings()
-    assert [kind for kind, _ in found] == [
+    result = strings()
+    assert [kind for kind, _ in result] == [
         "operands exchanged", "statement dropped", "name exchanged", "operator", "integer one more",
         "integer one less", "name exchanged",
     ]  # fmt: skip
-    assert 'clamp = "clamp({1}, {0})"' in found[0][1]
-    assert 'return f""' in found[1][1]
-    assert "[y + 1] = y;" in found[2][1]
-    assert "[x - 1] = y;" in found[3][1]
-    for _, text in found:
+    assert 'clamp = "clamp({1}, {0})"' in result[0][1]
+    assert 'return f""' in result[1][1]
+    assert "[y + 1] = y;" in result[2][1]
+    assert "[x - 1] = y;" in result[3][1]
+    for _, text in result:
         assert text != SOURCE
         ast.parse(text)
 
@@ -102,13 +102,13 @@ def test_tests_come_in_the_order_of_their_cost_and_one_case_of_each_first():
 
 
 def test_a_line_in_a_function_and_an_attribute_of_a_class_are_reached():
-    known = kills.Known(some_tests())
+    index = kills.Index(some_tests())
     inside = next(f for f in planting.written() if f.file.endswith("languages/c.py") and f.function)
     within = inside._replace(first=300, last=300)
-    assert [t.name for t in known.of(within)] == [f"tests/{t}" for t in (
+    assert [t.name for t in index.of(within)] == [f"tests/{t}" for t in (
         "a.py::test_a[1]", "a.py::test_a[2]", "c.py::test_c")]  # fmt: skip
     attribute = next(f for f in planting.written() if f.detail.startswith('"floor": "floorf'))
-    assert [t.name for t in known.of(attribute)] == ["tests/b.py::test_b"]
+    assert [t.name for t in index.of(attribute)] == ["tests/b.py::test_b"]
 
 
 # ---- outcomes ---------------------------------------------------------------------------------------------
@@ -139,16 +139,16 @@ def noted(tier, failed=True):
 )
 def test_the_state_of_a_bug(state, tier, notes, ended):
     fault = next(planting.written())
-    found = kills.outcome(fault, [], {"ended": ended, "notes": notes, "seconds": 1.0})
-    assert (found.state, found.tier) == (state, tier)
-    assert found.says == fault.says
+    result = kills.outcome(fault, [], {"ended": ended, "notes": notes, "seconds": 1.0})
+    assert (result.state, result.tier) == (state, tier)
+    assert result.says == fault.says
 
 
 def test_outcomes_come_back_from_their_file_and_become_rows(tmp_path):
     fault = next(planting.written())
-    found = kills.outcome(fault, [], {"ended": "done", "notes": [OTHER, noted("device")], "seconds": 1.0})
-    (tmp_path / "kills.jsonl").write_text(json.dumps(found) + "\n")
-    assert kills.outcomes(tmp_path / "kills.jsonl") == {fault.name: found}
+    result = kills.outcome(fault, [], {"ended": "done", "notes": [OTHER, noted("device")], "seconds": 1.0})
+    (tmp_path / "kills.jsonl").write_text(json.dumps(result) + "\n")
+    assert kills.outcomes(tmp_path / "kills.jsonl") == {fault.name: result}
     ((name, values),) = kills.rows(tmp_path)
     assert name.startswith("bug 0: compiler/schedules/emit.py")
     assert (values["part"], values["state"], values["by"]) == ("kills", "detected", "tests/device.py::test")
@@ -158,8 +158,8 @@ def test_outcomes_come_back_from_their_file_and_become_rows(tmp_path):
 def test_a_difference_names_the_first_line_that_differs():
     before = {"a": "1\n2\n", "b": "1\n2\n"}
     assert kill_server.difference(before, dict(before))["changed"] == 0
-    found = kill_server.difference(before, {"a": "1\n2\n", "b": "1\n3\n"})
-    assert found == {"changed": 1, "first": "b", "old": "2", "new": "3"}
+    result = kill_server.difference(before, {"a": "1\n2\n", "b": "1\n3\n"})
+    assert result == {"changed": 1, "first": "b", "old": "2", "new": "3"}
     assert kill_server.difference(before, {"a": "1\n"}) == {"changed": 1, "first": "a", "old": "2", "new": ""}
 
 
@@ -192,5 +192,5 @@ def test_an_image_of_the_small_network_has_a_digest():
 
 def test_a_bound_is_that_of_the_schedule_that_holds_the_model():
     assert house3.bound("cornell", "opencl", "dot16", "full")["schedule"] != "dot16"
-    found = house3.bound("cornell", "c", "dot16", "whole8")
-    assert found == {"part": "bounds", "schedule": "dot16", "bound": 0.0}
+    result = house3.bound("cornell", "c", "dot16", "whole8")
+    assert result == {"part": "bounds", "schedule": "dot16", "bound": 0.0}

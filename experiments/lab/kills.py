@@ -6,12 +6,13 @@
 3. An outcome is one line of JSON; a bug that has one is not tried again [`tried`].
 4. A bug is `detected` by a test on a device or by the source checker, else `compiled` by a test that only
    compiles. If no test detects it, it is `equal` where no kernel's source differs, `text` where only a
-   comment does, else `missed`: tests that compare sources with files in git do not count, for the sources
-   will change [`outcome`].
+   comment does, `open` where no test was traced that reaches it or the tests took too long, else `missed`:
+   tests that compare sources with files in git do not count, for the sources will change [`outcome`].
 """
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -31,7 +32,7 @@ from .trial import ROOT
 LIMIT_S = 60
 """CPU seconds of a bug's tests: a test at work when they are used up hangs."""
 
-OPEN = ("compiled", "missed", "late")
+AGAIN = ("compiled", "missed", "open")
 """States that more tests may change."""
 
 BUDGET_S = 60.0
@@ -53,7 +54,7 @@ COMMENT = re.compile(r"^(?:/\*|//|#(?!\s*(?:define|if|el|end|undef|pragma|includ
 class Outcome(NamedTuple):
     """What became of a bug: the tests that fail, and what differs in the kernels.
 
-    `state`: detected, compiled, missed, text, equal or late; `by` is the first test of a device or the
+    `state`: detected, compiled, missed, text, equal or open; `by` is the first test of a device or the
     source checker, or else of those that compile; `changed` counts sources of small kernels that differ (-1:
     the emitter fails), `where` names the first, `old` and `new` are its first line that differs.
     """
@@ -132,12 +133,10 @@ class Index:
 
 def _owner(fault: Fault) -> str:
     """Return the class that a bug outside functions is in, or nothing."""
-    owner = ""
-    for line in (ROOT / fault.file).read_text(encoding="utf-8").splitlines()[: fault.first]:
-        if re.match(r"\S", line):
-            result = re.match(r"class (\w+)", line)
-            owner = result[1] if result else owner if line.startswith((")", "]", "}")) else ""
-    return owner
+    tree = ast.parse((ROOT / fault.file).read_text(encoding="utf-8"))
+    classes = (node for node in tree.body if isinstance(node, ast.ClassDef))
+    inside = (node.name for node in classes if node.lineno <= fault.first <= (node.end_lineno or 0))
+    return next(inside, "")
 
 
 def _users(file: str) -> list[str]:
@@ -192,8 +191,8 @@ def outcome(fault: Fault, tests: Sequence[Traced], answer: Mapping[str, Any]) ->
         state = "equal"
     elif COMMENT.match(texts["old"]) and COMMENT.match(texts["new"]):
         state = "text"
-    elif answer["ended"] == "late":
-        state = "late"
+    elif answer["ended"] == "late" or not tests:
+        state = "open"
     else:
         state = "missed"
     return Outcome(
@@ -220,7 +219,7 @@ def tried(
     again, with the tests that are traced by now.
     """
     path, end = folder / "kills.jsonl", time.monotonic() + seconds
-    done = {name: o for name, o in outcomes(path).items() if not again or o.state not in OPEN}
+    done = {name: o for name, o in outcomes(path).items() if not again or o.state not in AGAIN}
     index = Index([t for p in sorted(folder.glob("reach*.jsonl")) for t in read(p)])
     queue = [fault for fault in in_turns(counts, seed) if fault.name not in done]
     copied(folder / "tree")

@@ -91,14 +91,16 @@ def some_tests():
     return [
         Traced("tests/a.py::test_a[1]", 1.0, "device", lines, []),
         Traced("tests/a.py::test_a[2]", 2.0, "device", lines, []),
+        Traced("tests/a.py::test_a[3]", 3.0, "device", {}, []),
         Traced("tests/b.py::test_b", 5.0, "reader", {}, ["compiler/languages/c.py:C"]),
         Traced("tests/c.py::test_c", 0.1, "golden", lines, []),
     ]
 
 
-def test_tests_come_in_the_order_of_their_cost_and_one_case_of_each_first():
+def test_tests_come_in_the_order_of_their_cost_and_two_of_each_file_first():
     names = [test.name for test in kills.chosen(some_tests())]
-    assert names == ["tests/a.py::test_a[1]", "tests/b.py::test_b", "tests/a.py::test_a[2]"]
+    first = ["tests/a.py::test_a[1]", "tests/a.py::test_a[2]", "tests/b.py::test_b"]
+    assert names == [*first, "tests/a.py::test_a[3]"]
 
 
 def test_a_line_in_a_function_and_an_attribute_of_a_class_are_reached():
@@ -131,7 +133,7 @@ def noted(tier, failed=True):
         ("missed", "", [OTHER, noted("device", False)], "done"),
         ("equal", "", [SAME, noted("device", False)], "done"),
         ("text", "", [COMMENTED, noted("device", False)], "done"),
-        ("late", "", [OTHER, noted("device", False)], "late"),
+        ("open", "", [OTHER, noted("device", False)], "late"),
         # The signal of a process whose CPU time is used up, or that has crashed.
         ("detected", "device", [OTHER, noted("device", False)], f"signal {signal.SIGXCPU.value}"),
         ("compiled", "import", [], "signal 11"),
@@ -139,9 +141,15 @@ def noted(tier, failed=True):
 )
 def test_the_state_of_a_bug(state, tier, notes, ended):
     fault = next(planting.written())
-    result = kills.outcome(fault, [], {"ended": ended, "notes": notes, "seconds": 1.0})
+    result = kills.outcome(fault, some_tests(), {"ended": ended, "notes": notes, "seconds": 1.0})
     assert (result.state, result.tier) == (state, tier)
     assert result.says == fault.says
+
+
+def test_a_bug_without_tests_is_open():
+    fault, answer = next(planting.written()), {"ended": "done", "notes": [OTHER], "seconds": 1.0}
+    assert kills.outcome(fault, [], answer).state == "open"
+    assert kills.outcome(fault, some_tests(), answer).state == "missed"
 
 
 def test_outcomes_come_back_from_their_file_and_become_rows(tmp_path):
@@ -167,7 +175,7 @@ def test_a_fork_ends_by_itself_or_by_a_signal(tmp_path, monkeypatch):
     (tmp_path / "tree").mkdir()
     monkeypatch.chdir(tmp_path / "tree")
     assert kill_server._fork(lambda: None, 10) == "done"
-    assert kill_server._fork(lambda: os.kill(os.getpid(), signal.SIGSEGV), 10) == "signal 11"
+    assert kill_server._fork(lambda: os.kill(os.getpid(), signal.SIGKILL), 10) == "signal 9"
 
 
 # ---- the parts --------------------------------------------------------------------------------------------

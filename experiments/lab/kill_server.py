@@ -136,7 +136,8 @@ def _tried(tree: Path, request: Mapping[str, Any], notes: Path) -> None:
             note(**difference(before, _emitted(request["file"])))
         except Exception as error:  # noqa: BLE001 - an emitter may fail in any manner
             note(changed=-1, first="", old="", new=f"{type(error).__name__}: {error}"[:160])
-        _run(request["tests"], note)
+        if request["tests"]:  # without names pytest would run all tests
+            _run(request["tests"], note)
 
 
 def difference(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, Any]:

@@ -180,7 +180,7 @@ def outcome(fault: Fault, tests: Sequence[Traced], answer: Mapping[str, Any]) ->
     texts = texts or {"changed": -1, "first": "", "old": "", "new": f"ended: {answer['ended']}"}
     failed: dict[str, str] = {}
     for note in notes:
-        if note.get("failed"):
+        if note.get("failed") and note["tier"]:
             failed.setdefault(note["tier"], note["test"])
     if answer["ended"] != "done" and (hung := _hung(notes, answer)):
         failed.setdefault(hung[0], hung[1])

@@ -171,6 +171,17 @@ def test_a_difference_names_the_first_line_that_differs():
     assert kill_server.difference(before, {"a": "1\n"}) == {"changed": 1, "first": "a", "old": "2", "new": ""}
 
 
+def test_without_tests_none_runs(tmp_path, monkeypatch):
+    """Pytest without names would run all tests of the project."""
+    monkeypatch.setattr(kill_server, "_emitted", lambda file: {"a": "2"})
+    monkeypatch.setattr(kill_server, "_run", lambda *request: pytest.fail("tests run"))
+    (tmp_path / "emitted.json").write_text('{"a": "1"}')
+    request = {"file": "compiler/languages/c.py", "tests": []}
+    kill_server._tried(tmp_path / "tree", request, tmp_path / "notes.jsonl")
+    (line,) = (tmp_path / "notes.jsonl").read_text().splitlines()
+    assert json.loads(line) == {"changed": 1, "first": "a", "old": "1", "new": "2"}
+
+
 def test_a_fork_ends_by_itself_or_by_a_signal(tmp_path, monkeypatch):
     (tmp_path / "tree").mkdir()
     monkeypatch.chdir(tmp_path / "tree")

@@ -14,6 +14,7 @@ from itertools import chain
 
 import numpy as np
 
+from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.core.loops import LISTS
 from wamnet.compiler.core.trace import trace
@@ -24,6 +25,7 @@ from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing
 from wamnet.compiler.schedules.c_fourier import CFourier
+from wamnet.compiler.schedules.emit import output_channels
 from wamnet.compiler.schedules.emit_fourier import Fourier
 from wamnet.compiler.schedules.opencl_fourier import OpenCLFourier
 from wamnet.compiler.schedules.schedules import pick
@@ -53,7 +55,7 @@ def sources(file: str = "") -> dict[str, str]:
 
     `file`: the module that may be changed; a schedule's makes no difference to other roles.
     """
-    result = dict(chain(denoisers(), spectra()))
+    result = dict(chain(denoisers(), spectra(), passes()))
     return result if file.startswith("compiler/schedules/") else result | dict(chain(paths(), others()))
 
 
@@ -78,6 +80,8 @@ def denoisers() -> Iterator[tuple[str, str]]:
             for schedule in target.schedules:
                 if pick(target.schedules, schedule.name, program).schedule is not schedule:
                     continue
+                if target.dialect and output_channels(program) > target.dialect.max_output_channels:
+                    continue
                 source = schedule.emit(program, ["a kernel"], True)
                 yield (
                     f"{name} {schedule.name} {label}",
@@ -97,11 +101,20 @@ def spectra() -> Iterator[tuple[str, str]]:
                 yield f"{dialect.target} fft4 {label} {name}", f"{source}weights {weights}\n"
 
 
+def passes() -> Iterator[tuple[str, str]]:
+    """Yield the two kernels of a first layer of low rank."""
+    for name in ("opencl", "c", "opengl"):
+        second = compile_program(_network({"a": 3, "b": 2}, "zero", (5, 3)), name, rank=2)
+        parts = (f"{kernel.source}weights {sha256(kernel.weights.tobytes())}" for kernel in second.kernels)
+        yield f"{name} rank 2", "\n".join(parts)
+
+
 def programs() -> dict[str, Program]:
     """Return small networks, by name."""
     return {
         "zero border": _network({"a": 3, "b": 2}, "zero", (5, 3)),
         "wide layers": _network({"a": 1, "b": 4}, "clamp", (40, 20, 3), activation="relu"),
+        "many channels": _network({"a": 3}, "zero", (5, 6)),
         "exact": _network({"a": 2}, "clamp", (4, 2), profile="exact"),
         "integers": _network({"a": 3, "b": 2}, "zero", (6, 3), whole=True),
     }

@@ -81,12 +81,12 @@ def _here(tree: Path) -> None:
 
 
 def _fork(task: Callable[[], Any], limit_s: float) -> str:
-    """Run a task in a process group of its own; return how it ended: done, late, or a signal."""
+    """Run a task in a separate process group; return how it ended: done, late, or a signal."""
     child = os.fork()
     if not child:
         status = 1
         try:
-            os.setsid()
+            os.setpgid(0, 0)
             quiet = os.open(os.devnull, os.O_RDWR)
             log = os.open("../fork.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(quiet, 0)

@@ -44,8 +44,8 @@ MOST_TESTS, MOST_COMPILED, AT_ONCE = 40, 5, 2
 DECISIVE = ("reader", "device")
 """Tiers whose tests detect what a kernel computes wrong."""
 
-NAME_LENGTH, LINE_LENGTH = 160, 90
-"""Most letters of a bug's name in a record, and of a line that differs."""
+LINE_LENGTH = 90
+"""Most letters in a record of a line that differs."""
 
 COMMENT = re.compile(r"^(?:/\*|//|#(?!\s*(?:define|if|el|end|undef|pragma|include|version|extension))|\*)")
 """A line of a kernel that is a comment."""
@@ -283,10 +283,10 @@ class _server:  # noqa: N801 - it is used like a function
 
 def rows(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the name and the values of each bug's row in a record."""
-    for number, result in enumerate(outcomes(folder / "kills.jsonl").values()):
+    for result in outcomes(folder / "kills.jsonl").values():
         values = result._asdict()
         for name in ("name", "seconds"):
             del values[name]
         for name in ("old", "new"):
             values[name] = values[name][:LINE_LENGTH]
-        yield f"bug {number}: {result.name}"[:NAME_LENGTH], {"part": "kills", **values}
+        yield f"bug: {' '.join(result.name.split())}", {"part": "kills", **values}

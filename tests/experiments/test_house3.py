@@ -158,7 +158,7 @@ def test_outcomes_come_back_from_their_file_and_become_rows(tmp_path):
     (tmp_path / "kills.jsonl").write_text(json.dumps(result) + "\n")
     assert kills.outcomes(tmp_path / "kills.jsonl") == {fault.name: result}
     ((name, values),) = kills.rows(tmp_path)
-    assert name.startswith("bug 0: compiler/schedules/emit.py")
+    assert name.startswith("bug: compiler/schedules/emit.py")
     assert (values["part"], values["state"], values["by"]) == ("kills", "detected", "tests/device.py::test")
     assert house3.counts("hand", [values]) == ["hand", "1", "1", "0", "0", "0", "0", "0"]
 

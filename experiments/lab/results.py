@@ -147,13 +147,16 @@ class Results:
 
     def put(self, configuration: str, seed: int, values: Values) -> None:
         """Add a record, in place of an older one of this configuration and seed."""
+        self.put_all({configuration: values}, seed)
+
+    def put_all(self, rows: Mapping[str, Values], seed: int = 0) -> None:
+        """Add a record for each configuration in one step."""
         with self._locked():
-            key = (configuration, seed)
             found = self._checked()
-            kept = [r for r in found["records"] if (r["configuration"], r["seed"]) != key]
-            record = {"configuration": configuration, "seed": seed, "values": dict(values)}
+            kept = [r for r in found["records"] if r["configuration"] not in rows or r["seed"] != seed]
+            kept += [{"configuration": n, "seed": seed, "values": dict(v)} for n, v in rows.items()]
             commands = dict.fromkeys([*found["commands"], *([self.command] if self.command else [])])
-            self._write([*kept, record], list(commands))
+            self._write(kept, list(commands))
 
     def configurations(self) -> list[str]:
         """Return the configurations that have a record, in the order of their first ones."""

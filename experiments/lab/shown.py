@@ -439,6 +439,8 @@ AS_PRINTED = (
     "course", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
+SHOWN_BY_MODULE = ("blender", "domain", "house3")
+"""Records whose module has a function `rows` that makes the table."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
     "bench-pipeline": whole_pictures,
@@ -450,7 +452,7 @@ TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
-    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in ("blender", "domain")},
+    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in SHOWN_BY_MODULE},
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

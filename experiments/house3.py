@@ -1,20 +1,17 @@
-"""The baseline of the kernel rebuild: images, bounds, times and seeded bugs, as one record.
+"""The baseline of the kernel rebuild: images, bounds and times; bugs seeded in the old emitters, as a record.
 
     python experiments/house3.py images bounds
-    python experiments/house3.py reach kills --minutes 60
     python experiments/house3.py speed
     python experiments/publish.py out/house3/house3.json --partial
 
 1. `images`: the SHA-256 of what kernels of every role compute on small inputs, per backend and schedule
    [`IMAGES`]. Compilers may contract differently on another processor: compare on the same machine.
 2. `bounds`: the proven bound of each bundled model, per target, schedule and variant [`bounds`].
-3. `reach`: which tests reach which lines of the emitters, and their seconds [lab/reach.py].
-4. `kills`: bugs in the emitters, one at a time, and the first test that detects each [lab/planting.py,
-   lab/kills.py]. `--again` tries those again that no test detected, after `reach` has seen more tests.
-5. `speed`: milliseconds per frame, path and training step, in interleaved rounds. Nothing else may run on the
+3. `speed`: milliseconds per frame, path and training step, in interleaved rounds. Nothing else may run on the
    machine [`speed`].
 
-All of it resumes where it was interrupted. Each part adds its rows to one file of results.
+The record also has bugs that were seeded in the emitters before the rebuild (`rows`): commit 754642fe has the
+code that planted them. All of it resumes where it was interrupted. Each part adds its rows to one file.
 """
 
 from __future__ import annotations
@@ -31,7 +28,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lab import kills, planting, reach
 from lab.command import begin
 from lab.records import ROOT
 from lab.results import Results, Values, fill
@@ -39,7 +35,6 @@ from lab.tables import markdown
 from numpy.typing import NDArray
 
 from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing
 from wamnet.compiler.targets import DENOISERS, EXPORTED
@@ -51,6 +46,7 @@ from wamnet.kernels.run.denoise_on import images_of
 from wamnet.kernels.run.follow_on import follow_on
 from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.kernels.run.trainer import train_on
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
@@ -308,7 +304,7 @@ def counts(origin: str, some: Sequence[Values]) -> list[str]:
 
 # ---- the record -------------------------------------------------------------------------------------------
 
-PARTS = ("images", "bounds", "reach", "kills", "speed")
+PARTS = ("images", "bounds", "speed")
 """Parts, in their order."""
 
 
@@ -319,10 +315,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("parts", nargs="+", choices=PARTS, help="what to run")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/house3"), help="folder of the results")
-    parser.add_argument("--minutes", type=float, default=60.0, help="time of `kills`; 0: none")
-    parser.add_argument("--seed", type=int, default=0, help="seed that draws bugs")
-    parser.add_argument("--again", action="store_true", help="try again the bugs that no test detected")
-    parser.add_argument("--counts", type=int, nargs=3, default=[300, 180, 90], help="bugs per group")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     results = Results.open(options.output / "house3.json", "house3", {})
@@ -332,15 +324,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             fill(results, dict(images(devices)), (0,), "images")
         if "bounds" in options.parts:
             fill(results, dict(bounds()), (0,), "bounds")
-        if "reach" in options.parts:
-            reach.trace(options.output)
-        if "kills" in options.parts:
-            most = dict(zip(planting.GROUPS, options.counts, strict=True))
-            limit_s = 60 * options.minutes
-            tries = kills.tried(options.output, most, limit_s, options.seed, options.again) if limit_s else ()
-            for result in tries:
-                print(result.state, result.name, result.by, flush=True)
-            results.put_all(dict(kills.rows(options.output)))
         if "speed" in options.parts:
             results.put_all(dict(speed(devices)))
 

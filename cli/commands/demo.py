@@ -208,7 +208,7 @@ def _check_note(folder: Path, text: str) -> bool:
     except InputError:
         found = ""
     if found != text:
-        rule = "holds results of another plan" if found else "it holds files that are not the demo's"
+        rule = "holds results of another plan" if found else "holds files that are not the demo's"
         raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
     return True
 

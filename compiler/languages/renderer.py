@@ -273,7 +273,12 @@ class Renderer(Lines):
                 image=array.removeprefix(IMAGE), row=row, column=column, part="rgba"[:lanes]
             )
         if len(index) == 2:
-            return f"{array}[{self.text(index[0], 11)} * width * {channels} + {self.text(index[1], 10)}]"
+            row, position = index
+            assert position.op == "add", (
+                "a position in a row is the first of a pixel's, and a distance from it"
+            )
+            first, beyond = position.args
+            index = row, first if channels == 1 else first.args[0], beyond
         row, column, channel = map(self.text, index)
         return self.dialect.pixel.format(
             image=array.removeprefix(IMAGE), channels=channels, row=row, column=column, c=channel

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..kernel.interface import DENOISE, RESULT, Interface
+from ..kernel.interface import DENOISE, IMAGE, RESULT, Interface
 from ..kernel.kernel import (
+    FLOAT,
     INT,
     Array,
     Block,
@@ -90,7 +91,7 @@ def _statement(statement: Statement, names: Collection[str]) -> Statement:
     if isinstance(statement, Array):
         sizes = tuple(_value(const(s) if isinstance(s, int) else s, names) for s in statement.sizes)
         value = statement.value and _value(statement.value, names)
-        return replace(statement, sizes=sizes, value=value, kept=False)
+        return replace(statement, sizes=sizes, value=value, kept=False, register=False)
     if isinstance(statement, Store):
         index = tuple(_value(each, names) for each in statement.index)
         return replace(statement, index=index, value=_value(statement.value, names))
@@ -123,6 +124,13 @@ def _value(value: Expr, names: Collection[str]) -> Expr:
     value = replace(value, args=tuple(_value(each, names) for each in value.args))
     if value.op in ("add", "subtract") and value.type == INT:
         return total(terms(value))
+    if value.op == "load" and value.value.startswith(IMAGE) and len(value.args) == 2 and value.type == FLOAT:
+        first, *beyond = terms(
+            value.args[1]
+        )  # a row's position, as the pixel's column and a distance from it
+        scaled = first[0].op == "multiply" and first[0].args[1].op == "const"
+        column = first[0].args[0] if scaled else first[0]
+        return replace(value, args=(value.args[0], column, total(beyond)))
     return _shortened(value)
 
 

@@ -563,7 +563,7 @@ class Parser:
         return self._lane(load(word, *indices, kind=kind))
 
     def _pixel(self, image: str, place: Expr) -> Expr:
-        """Return an element: `(row * width + column) * channels + c`, `row * width * channels + position`."""
+        """Return an element: `(row * width + column) * channels + c`."""
         first, *rest = terms(place)
         if first[0].op != "multiply" or not rest or rest[0][1] < 0:
             raise Unread(f"a place in {image} of another form")
@@ -577,7 +577,7 @@ class Parser:
         if row.op != "multiply" or row.args[1] != name("width"):
             raise Unread(f"a place in {image} without its row")
         if not columns:
-            return load(image, row.args[0], index)
+            raise Unread(f"a place in {image} without its column")
         column = columns[0][0]
         if columns[0][1] < 0:
             raise Unread(f"a place in {image} left of its row")

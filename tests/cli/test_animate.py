@@ -41,7 +41,7 @@ def model(samples, tmp_path) -> None:
 def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     """Noisy, denoised and reference of the second time, side by side below their labels."""
     outcome = wamnet("animate", "m.safetensors", *SHORT, "--reference-spp", 2, "--start", 1, "-o", "a")
-    assert (outcome.status, outcome.out) == (0, "a: 2 pictures, 2 of them made now\n")
+    assert (outcome.status, outcome.out) == (0, "a: 2 frames, 2 of them rendered now\n")
     network, scene = load_model(tmp_path / "m.safetensors"), canonical("minicubes", time=1.2)
     noisy, reference = (render(scene, Job(13, 13, spp, seed)).frame for spp, seed in ((1, 2), (2, 3)))
     got = read_png(tmp_path / "a/00001.png")
@@ -126,7 +126,7 @@ def test_a_network_that_sees_the_history_gets_that_of_the_film(
     before = last.read_bytes()
     last.unlink()
     assert wamnet("animate", "h.safetensors", *film, "-o", "a").out.endswith(
-        "3 pictures, 1 of them made now\n"
+        "3 frames, 1 of them rendered now\n"
     )
     assert last.read_bytes() == before
 
@@ -238,7 +238,7 @@ def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> N
 def test_films(wamnet, tmp_path, suffix) -> None:
     """As many pictures of that size as the animation has; their folder is gone."""
     outcome = wamnet("animate", "m.safetensors", *SHORT, "-o", f"f{suffix}")
-    assert (outcome.status, outcome.out) == (0, f"f{suffix}: 2 pictures, 2 of them made now\n")
+    assert (outcome.status, outcome.out) == (0, f"f{suffix}: 2 frames, 2 of them rendered now\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"f{suffix}", "m.safetensors"]
     if suffix == ".gif":
         with Image.open(tmp_path / "f.gif") as film:
@@ -270,7 +270,7 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(animate, "write_shot", write)
     (tmp_path / "a.gif.frames/00001.png").write_bytes(b"damaged")
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").out.endswith(
-        "2 pictures, 1 of them made now\n"
+        "2 frames, 1 of them rendered now\n"
     )
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
 

@@ -355,12 +355,12 @@ def test_a_changed_step_is_refused_by_name(path, changed, place, value, match):
         ({"step": 0.5, "count": 54}, "W0: counts and steps are integers"),
         ({"step": "6", "count": 54}, "W0: counts and steps are integers"),
         ({"step": 5, "count": 54}, "digest of the program in the certificate"),
-        ({"step": 6, "count": 0}, "must be a whole certificate"),
-        ({"step": -6, "count": 54}, "must be a whole certificate"),
-        ({"step": 10**40, "count": 54}, "must be a whole certificate"),
-        ({"step": 6, "count": 53}, "must be a whole certificate"),
-        ({"step": 6}, "must be a whole certificate"),
-        (54, "must be a whole certificate"),
+        ({"step": 6, "count": 0}, "must be a complete certificate"),
+        ({"step": -6, "count": 54}, "must be a complete certificate"),
+        ({"step": 10**40, "count": 54}, "must be a complete certificate"),
+        ({"step": 6, "count": 53}, "must be a complete certificate"),
+        ({"step": 6}, "must be a complete certificate"),
+        (54, "must be a complete certificate"),
     ],
 )
 def test_places_of_no_weights_are_refused(path, changed, columns, match):

@@ -144,7 +144,7 @@ static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *
     to[leap * 4 + 1] = t19;
 }
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
-   to `result`, the whole picture's array. */
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_i0,
     const float *restrict image_i1,

@@ -163,7 +163,7 @@ def test_refusals(change, text) -> None:
 def test_an_unknown_executor_is_rejected() -> None:
     """Where a task is carried out: plans know no executors."""
     (task,) = plan(replace(TINY, executor="abacus"))[0].pictures["noisy"].tasks()
-    with pytest.raises(InputError, match="executor that renders is abacus"):
+    with pytest.raises(InputError, match=r"executor that renders 'abacus': unknown \(choose one of numpy"):
         carry_out(task)
 
 

@@ -37,7 +37,7 @@ def test_a_file_is_the_scene_at_every_time(tmp_path, name) -> None:
 @given(st.one_of(st.text(), st.text(max_size=5).map(lambda text: f"{text}.json"), st.just("n" * 300)))
 def test_a_name_of_nothing_is_one_error(name) -> None:
     """Whatever its characters and its length."""
-    with pytest.raises(InputError, match=r"^scene (file )?is "):
+    with pytest.raises(InputError, match=r"^scene (file )?'.*': .+ \(.+\)$"):
         scene_source(name)
 
 

@@ -40,6 +40,7 @@ from wamnet.compiler.scenes.smooth_kernel import compile_smoothing
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.compiler.variants import parse, plan_model, vary
 from wamnet.kernels import open_executor
+from wamnet.kernels.devices import planes
 from wamnet.kernels.devices.executor import Executor, Part
 from wamnet.kernels.export.check import digest_of
 from wamnet.kernels.run.denoise_on import images_of
@@ -142,7 +143,7 @@ def smoothed(device: Executor) -> Array:
     """Return the colour of a noisy frame after the edge-aware filter."""
     kernels = compile_smoothing(SCALES, device.name, lanes=device.lanes)
     names = ("color", "normal", "albedo", "position", "depth")
-    return device.smooth(kernels, {name: noisy("minicubes")[name] for name in names})
+    return planes.smoothed(device, kernels, {name: noisy("minicubes")[name] for name in names})
 
 
 def accumulated(device: Executor) -> Array:

@@ -276,7 +276,8 @@ def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
         assert "another process is making a demonstration there" in refused("demo", "--quick", "-o", "out")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "noisy.exr").write_text("precious")
-    assert "output folder 'mine': holds files that are not the demo's" in refused("demo", "--quick", "-o", "mine")
+    text = "output folder 'mine': holds files that are not the demo's"
+    assert text in refused("demo", "--quick", "-o", "mine")
     assert "--size 16: cannot be combined with --quick" in refused("demo", "--quick", "--size", 16)
 
 

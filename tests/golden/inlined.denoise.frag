@@ -93,7 +93,7 @@ void main()
             int row = clamp(y - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);
             bool inside = row == y - 1 && column == x - 1;
-            vec2 i0 = mix(vec2(0.0f), texelFetch(image_i0, ivec2(column, row), 0).rg, inside);
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
             part1_0 += vec4((-0.03125f), (-0.234375f), 0.3125f, 0.390625f) * i0.x;
             part1_1 += vec4(0.234375f, 0.0f, 0.0f, 0.0f) * i0.x;
             part1_0 += vec4(0.0f, 0.3125f, (-0.171875f), (-0.296875f)) * i0.y;
@@ -103,7 +103,7 @@ void main()
             int row = clamp(y - 1, 0, height - 1);
             int column = clamp(x + 1 - 1, 0, width - 1);
             bool inside = row == y - 1 && column == x + 1 - 1;
-            vec2 i0 = mix(vec2(0.0f), texelFetch(image_i0, ivec2(column, row), 0).rg, inside);
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
             part1_0 += vec4(0.4375f, (-0.09375f), 0.28125f, (-0.25f)) * i0.x;
             part1_1 += vec4(0.21875f, 0.0f, 0.0f, 0.0f) * i0.x;
             part1_0 += vec4((-0.46875f), 0.140625f, (-0.390625f), (-0.484375f)) * i0.y;
@@ -119,7 +119,7 @@ void main()
             int row = clamp(y + 1 - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);
             bool inside = row == y + 1 - 1 && column == x - 1;
-            vec2 i0 = mix(vec2(0.0f), texelFetch(image_i0, ivec2(column, row), 0).rg, inside);
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
             part1_0 += vec4(0.3125f, (-0.421875f), (-0.390625f), (-0.453125f)) * i0.x;
             part1_1 += vec4(0.421875f, 0.0f, 0.0f, 0.0f) * i0.x;
             part1_0 += vec4(0.4375f, (-0.484375f), (-0.046875f), (-0.234375f)) * i0.y;
@@ -129,7 +129,7 @@ void main()
             int row = clamp(y + 1 - 1, 0, height - 1);
             int column = clamp(x + 1 - 1, 0, width - 1);
             bool inside = row == y + 1 - 1 && column == x + 1 - 1;
-            vec2 i0 = mix(vec2(0.0f), texelFetch(image_i0, ivec2(column, row), 0).rg, inside);
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
             part1_0 += vec4((-0.203125f), 0.25f, (-0.375f), (-0.015625f)) * i0.x;
             part1_1 += vec4((-0.34375f), 0.0f, 0.0f, 0.0f) * i0.x;
             part1_0 += vec4(0.359375f, 0.328125f, (-0.125f), (-0.390625f)) * i0.y;

@@ -63,7 +63,7 @@ __kernel void wamnet_denoise(
         int row = clamp(top + dy, 0, height - 1);
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 2; ++i) {
-                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[row * width * 2 + left * 2 + i];
+                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[(row * width + left) * 2 + i];
             }
         }
         else {
@@ -77,7 +77,7 @@ __kernel void wamnet_denoise(
         }
         if (within) {
             for (int i = 0; i < PATCH_WIDTH; ++i) {
-                patch_i1[dy * PATCH_WIDTH + i] = image_i1[row * width * 1 + left + i];
+                patch_i1[dy * PATCH_WIDTH + i] = image_i1[(row * width + left) * 1 + i];
             }
         }
         else {

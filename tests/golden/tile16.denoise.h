@@ -139,7 +139,7 @@ static inline void wamnet_add_product(
 #endif
 
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
-   to `result`, the whole picture's array. */
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -193,7 +193,7 @@ static inline void wamnet_pixel(
         int row = wamnet_clamp(top + dy, 0, height - 1);
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 2; ++i) {
-                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[row * width * 2 + left * 2 + i];
+                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[(row * width + left) * 2 + i];
             }
         }
         else {
@@ -207,7 +207,7 @@ static inline void wamnet_pixel(
         }
         if (within) {
             for (int i = 0; i < PATCH_WIDTH; ++i) {
-                patch_i1[dy * PATCH_WIDTH + i] = image_i1[row * width * 1 + left + i];
+                patch_i1[dy * PATCH_WIDTH + i] = image_i1[(row * width + left) * 1 + i];
             }
         }
         else {

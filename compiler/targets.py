@@ -174,7 +174,7 @@ HOMES: Mapping[str, tuple[str, Mapping[type[Dialect], str]]] = {
     ),
 }
 """Other places for weights than a target's usual one: a table in the source, or a uniform block; what
-callers are told, and how a weight is read there, by language.
+callers get to read, and how a weight is read there, by language.
 
 Fragment shaders of GLSL have constants as straight code instead; compute shaders have no table: Mesa had not
 compiled one of 770 numbers after a minute, and a buffer is there wherever they are.

@@ -1,6 +1,6 @@
 """What a kernel's floats are while it runs in NumPy [run.py]: float32 values, or other things that add up.
 
-Indices, integers and truth values are the same in every domain. A domain sees each operation that reads or
+Indices, integers and booleans are the same in every domain. A domain sees each operation that reads or
 makes a float, so that it may count roundings, or compute in a prime field.
 """
 

@@ -133,7 +133,7 @@ class Verifier:
         """Return an array by its name."""
         declared = self.named(name)
         if declared.sizes is None:
-            raise KernelError(f"{name} is no array")
+            raise KernelError(f"{name} is not an array")
         return declared
 
     def constant(self, value: Expr) -> int | None:
@@ -269,13 +269,13 @@ class Verifier:
         if not self.kernel.group:
             raise KernelError("a barrier in a kernel without groups")
         if self.branches:
-            raise KernelError("a barrier inside a branch, or a loop whose bounds are no constants")
+            raise KernelError("a barrier inside a branch, or a loop whose bounds are not constants")
 
     def _check_call(self, statement: Call, depth: int) -> None:
         """Check the views that a function is given."""
         function = self.functions.get(statement.function)
         if function is None or function.result is not None:
-            raise KernelError(f"{statement.function} is no function on views")
+            raise KernelError(f"{statement.function} is not a function on views")
         if len(function.takes) != len(statement.views) or len(statement.views) > len(STEPS):
             count = len(statement.views)
             raise KernelError(f"{statement.function} takes {len(function.takes)} views, not {count}")
@@ -331,7 +331,7 @@ class Verifier:
         truth = isinstance(number, bool) != (kind.dtype == "bool")
         least, most = LIMITS.get(kind.dtype, (-np.inf, np.inf))
         if kind.lanes != 1 or not isinstance(number, fits) or truth or not least <= number <= most:
-            raise KernelError(f"{number!r} is no constant of type {shown(kind)}")
+            raise KernelError(f"{number!r} is not a constant of type {shown(kind)}")
         return kind
 
     def _type_name(self, value: Expr) -> Type:
@@ -377,7 +377,7 @@ class Verifier:
         """Return the type of a value of another kind."""
         self.arity(value, 1)
         if value.value not in BYTES:
-            raise KernelError(f"a value is converted to {value.value}, which is no kind of value")
+            raise KernelError(f"a value is converted to {value.value}, which is not a kind of value")
         return Type(value.value, self.type(value.args[0]).lanes)
 
     def _type_bits(self, value: Expr) -> Type:
@@ -389,7 +389,7 @@ class Verifier:
     def _type_take(self, value: Expr) -> Type:
         """Return the type of an entry of a table."""
         if value.value not in self.tables:
-            raise KernelError(f"{value.value} is no table")
+            raise KernelError(f"{value.value} is not a table")
         self.check(value.args[0], INT, f"the index of {value.value}")
         number, size = self.constant(value.args[0]), len(self.tables[value.value])
         if number is not None and not 0 <= number < size:
@@ -416,7 +416,7 @@ class Verifier:
         """Return the type of a function's result."""
         function = self.functions.get(value.value)
         if function is None or function.result is None:
-            raise KernelError(f"{value.value} is no function of values")
+            raise KernelError(f"{value.value} is not a function of values")
         if len(value.args) != len(function.takes):
             raise KernelError(f"{value.value} takes {len(function.takes)} values, not {len(value.args)}")
         for each, (key, kind) in zip(value.args, function.takes, strict=True):
@@ -432,7 +432,7 @@ class Verifier:
             return INT
         rule = OPS.get(value.op)
         if rule is None or not rule.elementwise or value.op == "convert":
-            raise KernelError(f"{value.op} is no operation")
+            raise KernelError(f"{value.op} is not an operation")
         self.arity(value, rule.arity or 0)
         if len({each.lanes for each in args}) != 1:
             raise KernelError(f"{value.op} of {', '.join(map(shown, args))}: lanes differ")

@@ -48,7 +48,7 @@ VECTORS = {f"float{n}": FLOAT.of(n) for n in (2, 4, 8, 16)}
 """Vectors of OpenCL."""
 
 MASKS = {f"int{n}": BOOL.of(n) for n in (2, 4, 8, 16)}
-"""Truth values in vectors of OpenCL, which are integers with all bits set."""
+"""Booleans in vectors of OpenCL, which are integers with all bits set."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def parse(source: str, language: str, channels: Mapping[str, int] | None = None)
         raise Unread("a character beyond printable ASCII, or a trigraph")
     match = frame(language).fullmatch(lines_of(source))
     if match is None:
-        raise Unread(f"what surrounds the statements is no frame of {language}")
+        raise Unread(f"what surrounds the statements is not a frame of {language}")
     parser = Parser(LANGUAGES[language], match.groupdict(), dict(channels or {}))
     try:
         kernel = canonical(parser.kernel())
@@ -125,7 +125,7 @@ class Parser:
         match = re.fullmatch(r"#define (\w+) (\d+|\(.*\))|const (\w+): i32 = (\d+|\(.*\));", line)
         key = match and (match[1] or match[3])
         if match is None or not CONSTANT.fullmatch(str(key)):
-            raise Unread(f"{line!r} is no constant")
+            raise Unread(f"{line!r} is not a constant")
         self._read(match[2] or match[4])
         value = self._expression()
         self._end()
@@ -169,12 +169,12 @@ class Parser:
             raise Unread(f"{self._now()!r} where nothing follows")
 
     def _word(self) -> str:
-        """Take a name that is no type, function or array of the interface."""
+        """Take a name that is not a type, function or array of the interface."""
         kind = self.tokens[self.at][0] if self.at < len(self.tokens) else ""
         word = self._take()
         taken = word in self.types or word in self.language.calls or word in (WEIGHTS, RESULT, "w", "select")
         if kind != "word" or taken or word.startswith((IMAGE, "wamnet_", "gl_", "as_", "convert_")):
-            raise Unread(f"{word!r} is no name of a value")
+            raise Unread(f"{word!r} is not a name of a value")
         return word
 
     # ---- statements --------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ class Parser:
         if self.at < len(self.tokens) and self.tokens[self.at][0] == "unroll":
             self.at += 1
             if self._now() != "for":
-                raise Unread("an unrolled statement that is no loop")
+                raise Unread("an unrolled statement that is not a loop")
         if self._has("{"):
             return Block(self._body())
         if self._has("for", "("):
@@ -331,7 +331,7 @@ class Parser:
         if not self._has("array", "<"):
             word = self._take()
             if word not in self.types:
-                raise Unread(f"{word!r} is no type")
+                raise Unread(f"{word!r} is not a type")
             return self.types[word]
         kind = self._sized(sizes)
         self._take(",")
@@ -344,7 +344,7 @@ class Parser:
         target = self._postfix(self._take())
         sign = self._take()
         if sign not in ("=", "+=", "-="):
-            raise Unread(f"{sign!r} is no assignment")
+            raise Unread(f"{sign!r} is not a assignment")
         if target.op == "name":
             target = Expr("load", (), target.type, target.value)
         if target.op != "load" or target.value == WEIGHTS or target.value.startswith(IMAGE):
@@ -392,7 +392,7 @@ class Parser:
         self._take("+")
         place = self._binary(PRODUCTS)
         if place.op != "multiply" or place.args[1] != name("LANES"):
-            raise Unread(f"a place in {array} that is no vector's")
+            raise Unread(f"a place in {array} that is not a vector's")
         if array != WEIGHTS and self.scope.arrays.get(array) != (self.vector, 1, True):
             raise Unread(f"{array} holds no vectors")
         return load(array, place.args[0], kind=self.vector)
@@ -464,7 +464,7 @@ class Parser:
         if text in ("true", "false"):
             return const(self._take() == "true")
         if kind != "word":
-            raise Unread(f"{text!r} is no value")
+            raise Unread(f"{text!r} is not a value")
         self._take()
         return self._call(text) if self._has("(") else self._postfix(text)
 
@@ -504,7 +504,7 @@ class Parser:
         if word == "select" and language.lets and len(values) == 3:
             return self._made("select", values[2], values[1], values[0])
         if word not in language.calls:
-            raise Unread(f"{word} is no function of the language's list")
+            raise Unread(f"{word} is not a function of the language's list")
         return self._made(language.calls[word], *values)
 
     def _texel(self) -> Expr:

@@ -35,7 +35,7 @@ def table() -> Table:
     for entry in entry_points(group=GROUP):
         found: Table = entry.load()
         return found
-    raise ExecutorUnavailable("the peers are not installed: pip install wamnet-peers")
+    raise ExecutorUnavailable("the baselines are not installed: pip install wamnet-peers")
 
 
 def contenders() -> tuple[Contender, ...]:

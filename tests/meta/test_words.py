@@ -110,7 +110,7 @@ GLOSSARY = (
     Word(r"(?:has|have) (?:not |never )?learned", "was trained on", "networks are trained"),
     Word(r"spectra", "FFT", "the name of the schedule"),
     Word(r"ways? out", "remedy, fix", "the word of the field"),
-    Word(r"peers?", "baseline, other renderer", "the word of the field"),
+    Word(r"(?<![-/.])peers?", "baseline, other renderer", "the word of the field"),
     Word(r"shelf", "prebuilt kernels", "the word of the field"),
     Word(r"telephones?", "phone", "the usual word"),
     Word(r"that (?:is|are) here", "available, installed", "a place says nothing"),

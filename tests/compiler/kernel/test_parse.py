@@ -215,7 +215,7 @@ def test_every_token_counts(tiny, target, schedule):
 
 REFUSED = {
     "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "no frame of opencl"),
-    "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is no constant"),
+    "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is not a constant"),
     "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
     "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
     "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "begins with no token"),
@@ -224,22 +224,22 @@ REFUSED = {
         "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */",
         "beyond printable ASCII",
     ),
-    "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;", "'clamp' is no name of a value"),
+    "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;", "'clamp' is not a name of a value"),
     "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]", "part2 is not declared"),
     "a double": ("part1[j] = 0.0f", "part1[j] = 0.0", "begins with no token"),
-    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is no value"),
+    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is not a value"),
     "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0", "begins with no token"),
     "an integer that is too large": (
         "float v1[2];",
         "float v1[2]; int big = 4294967297;",
-        "4294967297 is no constant of type int32",
+        "4294967297 is not a constant of type int32",
     ),
     "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j", "part1 of type .* has a value of type"),
-    "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;", "j is no array"),
+    "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;", "j is not an array"),
     "a call of another function": (
         "part1[j] = 0.0f",
         "part1[j] = tan(0.0f)",
-        "tan is no function of the language",
+        "tan is not a function of the language",
     ),
     "an index beyond its array": ("float v1[2];", "float v1[2]; v1[2] = 0.0f;", "index 2 is beyond v1"),
     "a further statement": (

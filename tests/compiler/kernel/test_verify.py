@@ -69,7 +69,7 @@ WRONG = {
         "name of type int32 is said to have type float32",
     ),
     "an array without its index": (small(V, Let("t", name("v", FLOAT))), "v is an array without its index"),
-    "an index of a value": (small(Let("t", ZERO), Let("u", load("t", 0))), "t is no array"),
+    "an index of a value": (small(Let("t", ZERO), Let("u", load("t", 0))), "t is not an array"),
     "a missing index": (small(Array("m", FLOAT, (2, 2)), Let("t", load("m", 0))), "m has 2 indices, not 1"),
     "a float for an index": (
         small(V, Let("t", load("v", ZERO))),
@@ -93,23 +93,23 @@ WRONG = {
         small(Let("t", Expr("take", (const(2),), FLOAT, "table")), tables=TABLES),
         "index 2 is beyond table",
     ),
-    "a table that is not there": (small(Let("t", Expr("take", (X,), FLOAT, "other"))), "other is no table"),
+    "a table that is not there": (small(Let("t", Expr("take", (X,), FLOAT, "other"))), "other is not a table"),
     "another type in an array": (
         small(V, Store("v", (const(0),), const(1))),
         "v has elements of type float32, not",
     ),
     "lanes that differ": (small(Let("t", apply("add", splat(ZERO, 4), ZERO))), "lanes differ"),
     "kinds that differ": (small(Let("t", apply("add", ZERO, 1))), "add: operands must all be"),
-    "a sum of truth values": (
+    "a sum of booleans": (
         small(Let("t", Expr("add", (X < 1, X < 1), BOOL))),
         "add: operands must all be",
     ),
     "a missing operand": (small(Let("t", Expr("add", (ZERO,), FLOAT))), "add has 1 operands, not 2"),
     "an operation that is not there": (
         small(Let("t", Expr("twist", (ZERO,), FLOAT))),
-        "twist is no operation",
+        "twist is not an operation",
     ),
-    "a constant of another kind": (small(Let("t", const(0.5, INT))), "0.5 is no constant of type int32"),
+    "a constant of another kind": (small(Let("t", const(0.5, INT))), "0.5 is not a constant of type int32"),
     "a type that does not exist": (small(Array("v", Type("float16"), (2,))), "which does not exist"),
     "bits of no words": (
         small(Let("t", Expr("bits", (ZERO,), FLOAT))),
@@ -155,7 +155,7 @@ WRONG = {
         small(functions=(Function("f", (), (Barrier(),), ZERO),), group=(2, 2)),
         "function f has a barrier",
     ),
-    "a function that is not there": (small(Let("t", call("f", [X], INT))), "f is no function of values"),
+    "a function that is not there": (small(Let("t", call("f", [X], INT))), "f is not a function of values"),
     "a missing argument": (
         small(Let("t", call("twice", [], INT)), functions=(GIVEN,)),
         "twice takes 1 values, not 0",
@@ -170,11 +170,11 @@ WRONG = {
     ),
     "a function that calls itself": (
         small(functions=(Function("f", (("n", INT),), (), call("f", [name("n")], INT)),)),
-        "f is no function of values",
+        "f is not a function of values",
     ),
     "a call of a function of values": (
         small(Call("twice", ()), functions=(GIVEN,)),
-        "twice is no function on views",
+        "twice is not a function on views",
     ),
     "a missing view": (
         small(V, Call("copy", (View("v", (X,), X),)), functions=(COPY,)),

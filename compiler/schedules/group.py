@@ -106,6 +106,7 @@ class Group(Straight):
 
     pixel_names = True
     element = FLOAT
+    is_filled = False
 
     def __init__(
         self, program: Program, slots: Mapping[str, Slot], pixels: int, size: tuple[int, int], wide: bool
@@ -199,7 +200,10 @@ class Group(Straight):
         return found
 
     def staged(self, values: Sequence[Expr]) -> list[Statement]:
-        """Return the copy of a pixel's values for all that the group's windows touch, by all its items."""
+        """Return the copy of a pixel's values for all that the group's windows touch, by all its items.
+
+        A tile that holds others is filled again when all items have read it.
+        """
         tile_row, tile_column = name("tile_row"), name("tile_column")
         lines: list[Statement] = [
             Let("tile_row", name("top") + COUNTER // TILE_WIDTH),
@@ -212,7 +216,8 @@ class Group(Straight):
             lines.append(Let("inside", same))
         lines += [Store(TILE, (const(plane) * PLANE + COUNTER,), value) for plane, value in enumerate(values)]
         share = For("i", PLANE, tuple(lines), start=name("item"), step=GROUP_WIDTH * GROUP_HEIGHT)
-        return [Barrier(), share, Barrier()]
+        again, self.is_filled = self.is_filled, True
+        return [*([Barrier()] if again else []), share, Barrier()]
 
     def of_taps(self, index: int, first: int, planes: int) -> list[Statement]:
         """Return the products of the tile's taps: a partial sum for each row of taps [core/sums.py]."""

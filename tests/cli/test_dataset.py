@@ -242,8 +242,8 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
 def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
     """Before anything is rendered: the lattice of a scene that stands still is one picture."""
     text = refused("dataset", "daylight", "--frames", 2, "--test", 1, "--size", 12, "-o", "still")
-    assert "test frame is test/00000" in text
-    assert "over 99 % of the pixels; move the camera (--yaw, --pitch, --distance)" in text
+    assert "test frame 'test/00000 (" in text
+    assert "over 99 % of the pixels (move the camera (--yaw, --pitch, --distance)" in text
     assert not (tmp_path / "still").exists()
 
 

@@ -117,8 +117,8 @@ def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, 
     monkeypatch.setattr(module, "entry_points", lambda group: [])
     assert command not in wamnet().out
     assert refused(command, "check", "1") == (
-        f"wamnet: error: command is {command}: distribution {distribution} is not installed; "
-        f"install it: pip install {distribution}\n"
+        f"wamnet: error: command '{command}': distribution {distribution} is not installed "
+        f"(install it: pip install {distribution})\n"
     )
 
 

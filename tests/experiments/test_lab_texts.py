@@ -80,7 +80,7 @@ def test_no_line_begins_with_a_mark(kept, text, made):
 
 @pytest.mark.parametrize("start", ["", "> ", "* ", "1. ", "  "])
 def test_a_paragraph_that_begins_with_a_mark_is_refused(kept, start):
-    with pytest.raises(InputError, match="ends its paragraph; begin with a word"):
+    with pytest.raises(InputError, match=r"ends its paragraph \(begin with a word\)"):
         filler(kept).text(f"Text.\n\n{start}<!--= seeds -->3<!--/--> seeds.\n")
 
 
@@ -142,7 +142,7 @@ def test_a_plot_without_a_record_must_wait_for_one(tmp_path):
     plot = plots.Plot(lambda found: None, ("study",))
     assert not plots.ready(plot, Records(tmp_path), tmp_path)
     (tmp_path / "pending.txt").write_text("# nothing\n")
-    with pytest.raises(Missing, match="it is not there"):
+    with pytest.raises(Missing, match="record 'study': not found"):
         plots.ready(plot, Records(tmp_path), tmp_path)
     (tmp_path / "pending.txt").write_text("study, no command\n")
     with pytest.raises(InputError, match="an entry has 3 parts"):

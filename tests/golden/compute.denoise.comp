@@ -99,7 +99,6 @@ void main()
     /* %1: affine map W0 from 12 to 5 */
     vec4 v1_0_0 = w[24];
     vec4 v1_0_1 = w[25];
-    barrier();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

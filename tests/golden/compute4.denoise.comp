@@ -105,7 +105,6 @@ void main()
     vec4 v1_2_1 = w[25];
     vec4 v1_3_0 = w[24];
     vec4 v1_3_1 = w[25];
-    barrier();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

@@ -58,7 +58,7 @@ __kernel void wamnet_denoise(
         int row = clamp(top + dy, 0, height - 1);
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 3; ++i) {
-                patch_a[dy * PATCH_WIDTH * 3 + i] = (uchar)((int)image_a[row * width * 3 + left * 3 + i] + 128);
+                patch_a[dy * PATCH_WIDTH * 3 + i] = (uchar)((int)image_a[(row * width + left) * 3 + i] + 128);
             }
         }
         else {
@@ -72,7 +72,7 @@ __kernel void wamnet_denoise(
         }
         if (within) {
             for (int i = 0; i < PATCH_WIDTH; ++i) {
-                patch_b[dy * PATCH_WIDTH + i] = (uchar)((int)image_b[row * width * 1 + left + i] + 128);
+                patch_b[dy * PATCH_WIDTH + i] = (uchar)((int)image_b[(row * width + left) * 1 + i] + 128);
             }
         }
         else {
@@ -129,8 +129,8 @@ __kernel void wamnet_denoise(
     for (int i = 0; i < PIXELS; ++i) {
         int4 t2 = CONVERT(v1[i], int4);
         uint4 t3 = CONVERT(t2, uint4);
-        uint4 t5 = CONVERT(w[7 + i % 1], uint4);
-        uint4 t8 = CONVERT(w[8 + i % 1], uint4);
+        uint4 t5 = CONVERT(as_float4(w[7 + i % 1]), uint4);
+        uint4 t8 = CONVERT(as_float4(w[8 + i % 1]), uint4);
         uint4 t9 = t3 * t5 + t8;
         uint4 t11 = t9 >> 22u;
         uint4 t13 = t11 & 1u;
@@ -187,8 +187,8 @@ __kernel void wamnet_denoise(
     union { float4 all[PIXELS]; float number[PIXELS * 4]; } v67;
     for (int i = 0; i < PIXELS; ++i) {
         int4 t51 = CONVERT(v50[i], int4);
-        int4 t53 = CONVERT(w[11 + i % 1], int4);
-        int4 t56 = CONVERT(w[12 + i % 1], int4);
+        int4 t53 = CONVERT(as_float4(w[11 + i % 1]), int4);
+        int4 t56 = CONVERT(as_float4(w[12 + i % 1]), int4);
         int4 t57 = t51 * t53 + t56;
         int4 t59 = (int4)(0) > t57 ? (int4)(0) : t57;
         int4 t61 = (int4)(16777216) < t59 ? (int4)(16777216) : t59;

@@ -104,7 +104,7 @@ static inline void wamnet_floats(float *to, const wamnet_sums *from)
 #endif
 
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
-   to `result`, the whole picture's array. */
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_a,
     const float *restrict image_b,
@@ -158,7 +158,7 @@ static inline void wamnet_pixel(
         int row = wamnet_clamp(top + dy, 0, height - 1);
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 3; ++i) {
-                patch_a[dy * PATCH_WIDTH * 3 + i] = (uint8_t)((int32_t)image_a[row * width * 3 + left * 3 + i] + 128);
+                patch_a[dy * PATCH_WIDTH * 3 + i] = (uint8_t)((int32_t)image_a[(row * width + left) * 3 + i] + 128);
             }
         }
         else {
@@ -172,7 +172,7 @@ static inline void wamnet_pixel(
         }
         if (within) {
             for (int i = 0; i < PATCH_WIDTH; ++i) {
-                patch_b[dy * PATCH_WIDTH + i] = (uint8_t)((int32_t)image_b[row * width * 1 + left + i] + 128);
+                patch_b[dy * PATCH_WIDTH + i] = (uint8_t)((int32_t)image_b[(row * width + left) * 1 + i] + 128);
             }
         }
         else {

@@ -109,7 +109,6 @@ void wamnet_denoise(
     /* %1: affine map W0 from 12 to 5 */
     float4 v1_0_0 = w[24];
     float4 v1_0_1 = w[25];
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

@@ -115,7 +115,6 @@ void wamnet_denoise(
     float4 v1_2_1 = w[25];
     float4 v1_3_0 = w[24];
     float4 v1_3_1 = w[25];
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

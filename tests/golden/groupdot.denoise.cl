@@ -53,11 +53,11 @@ float4 wamnet_numbers(int4 bits)
 #define TILE_NUMBERS (PLANE * 2)
 float4 elementwise_49(float4 v1, float4 v4, float4 v7)
 {
-    int4 t2 = wamnet_floats(v1);
-    uint4 t3 = wamnet_floats(t2);
-    uint4 t5 = wamnet_floats(v4);
+    int4 t2 = CONVERT(v1, int4);
+    uint4 t3 = CONVERT(t2, uint4);
+    uint4 t5 = CONVERT(v4, uint4);
     uint4 t6 = t3 * t5;
-    uint4 t8 = wamnet_floats(v7);
+    uint4 t8 = CONVERT(v7, uint4);
     uint4 t9 = t6 + t8;
     uint4 t11 = t9 >> 22u;
     uint4 t13 = t11 & 1u;
@@ -77,10 +77,10 @@ float4 elementwise_49(float4 v1, float4 v4, float4 v7)
     uint4 t35 = t33 + 8388608u;
     uint4 t37 = t35 >> 24u;
     uint4 t39 = (uint4)(127u) < t37 ? (uint4)(127u) : t37;
-    float4 t40 = wamnet_floats(t39);
+    float4 t40 = CONVERT(t39, float4);
     uint4 t42 = t9 >> 23u;
     uint4 t43 = t42 & 1u;
-    float4 t44 = wamnet_floats(t43);
+    float4 t44 = CONVERT(t43, float4);
     float4 t46 = 2.0f * t44;
     float4 t48 = 1.0f - t46;
     float4 t49 = t40 * t48;
@@ -88,16 +88,16 @@ float4 elementwise_49(float4 v1, float4 v4, float4 v7)
 }
 float4 elementwise_67(float4 v50, float4 v52, float4 v55)
 {
-    int4 t51 = wamnet_floats(v50);
-    int4 t53 = wamnet_floats(v52);
+    int4 t51 = CONVERT(v50, int4);
+    int4 t53 = CONVERT(v52, int4);
     int4 t54 = t51 * t53;
-    int4 t56 = wamnet_floats(v55);
+    int4 t56 = CONVERT(v55, int4);
     int4 t57 = t54 + t56;
     int4 t59 = (int4)(0) > t57 ? (int4)(0) : t57;
     int4 t61 = (int4)(16777216) < t59 ? (int4)(16777216) : t59;
-    uint4 t62 = wamnet_floats(t61);
+    uint4 t62 = CONVERT(t61, uint4);
     uint4 t64 = t62 >> 8u;
-    float4 t65 = wamnet_floats(t64);
+    float4 t65 = CONVERT(t64, float4);
     float4 t67 = t65 * 1.52587891e-05f;
     return t67;
 }
@@ -122,7 +122,6 @@ void wamnet_denoise(
 
     /* %1: affine map W0 from 20 to 3 */
     int4 s1_0_0 = (int4)(0);
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

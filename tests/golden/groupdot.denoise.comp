@@ -121,7 +121,6 @@ void main()
 
     /* %1: affine map W0 from 20 to 3 */
     ivec4 s1_0_0 = ivec4(0);
-    barrier();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

@@ -136,7 +136,6 @@ extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_
 
     /* %1: affine map W0 from 20 to 3 */
     int4 s1_0_0 = make_int4(0, 0, 0, 0);
-    __syncthreads();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;

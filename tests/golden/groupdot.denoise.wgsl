@@ -109,7 +109,6 @@ fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_
 
     /* %1: affine map W0 from 20 to 3 */
     var s1_0_0: vec4<i32> = vec4<i32>(0);
-    workgroupBarrier();
     for (var i: i32 = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         let tile_row: i32 = top + i / TILE_WIDTH;
         let tile_column: i32 = left + i % TILE_WIDTH;

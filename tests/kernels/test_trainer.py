@@ -501,7 +501,7 @@ def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> Non
     kept: list[TrainState] = []
     with (
         np.errstate(over="ignore"),
-        pytest.raises(TrainingError, match="parameters after step 1 are not finite"),
+        pytest.raises(TrainingError, match="parameters after step 1: must be finite"),
     ):
         train_on(opencl, replace(SMALL, learning_rate=1e39, steps=1), PAIRS, on_checkpoint=kept.append)
     assert [state.step for state in kept] == [0]

@@ -233,7 +233,7 @@ def test_a_refusal_is_no_deviation(executor_named, model, images):
     assert [v.state for v in found] == ["within", "refused: not today"]
     assert not triage.odd_ones(found)
     found = verdicts_of(runners(executor_named, "opencl"), model, images, which="spiral")
-    assert "schedule 'spiral' does not exist" in found[0].state
+    assert "schedule 'spiral': unknown to this target (choose one of plain)" in found[0].state
 
 
 SEGMENTATION_FAULT = {

@@ -224,7 +224,11 @@ REFUSED = {
         "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */",
         "beyond printable ASCII",
     ),
-    "a name of a function": ("float v1[2];", "float v1[2]; int clamp = 0;", "'clamp' is not a name of a value"),
+    "a name of a function": (
+        "float v1[2];",
+        "float v1[2]; int clamp = 0;",
+        "'clamp' is not a name of a value",
+    ),
     "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]", "part2 is not declared"),
     "a double": ("part1[j] = 0.0f", "part1[j] = 0.0", "begins with no token"),
     "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is not a value"),

@@ -93,7 +93,10 @@ WRONG = {
         small(Let("t", Expr("take", (const(2),), FLOAT, "table")), tables=TABLES),
         "index 2 is beyond table",
     ),
-    "a table that is not there": (small(Let("t", Expr("take", (X,), FLOAT, "other"))), "other is not a table"),
+    "a table that is not there": (
+        small(Let("t", Expr("take", (X,), FLOAT, "other"))),
+        "other is not a table",
+    ),
     "another type in an array": (
         small(V, Store("v", (const(0),), const(1))),
         "v has elements of type float32, not",

@@ -126,7 +126,7 @@ def test_a_process_that_ends_is_told(monkeypatch) -> None:
 
 @pytest.mark.parametrize("scene", [scenes.furnace(), scenes.glossy(), scenes.daylight()])
 def test_what_cycles_would_show_differently_is_refused(scene) -> None:
-    with pytest.raises(InputError, match=f"{scene.name}: (only matte|no sky)"):
+    with pytest.raises(InputError, match=f"scene.* '{scene.name}': (only matte|no sky)"):
         peer_cycles.check(scene, Settings())
 
 

@@ -69,6 +69,8 @@ class Plainly(Nest):
     def read(self, index: int, lane: Expr | None = None) -> Expr:
         """Return a value, or one component of it."""
         node = self.program.nodes[index]
+        if node.op == "constant":
+            return self.constant(node)
         if node.op == "parameter":
             return weight(self.offset(node["name"]) + lane if lane else self.offset(node["name"]))
         kind = Type(node.type.dtype)

@@ -176,10 +176,10 @@ def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> N
 FAULTS = {
     "first pass, tap": (0, "int left = x - CENTRE_COLUMN", "int left = x - CENTRE_COLUMN + 1"),
     "first pass, row": (0, "int top = y - CENTRE_ROW", "int top = y + 1"),
-    "first pass, channel": (0, "row[p * 3 + i]", "row[p * 3 + (i ^ 1)]"),
+    "first pass, channel": (0, "PATCH_WIDTH + p) * 3 + i]", "PATCH_WIDTH + p) * 3 + (i ^ 1)]"),
     "second pass, tap": (1, "int top = y - CENTRE_ROW", "int top = y - CENTRE_ROW + 1"),
     "second pass, column": (1, "int left = x - CENTRE_COLUMN", "int left = x - 1"),
-    "second pass, pixel": (1, "row[p * 5 + i]", "row[i]"),
+    "second pass, pixel": (1, "PATCH_WIDTH + p) * 5 + i]", "PATCH_WIDTH) * 5 + i]"),
     "second pass, border": (1, "clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
 }
 """Which kernel, a piece of it, and what makes it wrong; none leaves an array."""
@@ -199,7 +199,7 @@ def test_a_wrong_pass_is_caught(executor_named, kit, fault) -> None:
 
 
 FRAGMENT_FAULTS = {
-    "first pass, channel": (0, "result_1[i] = v1[4 + i]", "result_1[i] = v1[i]"),
+    "first pass, channel": (0, "result_1[1] = v1[5]", "result_1[1] = v1[1]"),
     "first pass, tap": (0, "x + dx - CENTRE_COLUMN", "x + dx - CENTRE_ROW"),
     "second pass, image": (
         1,

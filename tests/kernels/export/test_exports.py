@@ -290,7 +290,7 @@ def test_what_a_tool_refuses_is_a_verdict():
     whole = made("c")
     files = {**whole.files, "denoise/denoise.h": b"int wamnet(int x) { return x + 1.5; }\n"}
     verdict = check.check(replace(whole, files=files))
-    assert verdict.wrong.startswith("cc refuses the kernel")
+    assert verdict.wrong.startswith("cc rejects the kernel")
 
 
 # ---- places of weights, variants, limits -------------------------------------------------------------------

@@ -295,7 +295,7 @@ def test_the_add_on_is_right_inside_blender(tmp_path):
 
 def test_a_model_of_what_blender_lacks_is_refused():
     model = model_of(("color", "unshadowed", "direction"))
-    with pytest.raises(InputError, match="is unshadowed, direction: host blender has no such"):
+    with pytest.raises(InputError, match="'unshadowed, direction': are not available in host blender"):
         export(Request(model, "c", host="blender"))
 
 

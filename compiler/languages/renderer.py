@@ -268,9 +268,9 @@ class Renderer(Lines):
         assert found is not None, array
         channels = int(found.shape[-1])
         if lanes > 1:
-            row, column = map(self.text, index)
+            y, x = map(self.text, index)
             return self.dialect.texel.format(
-                image=array.removeprefix(IMAGE), row=row, column=column, part="rgba"[:lanes]
+                image=array.removeprefix(IMAGE), row=y, column=x, part="rgba"[:lanes]
             )
         if len(index) == 2:
             row, position = index
@@ -278,10 +278,10 @@ class Renderer(Lines):
                 "a position in a row is the first of a pixel's, and a distance from it"
             )
             first, beyond = position.args
-            index = row, first if channels == 1 else first.args[0], beyond
-        row, column, channel = map(self.text, index)
+            index = [row, first if channels == 1 else first.args[0], beyond]
+        y, x, c = map(self.text, index)
         return self.dialect.pixel.format(
-            image=array.removeprefix(IMAGE), channels=channels, row=row, column=column, c=channel
+            image=array.removeprefix(IMAGE), channels=channels, row=y, column=x, c=c
         )
 
     def element(self, array: str, index: Sequence[Expr], lanes: int) -> str:

@@ -149,7 +149,7 @@ def stored(program: Program, parameter: str, lanes: int, vectors: int) -> NDArra
     filled = np.zeros((len(rows), blocks.total * lanes), np.float32)
     filled[:, : rows.shape[1]] = rows
     if program.parameters[parameter].ndim == 1:
-        return filled[0]
+        return filled.ravel()
     ordered = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
     found: NDArray[np.float32] = np.ascontiguousarray(ordered)
     return found

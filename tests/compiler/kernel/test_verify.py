@@ -201,5 +201,7 @@ def test_refused(kernel, message):
         verify(kernel)
 
 
-def test_names_of_scopes_side_by_side_may_be_equal():
+def test_names_of_scopes_side_by_side_may_be_equal_but_not_those_within():
     verify(small(V, looped(Let("t", TURN)), looped(Let("t", TURN)), WRITE))
+    with pytest.raises(KernelError, match="t is declared twice"):
+        verify(small(V, Let("t", X), looped(Let("t", TURN)), WRITE))

@@ -148,7 +148,7 @@ def test_a_model_of_no_single_canonical_scene_needs_a_name(refused, here, learne
     several = replace(model, info={"trained_on_scene": learned})
     save_model(here / "several.safetensors", several)
     line = refused("view", "several.safetensors", "-o", "page.html")
-    assert f"scene that the model was trained on is {learned}: " in line
+    assert f"scene that the model was trained on '{learned}': " in line
     assert "name one with --scene" in line
 
 

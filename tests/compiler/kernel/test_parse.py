@@ -214,7 +214,7 @@ def test_every_token_counts(tiny, target, schedule):
 
 
 REFUSED = {
-    "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "no frame of opencl"),
+    "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "not a frame of opencl"),
     "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is not a constant"),
     "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
     "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
@@ -249,12 +249,12 @@ REFUSED = {
     "a further statement": (
         "    int x = (int)get",
         "    width = 1;\n    int x = (int)get",
-        "no frame of opencl",
+        "not a frame of opencl",
     ),
     "a further function": (
         "__kernel void",
         "float twice(float a) { return a; }\n__kernel void",
-        "no frame of opencl",
+        "not a frame of opencl",
     ),
     "images in another order": (
         "image_a,\n",

@@ -124,7 +124,7 @@ def train(
 ) -> Model:
     """Train a denoiser on noisy frames and their references, and return the model.
 
-    `noisy` and `clean` are a frame each, or as many of both; a frame is a `Frame` or a mapping from layers
+    `noisy` and `clean` are one frame each, or as many frames each; a frame is a `Frame` or maps layers
     to arrays (H, W, C). Noisy frames have the layers of `features` (those of the `preset` by default), clean
     ones `"color"`. `steps` replaces the preset's number of steps. `on_progress` is called with the number of
     steps and the loss. Presets are short, best, mirrors, sky and paper.

@@ -32,7 +32,7 @@ LIMIT_S = 0.5
 """Seconds that a renderer may take."""
 
 GRACE_S = 5.0
-"""Seconds within which a killed process has gone: on a busy machine it is listed for a moment more."""
+"""Seconds for which a killed process may still be listed: a busy machine reaps it late."""
 
 COMMANDS = (
     "denoise {good}/model.safetensors {good}/frame.exr --anyway -o out.exr --executor {executor}",

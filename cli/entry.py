@@ -75,10 +75,8 @@ def _incomplete(error: ModuleNotFoundError) -> int:
     """Print which package the base installation lacks, and how to install it; a module of ours is a bug."""
     if (error.name or "wamnet").startswith("wamnet"):
         raise error
-    fix = "install it: pip install 'wamnet[full]'"
-    sys.stderr.write(
-        f"wamnet: error: Python package {error.name!r} is missing: the command needs it; {fix}\n"
-    )
+    rule, fix = "missing, and needed for the command", "install it: pip install 'wamnet[full]'"
+    sys.stderr.write(f"wamnet: error: Python package {error.name!r}: {rule} ({fix})\n")
     return 2
 
 

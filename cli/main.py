@@ -1,7 +1,8 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
-1. Commands are registered with typer in the order of a first session [`COMMANDS`]; the module of a command
-   is imported when it is the one that runs, or all are listed [`application`].
+1. Commands are registered with typer in the order of a first session [`COMMANDS`], then those of other
+   distributions [`_join`]; the module of a command is imported when it is the one that runs, or all are
+   listed [`application`].
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
@@ -16,11 +17,12 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Annotated, Any
 
 import typer
 
-from ..refimpl.errors import WamnetError
+from ..refimpl.errors import InputError, WamnetError
 from .common.default_command import CommandWithOthers
 from .common.terminal import tell
 
@@ -57,12 +59,7 @@ COMMANDS: Mapping[str, tuple[str, str, str]] = {
     "tune": ("tune", "tune", "EXAMPLES"),
     "executors": ("denoise", "executors", "EXECUTORS_EXAMPLES"),
     "conformance": ("conformance", "conformance", "EXAMPLES"),
-    "verify-renderer": ("verify.renderer", "verify_renderer", "EXAMPLES"),
     "demo": ("demo", "demo", "EXAMPLES"),
-    "course": ("course.labs", "course", ""),
-    "course start": ("course.labs", "start", "START_EXAMPLES"),
-    "course check": ("course.labs", "check", "CHECK_EXAMPLES"),
-    "course grade": ("course.labs", "grade", "GRADE_EXAMPLES"),
     "bench": ("bench", "bench", "EXAMPLES"),
     "bench render": ("measure.render", "render", "EXAMPLES"),
     "bench train": ("measure.train", "train", "EXAMPLES"),
@@ -71,6 +68,13 @@ COMMANDS: Mapping[str, tuple[str, str, str]] = {
     "bench primitives": ("measure.primitives", "primitives", "EXAMPLES"),
 }
 """Each command's module in `commands`, function and examples; one of a group follows the group."""
+
+DISTRIBUTIONS: Mapping[str, str] = {"verify-renderer": "wamnet-verify", "course": "wamnet-course"}
+"""Distribution of each command that joins through an entry point of the group `ENTRY_POINTS`."""
+
+ENTRY_POINTS = "wamnet.commands"
+"""Group of entry points: a name is a command's, its value a module with a table `COMMANDS`: function and
+examples of each command, and of those in its group."""
 
 GROUPS: Mapping[str, Mapping[str, Any]] = {
     "course": {},
@@ -92,12 +96,26 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback(invoke_without_command=True)(root)
-    first = arguments[0] if arguments and arguments[0] in (*COMMANDS, VERSION) else None
+    first = arguments[0] if arguments and arguments[0] in (*COMMANDS, *DISTRIBUTIONS, VERSION) else None
     groups = {"": app}
     for path, (module, function, examples) in COMMANDS.items():
         if first in (None, path.partition(" ")[0]):
             _register(groups, path, import_module(f".commands.{module}", __package__), function, examples)
+    if first is None or first in DISTRIBUTIONS:
+        _join(groups, first)
     return app
+
+
+def _join(groups: dict[str, typer.Typer], name: str | None) -> None:
+    """Add the command of this name, or without one all installed commands of other distributions."""
+    installed = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    if name and name not in installed:
+        remedy = f"install it: pip install {DISTRIBUTIONS[name]}"
+        raise InputError("command", name, f"distribution {DISTRIBUTIONS[name]} is not installed", remedy)
+    for entry in (installed[name],) if name else installed.values():
+        module = entry.load()
+        for path, (function, examples) in module.COMMANDS.items():
+            _register(groups, path, module, function, examples)
 
 
 def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: str, examples: str) -> None:
@@ -117,7 +135,7 @@ def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: 
 
 def root(
     context: typer.Context,
-    version: Annotated[bool, typer.Option(VERSION, help="Show the version and end.")] = False,
+    version: Annotated[bool, typer.Option(VERSION, help="Print the version and exit.")] = False,
 ) -> None:
     """Render a scene, train a small network that denoises it, and run that network anywhere.
 
@@ -188,9 +206,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except WamnetError as error:
         return _fail(str(error))
     except MemoryError:
-        return _fail(
-            "the memory does not suffice; use smaller frames or fewer --workers, or end other programs"
-        )
+        return _fail("out of memory (use smaller frames or fewer --workers, or close other programs)")
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}")

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..models.writing import making_parents, write_together
 from .core.ir import Image, Program
-from .core.writing import making_parents, write_together
-from .languages import interface
-from .languages.interface import Interface
+from .kernel import interface
+from .kernel.interface import Interface
 
 if TYPE_CHECKING:
     from .plan import Plan

@@ -23,15 +23,14 @@ from . import artifact
 from .artifact import Artifact, schedule_text
 from .core import ir
 from .core.enclosure import round_up as round_up
-from .core.ir import LEAST, OUTPUT_ENCODING, Gather, Program
+from .core.ir import OUTPUT_ENCODING, Gather, Program
 from .core.passes import pipeline
 from .core.profiles import SineContract
 from .core.sums import is_split
-from .languages.c import stack_bytes
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
 from .proof.whole import has_one_zero
-from .schedules.emit import kernel_gather, output_channels
+from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
 from .schedules.schedules import PLAIN, Schedule
 
@@ -45,9 +44,6 @@ JSON_INFO = ("normalization", "recipe")
 
 AGAINST = "float64 reference, same float32 weights and images"
 """What a bound compares a kernel with."""
-
-AGAINST_PINNED = f"{AGAINST}, where weights below {LEAST!r} are 0"
-"""The same for an exact kernel."""
 
 AGAINST_WHOLE = "reference in integers, the same bits"
 """The same for a kernel in which nothing rounds."""
@@ -157,7 +153,7 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
     arguments = _arguments(plan).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
-    language = picked.schedule.language or target.language
+    language = plan.language.language if plan.language else target.language
     return [
         f"wamnet denoiser, {language}. Generated: change the compiler, not this text.",
         f"program   {ir.digest(program)[:32]}",
@@ -179,10 +175,7 @@ def _header(plan: Plan, bound: Bound) -> list[str]:
 
 def _arguments(plan: Plan) -> str:
     """Return how a kernel is called."""
-    (columns, rows), schedule = plan.picked.extent, plan.schedule
-    numbers = {"columns": columns, "rows": rows, "channels": output_channels(plan.emitted)}
-    stack = stack_bytes(schedule.private_bytes(plan.emitted))
-    return schedule.arguments.format(**numbers, stack=stack, **schedule.called())
+    return plan.schedule.arguments(plan.emitted)
 
 
 def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
@@ -214,17 +207,18 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
     gather, profile = kernel_gather(emitted), plan.profile
     weights, slots = schedule.pack(emitted), schedule.layout(emitted).values()
     raw = weights.astype("<f4").tobytes()
-    source_name = f"denoise{schedule.suffix or target.suffix}"
+    suffix = plan.language.suffix if plan.language else target.suffix
+    source_name = f"denoise{suffix}"
     manifest: dict[str, Any] = {
         "schema": artifact.SCHEMA,
         "digest": ir.sha256(source.encode(), raw),
         "program": ir.digest(plan.analysed),
         "target": target.name,
-        "language": schedule.language or target.language,
+        "language": plan.language.language if plan.language else target.language,
         "entry_point": entry,
         "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(plan.sine),
-        "passes": [*pipeline.COMMON, *profile.common, *profile.passes],
+        "passes": [*pipeline.COMMON, *profile.passes],
         "window": _window(gather),
         "images": [image.facts for image in gather.images],
         "output": {
@@ -235,7 +229,7 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
         "arguments": _arguments(plan),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
-            "against": AGAINST_WHOLE if bound.exact else AGAINST_PINNED if emitted.exact else AGAINST,
+            "against": AGAINST_WHOLE if bound.exact else AGAINST,
         },
         "certificate": artifact.CERTIFICATE_NAME if bound.proof or bound.exact else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],

@@ -7,9 +7,9 @@
    [`Plan.emitted`]; and it picks the schedule once [`Plan.picked`].
 3. It bounds the output over all inputs that the images can hold, and refuses a program whose sines may leave
    the domain on which their error is known, or whose numbers may leave float32 [`Plan.bound`].
-4. It says what a kernel may write for given images: the reference's picture in float64, with the weights that
-   the profile has, and how far each number may be from it: a-posteriori [`Plan.expected`]. Both are computed
-   for a block of rows at a time: all windows of a picture fill the memory.
+4. It says what a kernel may write for given images: the reference's picture in float64, and how far each
+   number may be from it: a-posteriori [`Plan.expected`]. Both are computed for a block of rows at a time: all
+   windows of a picture fill the memory.
 
 Everything is computed when it is first needed, and then kept.
 """
@@ -31,10 +31,11 @@ from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
+from .languages.dialect import Dialect
 from .proof import bounds, certificate, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
-from .schedules.emit import kernel_gather, output_channels
+from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
@@ -126,6 +127,11 @@ class Plan:
         """Return the schedule."""
         return self.picked.schedule
 
+    @property
+    def language(self) -> Dialect | None:
+        """Return the language of the source, which the interpreter has none of."""
+        return None if self.target.dialect is None else self.schedule.dialect
+
     @cached_property
     def passes(self) -> tuple[Plan, ...]:
         """Return the plan of each kernel in the order in which they run: this one, or those of two passes."""
@@ -205,7 +211,7 @@ class Plan:
     @property
     def reference(self) -> Program:
         """Return what a kernel computes up to rounding; a cut has the factors' product for weights."""
-        return replace(product(self.cut) if self.cut else self.analysed, exact=False)
+        return product(self.cut) if self.cut else self.analysed
 
     def expected(self, images: Images) -> Expected:
         """Return what a kernel may write for images (H, W, C); any number where a sine promises nothing.
@@ -230,9 +236,9 @@ class Plan:
         return Expected(np.concatenate(values), np.concatenate(errors))
 
 
-def analysed(program: Program, profile: str = "ieee") -> Program:
+def analysed(program: Program) -> Program:
     """Return the program that bounds speak about: after the common passes, each sine one node."""
-    return pipeline.run(program, (*pipeline.COMMON, *profiles.profile_named(profile).common))
+    return pipeline.run(program, pipeline.COMMON)
 
 
 def sine_contract(profile: str, target: str) -> SineContract:
@@ -249,13 +255,8 @@ def plan_program(
     """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     if kernel_gather(program).whole and rank:
-        raise CompileError(f"rank {rank}: it rounds sums, and a network of integers does not; leave it out")
-    common = analysed(program, profile)
-    if common.exact and chosen.assumes:
-        raise CompileError(
-            f"profile {profile}: kernels in {chosen.language} rest on a compiler that keeps operations in "
-            "order, which their text does not demand; use profile ieee, or a target whose text does"
-        )
+        raise CompileError(f"rank {rank}: rounds sums, and an integer network does not (leave it out)")
+    common = analysed(program)
     if rank and chosen.most is not None and rank > chosen.most:
         raise CompileError(
             f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "

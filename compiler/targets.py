@@ -10,46 +10,33 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..refimpl.errors import CompileError
+from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
+from .kernel.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages import opencl_path, planes
 from .languages.c import C
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
-from .languages.glsl import GLSL
+from .languages.glsl import GLSL, GLSLCompute
 from .languages.glsl_buffers import Compute, Vulkan
-from .languages.glsl_es import GLSLES, GLSLESInlined, GLSLESPacked
-from .languages.glsl_inlined import GLSLInlined
+from .languages.glsl_es import GLSLES
 from .languages.hosts import GodotDenoise, ShadertoyDenoise
-from .languages.interface import DENOISE, ENCODE, PATH
 from .languages.metal import Metal
 from .languages.opencl import OpenCL
-from .languages.weight_homes import HOMES
 from .languages.wgsl import WGSL
-from .schedules.buffers_group import (
-    ComputeGroup,
-    CUDADot,
-    CUDAGroup,
-    MetalGroup,
-    VulkanDot,
-    VulkanGroup,
-    WGSLDot,
-    WGSLGroup,
-    groups,
+from .schedules.schedules import (
+    Dot,
+    Fourier,
+    GroupDot,
+    Grouped,
+    Inline,
+    Packed,
+    Plain,
+    Printed,
+    Schedule,
+    Tile,
 )
-from .schedules.c_dot import C_DOT
-from .schedules.c_fourier import C_FOURIER
-from .schedules.c_tiled import C_LADDER
-from .schedules.emit_dot import dots
-from .schedules.emit_inlined import Inlined
-from .schedules.emit_packed import Packed
-from .schedules.glsl_compute import GLSL_COMPUTE
-from .schedules.opencl_dot import OPENCL_DOT
-from .schedules.opencl_fourier import OPENCL_FOURIER
-from .schedules.opencl_group import OPENCL_GROUP_DOT, OPENCL_GROUPS
-from .schedules.opencl_tiled import OPENCL_LADDER
-from .schedules.schedules import Plain, Printed, Schedule
 
 
 @dataclass(frozen=True)
@@ -88,6 +75,68 @@ class Target:
         return target_named, (self.name,)
 
 
+TILE_IDEAS = {
+    16: (14, "14 pixels share each weight: 28 vectors of 16 sums stay in registers"),
+    8: (6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
+    4: (6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
+}
+"""Pixels of a tile, and its idea, by lanes: AVX-512, AVX2, and SSE or NEON have those registers."""
+
+FFT_IDEA = "products of spectra in place of sums over the window, in tiles of 32 x 32 pixels"
+"""What an FFT schedule says of itself."""
+
+
+def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
+    """Return the schedules for processors: register tiles in each width of vector that the language has."""
+    found = [
+        Tile(f"tile{lanes}", TILE_IDEAS[lanes][1], dialect, lanes, TILE_IDEAS[lanes][0])
+        for lanes in dialect.tiles
+    ]
+    if 16 not in dialect.tiles or not dialect.wide:
+        return tuple(found)
+    idea = "a layer's neurons side by side in vectors of 16, one pixel after another"
+    return (Tile("vector16", idea, dialect, 16, 1), *found)
+
+
+def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
+    """Return the schedules of transforms, for languages whose functions take places in arrays.
+
+    Two tiles of 32 points side by side are as fast as four and take half the memory; one takes a third more
+    time: the weights pass by twice as often. The other layers have the register tiles of the tiled schedules.
+    """
+    if not dialect.transforms:
+        return ()
+    return (
+        Fourier("fft32", FFT_IDEA, dialect, 16, 14, 32, 2),
+        *(
+            Fourier(f"fft32x{lanes}", f"{FFT_IDEA}, by vectors of {lanes}", dialect, lanes, 6, 32, 2)
+            for lanes in (8, 4)
+        ),
+    )
+
+
+def dots(dialect: Dialect) -> tuple[Schedule, ...]:
+    """Return the schedule of bytes for processors."""
+    idea = "products of bytes, four at a time, of a network of integers"
+    found = Dot("dot16", idea, dialect, 16, 14)
+    found.instead = "tile16"
+    return (found,) if dialect.dot_of_bytes else ()
+
+
+def groups(dialect: Dialect, name: str = "group") -> tuple[Schedule, ...]:
+    """Return the schedules for graphics processors; none of them has been measured on one."""
+    one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
+    four = "the same with 4 pixels an item, which share each weight"
+    found: list[Schedule] = [
+        Grouped(name, one, dialect, 1),
+        Grouped(f"{name}4", four, dialect, 4, instead=name),
+    ]
+    if dialect.words:
+        idea = f"group4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
+        found.append(GroupDot("groupdot", idea, dialect, 4, instead="group4"))
+    return tuple(found)
+
+
 def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
     """Return the target whose source a dialect makes; `ladder` are its schedules after the plain one."""
     return Target(
@@ -104,6 +153,32 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         assumes=dialect.assumes,
     )
 
+
+def processor(dialect: Dialect) -> Target:
+    """Return the target of a language for processors, and for graphics processors where it has groups."""
+    shared = groups(dialect) if dialect.group else ()
+    return _dialect_target(dialect, *tiles(dialect), *ffts(dialect), *dots(dialect), *shared)
+
+
+QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
+"""A weight in a block of `vec4`, as std140 wants it; one in a table, or in memory of numbers."""
+
+HOMES: Mapping[str, tuple[str, Mapping[type[Dialect], str]]] = {
+    TABLE: ("are in the source", dict.fromkeys((Metal, CUDA, OpenCL, C, GodotDenoise), PLAIN_INDEX)),
+    BLOCK: (
+        "are a uniform block, or constant memory, of vectors of 4",
+        {
+            **dict.fromkeys((GLSL, GLSLES, Vulkan, Compute, WGSL), QUAD),
+            **dict.fromkeys((Metal, OpenCL), PLAIN_INDEX),
+        },
+    ),
+}
+"""Other places for weights than a target's usual one: a table in the source, or a uniform block; what
+callers get to read, and how a weight is read there, by language.
+
+Fragment shaders of GLSL have constants as straight code instead; compute shaders have no table: Mesa had not
+compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
+"""
 
 MESA = Forms(few=10000.0)
 """Most operations of primitives that become statements in fragment shaders. llvmpipe reads a table at a
@@ -126,15 +201,13 @@ TARGETS: Mapping[str, Target] = {
             planes={1: None},
         ),
         replace(
-            _dialect_target(
-                OpenCL(), *OPENCL_LADDER, *OPENCL_FOURIER, *OPENCL_DOT, *OPENCL_GROUPS, *OPENCL_GROUP_DOT
-            ),
+            processor(OpenCL()),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
             planes={lanes: planes.of_lanes(lanes) for lanes in opencl_path.LANES},
             forms=Forms(trees=True),
         ),
         replace(
-            _dialect_target(GLSL(), Inlined(GLSLInlined()), *GLSL_COMPUTE),
+            _dialect_target(GLSL(), Inline(GLSL()), *groups(GLSLCompute(), "compute")),
             planes={1: planes.GLSLPlanes()},
             forms=MESA,
         ),
@@ -145,7 +218,7 @@ TARGETS: Mapping[str, Target] = {
 DENOISERS: Mapping[str, Target] = {
     **TARGETS,
     "c": replace(
-        _dialect_target(C(), *C_LADDER, *C_FOURIER, *C_DOT),
+        processor(C()),
         planes={1: planes.CPlanes()},
         forms=Forms(trees=True),
     ),
@@ -156,18 +229,23 @@ EXPORTED: Mapping[str, Target] = {
     target.name: target
     for target in (
         replace(
-            _dialect_target(GLSLES(), Inlined(GLSLESInlined()), Packed(GLSLESPacked())),
+            _dialect_target(GLSLES(), Inline(GLSLES()), Packed(GLSLES())),
             forms=MESA,
         ),
-        _dialect_target(Compute(), *groups(ComputeGroup(), 8)),
-        _dialect_target(Vulkan(), *groups(VulkanGroup(), 8), *dots(VulkanDot(), 8)),
-        _dialect_target(WGSL(), *groups(WGSLGroup(), 8), *dots(WGSLDot(), 8)),
-        _dialect_target(CUDA(), *groups(CUDAGroup()), *dots(CUDADot())),
-        _dialect_target(Metal(), *groups(MetalGroup())),
-        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inlined(ShadertoyDenoise()),)),
+        processor(Compute()),
+        processor(Vulkan()),
+        processor(WGSL()),
+        processor(CUDA()),
+        processor(Metal()),
+        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inline(ShadertoyDenoise()),)),
         _dialect_target(GodotDenoise()),
+        *(
+            _dialect_target(language().placed(home, weight, where))
+            for home, (where, languages) in HOMES.items()
+            for language, weight in languages.items()
+        ),
     )
-} | {name: _dialect_target(dialect) for name, dialect in HOMES.items()}
+}
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 
@@ -175,7 +253,7 @@ def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
     known = {**DENOISERS, **EXPORTED}
     if name not in known:
-        raise CompileError(f"target {name!r} does not exist; there are: {', '.join(known)}")
+        raise CompileError(f"target {name!r}: unknown ({choice(name, known)})")
     return known[name]
 
 

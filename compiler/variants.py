@@ -38,11 +38,11 @@ from .core.enclosure import round_up
 from .core.ir import Program
 from .core.lower import lower
 from .core.profiles import SineContract
-from .languages.interface import FULL as FULL
+from .kernel.interface import FULL as FULL
 from .plan import Plan, analysed, plan_program
 from .proof import bounds
 from .proof.bounds import Enclosure
-from .schedules.emit import kernel_gather
+from .schedules.common import kernel_gather
 from .schedules.schedules import PLAIN
 
 Array = NDArray[np.float64]

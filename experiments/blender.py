@@ -35,10 +35,10 @@ from numpy.typing import NDArray
 
 from wamnet.cli.commands.blender.dataset import Asked, make
 from wamnet.cli.files import dataset_files, exr
-from wamnet.kernels.blender.plan import Animation, Request, plan
-from wamnet.kernels.blender.session import Blender
-from wamnet.kernels.run.frame_plan import KINDS as PICTURES
-from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.models.blender.plan import Animation, Request, plan
+from wamnet.models.blender.session import Blender
+from wamnet.models.data.frame_plan import KINDS as PICTURES
+from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.metrics import psnr

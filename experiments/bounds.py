@@ -22,13 +22,13 @@ from wamnet.cli.reports.runs import frame_bound
 from wamnet.compiler.core import sums
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import EMITTED_SINE
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.plan import Plan, analysed
 from wamnet.compiler.proof import bounds, scaled
-from wamnet.compiler.schedules.emit import kernel_gather
+from wamnet.compiler.schedules.common import kernel_gather
 from wamnet.compiler.targets import schedule_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import EXECUTORS, denoise_on, open_executor
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.network.denoise import denoise
 

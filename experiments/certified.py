@@ -21,11 +21,11 @@ from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
 from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.reading.check import check_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.variants import plan_model
+from wamnet.models.model_file import load_model
 
 ROOT = Path(__file__).parents[1]
 

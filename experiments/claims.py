@@ -543,7 +543,7 @@ def opened(options: argparse.Namespace) -> Results:
     path = options.table / "table1.json"
     if not path.exists():
         way_out = f"python experiments/table1.py --scale {options.scale}, or another --table"
-        raise InputError("folder of Table 1", str(options.table), "it has no table1.json", way_out)
+        raise InputError("folder of Table 1", str(options.table), "has no table1.json", way_out)
     settings = table1.settings_of(table1.SCALES[options.scale], options.executor)
     return Results.open(path, "table1", settings)
 

@@ -30,11 +30,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wamnet.cli.course import judged as students_process
-from wamnet.cli.course.frame import Ended, Wrong, of_exception, outcome
-from wamnet.cli.course.labs import LABS, Lab, lab_named
-from wamnet.cli.course.student import Functions, deadline
-from wamnet.cli.course.wire import Channel
+from wamnet_course import judged as students_process
+from wamnet_course.frame import Ended, Wrong, of_exception, outcome
+from wamnet_course.labs import LABS, Lab, lab_named
+from wamnet_course.student import Functions, deadline
+from wamnet_course.wire import Channel
 
 COURSE = Path(__file__).resolve().parents[1] / "tests/course"
 """Right and wrong answers."""

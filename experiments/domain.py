@@ -27,7 +27,7 @@ from lab.ground import write_table
 from lab.results import PER_FRAME, Results, fill
 from lab.sets import SETS, FrameSet
 
-from wamnet.kernels.run.frame_plan import TEST, TRAIN
+from wamnet.models.data.frame_plan import TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.metrics import psnr

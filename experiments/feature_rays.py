@@ -29,8 +29,8 @@ from wamnet.cli.commands.bench_frames import TEST_SEED, request_for
 from wamnet.cli.common.inputs import load_model
 from wamnet.kernels import Pipeline, open_executor
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.run.frame_plan import KINDS, TEST, Picture, plan
 from wamnet.kernels.run.render_frame import render_frame
+from wamnet.models.data.frame_plan import KINDS, TEST, Picture, plan
 from wamnet.refimpl.network.denoise import Model
 
 SOURCES = ("pcg4d", "net")

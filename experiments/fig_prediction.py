@@ -37,11 +37,11 @@ from lab.results import Results, Values
 from lab.tables import Column
 
 from wamnet.cli.files.images import read_png
-from wamnet.kernels.bench.peers import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
+from wamnet_peers import peer_oidn
 
 ENLARGED = (0.44, 0.36, 0.28)
 """The part of the picture that is enlarged: its left and upper edge and its side, as shares of the whole."""

@@ -31,10 +31,10 @@ from lab.ground import Ground, judged, start, write_table
 from lab.results import Results, Values, fill
 from lab.tables import Column
 
-from wamnet.kernels.bench.peers import peer_oidn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.network.train import PAPER, SHORT, Recipe
+from wamnet_peers import peer_oidn
 
 FRAMES_PER_SECOND = 24
 """Rate of the animation, as in cinemas."""

@@ -24,9 +24,9 @@ import wamnet
 from wamnet.cli.common.inputs import load_scene
 from wamnet.cli.common.options import View
 from wamnet.cli.files.outputs import replacing
-from wamnet.kernels.bench.peers.peer_oidn import Kept
 from wamnet.refimpl.encoding import to_8bit, to_display
 from wamnet.refimpl.light.scene import Scene
+from wamnet_peers.peer_oidn import Kept
 
 FRAMES, FRAME_MS, YAW_DEG = 24, 150, 12.0
 """Frames of the loop, the time that each is shown, and the largest turn of the camera."""

@@ -40,7 +40,7 @@ from lab.ground import (
 from lab.results import Results, Values
 from lab.tables import Column
 
-from wamnet.kernels.run.draws import Draw, times
+from wamnet.models.data.draws import Draw, times
 from wamnet.refimpl.light.scenes import TURN_SECONDS
 from wamnet.refimpl.light.variation import Ranges
 from wamnet.refimpl.network.train import PAPER, SHORT, Recipe

@@ -30,10 +30,10 @@ from lab.results import Results, Values
 from lab.sets import SETS
 from lab.tables import Column
 
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.train import SHORT
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SCENES = ("minicubes", "glossy", "vitrine")
 """The sets of frames."""

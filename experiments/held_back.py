@@ -3,8 +3,9 @@
     python experiments/held_back.py -o out/held-back
     python experiments/held_back.py -o out/held-back transport.mjs LTR-9
 
-1. javascript/faults.json has a hundred mistakes of a programmer, written from the text and the program before
-   the vectors were asked about them. No vector is made for one of them before it has been counted.
+1. examples/javascript/faults.json has a hundred mistakes of a programmer, written from the text and the
+   program before the vectors were asked about them. No vector is made for one of them before it has been
+   counted.
 2. Each is made in a copy of the program, which is asked all cases, the most elementary kind first, until one
    fails: the clause of that case is the one that `wamnet conformance` says to look at first.
 3. Words choose faults by their file or clause. Outcomes are kept in the folder, and a fault that has one is
@@ -37,7 +38,7 @@ from wamnet.spec.conformance import vectors
 from wamnet.spec.conformance.case import Case
 from wamnet.spec.conformance.protocol import Session
 
-PROGRAM = trial.ROOT / "experiments/javascript"
+PROGRAM = trial.ROOT / "examples/javascript"
 """The program that is changed."""
 
 LEAST_CAUGHT = 0.95

@@ -33,12 +33,12 @@ from lab.sequences import Take, taken
 from lab.sets import SETS
 from lab.tables import Column
 
-from wamnet.kernels.bench.peers.peer_oidn import filtered
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import HISTORY, Floats, Frame
 from wamnet.refimpl.light.history import LIMITS, Limits
 from wamnet.refimpl.network.train import SHORT
+from wamnet_peers.peer_oidn import filtered
 
 CHANGES: Mapping[str, Mapping[str, int]] = {
     "toy": {},

@@ -36,14 +36,14 @@ from lab.tables import Column
 from lights import NAMES, seen_colors
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
-from wamnet.kernels.run.draws import variation_of
+from wamnet.models.data.draws import variation_of
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import Ranges, Variation
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.train import SHORT
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 Array = NDArray[np.float64]
 
@@ -65,15 +65,8 @@ NOISE_SEED, TESTS_APART, COLOR_SEED = 9300, 500, 67
 FIRST_OF_TESTS = 5000
 """Number of the first test's colours: those of training are smaller."""
 
-STOPS = -1.0
-"""Exposure of the T_k that the network sees: white lamps are brighter than tinted ones."""
-
 SURFACES = ("normal", "albedo", "position")
 """The features beside colour."""
-
-LEAK = 0.05
-"""Slope of the loss's picture beyond white: there the target is 1, whatever is brighter is right, and a
-derivative of 0 would keep what is wrong."""
 
 WAYS = (
     "regression, colours of each frame",

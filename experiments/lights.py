@@ -52,12 +52,12 @@ from lab.ground import (
 from lab.results import PER_FRAME, Results, Values
 from lab.tables import Column
 
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
-from wamnet.kernels.run.draws import variation_of
+from wamnet.models.data.draws import variation_of
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import AT_REST, Ranges, Variation
 from wamnet.refimpl.network.train import MIRRORS, PAPER, SHORT
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 EACH = 0
 """Number of light sets that stands for colours of its own in each frame."""

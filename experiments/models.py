@@ -24,7 +24,7 @@ from quality import PLANS, RAYS, ROWS, SHIPPED_SET, Bench, denoised
 
 from wamnet.cli.files.dataset_files import sum_of
 from wamnet.cli.files.outputs import write_text
-from wamnet.compiler.model_file import save_model
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.light.variation import RANGES
 from wamnet.refimpl.network.denoise import Model
 

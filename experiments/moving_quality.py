@@ -29,22 +29,23 @@ from lab.frames import Shot, frames, reference
 from lab.sets import SETS
 from quality import PLANS, ROWS, SHIPPED_SET, Bench
 
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench.measure_pipeline import PEERS, STEP_S, moments
-from wamnet.kernels.bench.peers.moving import DENOISED, MitsubaOidn
-from wamnet.kernels.bench.peers.peer_cycles import Cycles
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
-from wamnet.kernels.run.frame_plan import TRAIN
-from wamnet.kernels.run.geometry import Shown, compare
 from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_on import render_on
+from wamnet.models.data.frame_plan import TRAIN
+from wamnet.models.data.geometry import Shown, compare
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.network.denoise import Model
+from wamnet_peers import table
+from wamnet_peers.moving import DENOISED, MitsubaOidn
+from wamnet_peers.peer_cycles import Cycles
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SCENE = "minicubes"
 """What moves."""
@@ -117,7 +118,7 @@ def ours(options: Namespace) -> Iterator[Pictures]:
 def theirs(name: str, size: int) -> Iterator[Pictures]:
     """Yield the pictures of a peer by each quality; nothing, and a sentence, where it is missing."""
     try:
-        maker = PEERS[name](moments(SCENE)[0], size)
+        maker = table.makers[name](moments(SCENE)[0], size)
     except ExecutorUnavailable as error:
         sys.stderr.write(f"no rows: {error}\n")
         return

@@ -41,7 +41,7 @@ def named(name: str) -> Mutant:
     found = found or [mutant for mutant in every if re.match(pattern, mutant.name)]
     if len(found) == 1:
         return found[0]
-    rule = f"it must be the name of one mutant, not of {len(found)}"
+    rule = f"must be the name of one mutant, not of {len(found)}"
     some = "; ".join(mutant.name for mutant in found[:MOST_LISTED])
     raise InputError("mutant", name, rule, some or "the name of a module lists some of its mutants")
 

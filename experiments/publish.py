@@ -30,7 +30,7 @@ from lab.results import PACKAGES, SCHEMA, Results, written
 
 from wamnet.cli.files.outputs import replacing, write_text
 from wamnet.cli.reports import machine
-from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.errors import NO_VALUE, InputError
 
 LARGEST_BYTES = 400_000
 """The largest record: one that is larger holds what nobody shows."""
@@ -58,7 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--run", nargs=argparse.REMAINDER, help="NAME COMMAND...: keep what a command prints")
     options = parser.parse_args(arguments)
     if bool(options.run) == bool(options.file):
-        raise InputError("what to publish", "nothing", "give a file, or --run NAME COMMAND", "see --help")
+        rule = "one of them is needed"
+        raise InputError("FILE or --run NAME COMMAND", NO_VALUE, rule, "see --help")
     if options.run:
         name, data = options.run[0], ran(options.run[0], options.run[1:])
     else:
@@ -83,7 +84,7 @@ def opened(path: Path, command: str | None) -> dict[str, Any]:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(
-            "file", str(path), f"it cannot be read ({type(error).__name__})", "name another"
+            "file", str(path), f"cannot be read: {type(error).__name__}", "name another"
         ) from None
     if isinstance(data, dict) and data.get("schema") == BENCH:
         return of_bench(data, command or "")
@@ -98,7 +99,7 @@ def ran(name: str, command: Sequence[str]) -> dict[str, Any]:
     program = list(command)
     allowed = len(program) > 1 and program[0] == "python" and program[1].startswith("experiments/")
     if not allowed and program[:1] != ["wamnet"]:
-        rule = "it must be python experiments/... or wamnet ..."
+        rule = "must be python experiments/... or wamnet ..."
         raise InputError("command", shlex.join(program), rule, "correct it")
     here = Path(sys.executable)
     program[0] = str(here if program[0] == "python" else here.with_name("wamnet"))
@@ -108,7 +109,7 @@ def ran(name: str, command: Sequence[str]) -> dict[str, Any]:
             sys.stdout.write(text)
             lines.append(text)
     if running.returncode:
-        rule = "it must end with status 0"
+        rule = "must end with status 0"
         raise InputError(f"command for {name}", f"status {running.returncode}", rule, "see what it says")
     rows = printed.records_of("".join(lines))
     head = {"schema": SCHEMA, "experiment": name, "commands": [shlex.join(command)], "settings": {}}

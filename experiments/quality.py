@@ -42,18 +42,18 @@ from wamnet.compiler.schedules.schedules import PLAIN
 from wamnet.compiler.targets import target_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run import tune
 from wamnet.kernels.run.denoise_on import images_of, images_on
-from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN
+from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import BEST, MIRRORS, SHORT, SKY, Recipe
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SHIPPED_SET = "minicubes-page"
 """The set that the network of the web page learns from: everything that the page can move."""
@@ -147,15 +147,21 @@ class Row:
 ROWS: Mapping[str, Row] = {
     "input": Row("input, 1 spp", 1),
     "oidn-color": Row("Open Image Denoise, high, colour only", 1, quality="high"),
-    "oidn-1": Row("Open Image Denoise, high, features of 1 ray", 1, quality="high", aux="noisy"),
+    "oidn-1": Row("Open Image Denoise, high, noisy features (1 ray)", 1, quality="high", aux="noisy"),
     "oidn-prefiltered1": Row(
-        "Open Image Denoise, high, 1 ray, prefiltered", 1, quality="high", aux="prefiltered"
+        "Open Image Denoise, high, prefiltered features (1 ray)", 1, quality="high", aux="prefiltered"
     ),
-    "oidn-clean1": Row("Open Image Denoise, high, 1 ray, declared clean", 1, quality="high", aux="clean"),
-    "oidn-clean16": Row(f"Open Image Denoise, high, clean, {RAYS} rays", RAYS, quality="high", aux="clean"),
-    "oidn-fast16": Row(f"Open Image Denoise, fast, clean, {RAYS} rays", RAYS, quality="fast", aux="clean"),
+    "oidn-clean1": Row(
+        "Open Image Denoise, high, noisy features declared clean", 1, quality="high", aux="clean"
+    ),
+    "oidn-clean16": Row(
+        f"Open Image Denoise, high, features of {RAYS} rays", RAYS, quality="high", aux="clean"
+    ),
+    "oidn-fast16": Row(
+        f"Open Image Denoise, fast, features of {RAYS} rays", RAYS, quality="fast", aux="clean"
+    ),
     "oidn-past-clean16": Row(
-        f"Open Image Denoise, high, clean, {RAYS} rays past mirrors and glass",
+        f"Open Image Denoise, high, specular features of {RAYS} rays",
         RAYS,
         "",
         "high",
@@ -163,42 +169,42 @@ ROWS: Mapping[str, Row] = {
         past=True,
     ),
     "oidn-past-prefiltered16": Row(
-        f"Open Image Denoise, high, prefiltered, {RAYS} rays past mirrors and glass",
+        f"Open Image Denoise, high, prefiltered specular features of {RAYS} rays",
         RAYS,
         quality="high",
         aux="prefiltered",
         past=True,
     ),
     "oidn-past-apart16": Row(
-        "the same, what is seen emits taken off the colour before and added after",
+        "the same, with visible emission subtracted before and added after",
         RAYS,
         quality="high",
         aux="prefiltered",
         past=True,
         apart=True,
     ),
-    "short-1": Row("wamnet, short, features of 1 ray", 1, "short"),
-    "best-1": Row("wamnet, best, features of 1 ray", 1, "best"),
-    "best-16": Row(f"wamnet, best, {RAYS} rays", RAYS, "best"),
-    "page-16": Row(f"wamnet, the page's inputs and steps, {RAYS} rays", RAYS, "page"),
-    "page48-16": Row(f"wamnet, the same with 48 neurons a layer, {RAYS} rays", RAYS, "page48"),
+    "short-1": Row("wamnet, preset `short`, features of 1 ray", 1, "short"),
+    "best-1": Row("wamnet, preset `best`, features of 1 ray", 1, "best"),
+    "best-16": Row(f"wamnet, preset `best`, features of {RAYS} rays", RAYS, "best"),
+    "page-16": Row(f"wamnet, inputs and steps of the web page, {RAYS} rays", RAYS, "page"),
+    "page48-16": Row(f"wamnet, the same with 48 neurons per layer, {RAYS} rays", RAYS, "page48"),
     "smooth-page-16": Row(
-        "the page's inputs, colour smoothed, 8 x 8 pixels, 64 neurons", RAYS, "smooth-page"
+        "inputs of the web page, filtered colour, 8x8 window, 64 neurons", RAYS, "smooth-page"
     ),
-    "past-16": Row(f"wamnet, best, {RAYS} rays past mirrors and glass", RAYS, "past", past=True),
-    "bright-16": Row("the same, and how bright is what colour clips", RAYS, "bright", past=True),
-    "narrow-16": Row("the same, 8 x 8 pixels, 64 neurons a layer", RAYS, "narrow", past=True),
-    "long-16": Row("the same, four times as many steps", RAYS, "long", past=True),
-    "hard-16": Row("twice as many steps at half the rate instead", RAYS, "hard", past=True),
-    "slow-16": Row("four times as many steps at half the rate", RAYS, "slow", past=True),
-    "smooth-16": Row("twice as many steps, and colour smoothed", RAYS, "smooth", past=True),
-    "smooth-slow-16": Row("four times as many steps, and colour smoothed", RAYS, "smooth-slow", past=True),
-    "lit-16": Row("colour smoothed, and what is seen emits (mirrors)", RAYS, "lit", past=True),
-    "lit-slow-16": Row("the same, four times as many steps", RAYS, "lit-slow", past=True),
-    "lit7-16": Row("the same as mirrors, 7 x 7 pixels", RAYS, "lit7", past=True),
-    "sun-16": Row("7 x 7 pixels, and where the sun is (sky)", RAYS, "sun", past=True),
-    "sun48-16": Row("the same, 48 neurons a layer", RAYS, "sun48", past=True),
-    "shipped": Row(f"wamnet, the network of the page, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
+    "past-16": Row(f"wamnet, preset `best`, specular features of {RAYS} rays", RAYS, "past", past=True),
+    "bright-16": Row("the same, plus clipped highlights", RAYS, "bright", past=True),
+    "narrow-16": Row("the same, 8x8 window, 64 neurons per layer", RAYS, "narrow", past=True),
+    "long-16": Row("the same, four times the steps", RAYS, "long", past=True),
+    "hard-16": Row("instead: twice the steps at half the learning rate", RAYS, "hard", past=True),
+    "slow-16": Row("four times the steps at half the learning rate", RAYS, "slow", past=True),
+    "smooth-16": Row("twice the steps, plus filtered colour", RAYS, "smooth", past=True),
+    "smooth-slow-16": Row("four times the steps, plus filtered colour", RAYS, "smooth-slow", past=True),
+    "lit-16": Row("filtered colour, plus visible emission (preset `mirrors`)", RAYS, "lit", past=True),
+    "lit-slow-16": Row("the same, four times the steps", RAYS, "lit-slow", past=True),
+    "lit7-16": Row("preset `mirrors` with a 7x7 window", RAYS, "lit7", past=True),
+    "sun-16": Row("7x7 window, plus sun direction (preset `sky`)", RAYS, "sun", past=True),
+    "sun48-16": Row("the same, 48 neurons per layer", RAYS, "sun48", past=True),
+    "shipped": Row(f"wamnet, the bundled network, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
 }
 """The rows by name."""
 
@@ -212,12 +218,12 @@ SKY_TIMED = (*HARD_TIMED, "sun-16")
 """The same of such scenes under a sky."""
 
 SHOWN = {
-    "input": "1 sample a pixel",
+    "input": "1 sample per pixel",
     "oidn-clean16": "Open Image Denoise",
-    "oidn-past-prefiltered16": "Open Image Denoise, past mirrors",
+    "oidn-past-prefiltered16": "Open Image Denoise, specular features",
     "page-16": "wamnet",
-    "lit-16": "wamnet, past mirrors",
-    "sun-16": "wamnet, and the sun",
+    "lit-16": "wamnet, specular features",
+    "sun-16": "wamnet, with the sun direction",
 }
 """Rows that are shown beside the reference, and what their pictures are called."""
 
@@ -226,7 +232,7 @@ COLUMNS = (
     tables.Column("ssim", "SSIM", 3, interval=True),
     tables.Column("flip", "FLIP", 3, interval=True),
     tables.Column("relmse", "relMSE", 4, interval=True),
-    tables.Column("spp", "worth, spp", 0),
+    tables.Column("spp", "equivalent spp", 0),
     tables.Column("seconds", "training, s", 0),
 )
 """The columns of the table of scores."""
@@ -426,7 +432,7 @@ def _done(way: Callable[[], Any]) -> Callable[[], None]:
     return run
 
 
-SPLITS = {TEST: "inside of the ranges", OUTSIDE: "outside"}
+SPLITS = {TEST: "inside the training range", OUTSIDE: "outside it"}
 """The kinds of test frames, in words."""
 
 
@@ -518,7 +524,7 @@ def work(options: argparse.Namespace) -> None:
     for what, chosen, known in (("row", options.only, ROWS), ("set", options.sets, SETS)):
         for name in chosen:
             if name not in known:
-                raise InputError(what, name, "there is none of this name", f"use some of {', '.join(known)}")
+                raise InputError(what, name, "unknown", f"choose some of {', '.join(known)}")
     plan = PLANS[options.scale]
     settings = {"scale": options.scale, **asdict(plan), "executor": options.executor}
     kept = Results.open(options.output / "quality.json", "quality", settings)

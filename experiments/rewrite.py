@@ -17,8 +17,9 @@ from collections.abc import Sequence
 
 from lab import plots, texts
 from lab.command import begin
+from lab.gallery import PLOTS
 from lab.records import ROOT, Records, pending
-from lab.shown import FIGURES, PLOTS, TABLES
+from lab.shown import FIGURES, TABLES
 
 from wamnet.cli.files.outputs import replacing, write_text
 

@@ -37,12 +37,10 @@ from numpy.typing import NDArray
 from wamnet.cli.common.inputs import load_model
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.model_file import save_model
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.peers import peer_onnxruntime
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.export import tools
+from wamnet.kernels.export import onnx_export, tools
 from wamnet.kernels.export.check import digest_of
 from wamnet.kernels.export.gl_runner import ComputeRunner, ESRunner
 from wamnet.kernels.export.host_pass_runner import GodotRunner
@@ -50,6 +48,7 @@ from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.kernels.export.wgpu_runner import WgpuRunner, hlsl_runner, vulkan_runner
 from wamnet.kernels.run.denoise_on import images_of
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
@@ -136,7 +135,7 @@ def on(opened: Callable[[], Executor]) -> Run:
 
 def by_graph(model: Model, images: Images, schedule: str) -> tuple[str, Picture]:
     """Run the graph by ONNX Runtime."""
-    return peer_onnxruntime.run_graph(peer_onnxruntime.graph(model), images)
+    return onnx_export.run_graph(onnx_export.graph(model), images)
 
 
 def by_evaluator(model: Model, images: Images, schedule: str) -> tuple[str, Picture]:
@@ -144,7 +143,7 @@ def by_evaluator(model: Model, images: Images, schedule: str) -> tuple[str, Pict
     import onnx
     from onnx.reference import ReferenceEvaluator
 
-    (found,) = ReferenceEvaluator(peer_onnxruntime.graph(model)).run(None, dict(images))
+    (found,) = ReferenceEvaluator(onnx_export.graph(model)).run(None, dict(images))
     return f"onnx.reference {onnx.__version__}", found
 
 
@@ -171,7 +170,7 @@ def dxc_runner() -> WgpuRunner:
             made.write_text(tools.hlsl(tools.spirv(source), "dxc"), encoding="utf-8")
             done = subprocess.run([*DXC, "-Fo", written, made], capture_output=True, text=True, check=False)
             if done.returncode:
-                raise CompileError(f"dxc refuses the kernel: {done.stderr}")
+                raise CompileError(f"dxc rejects the kernel: {done.stderr}")
             return written.read_bytes()
 
     return WgpuRunner("glsl-vulkan", translated)

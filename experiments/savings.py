@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wamnet.cli.files import dataset_files
-from wamnet.compiler.model_file import load_model
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset

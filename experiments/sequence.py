@@ -24,8 +24,8 @@ from pathlib import Path
 
 from wamnet.cli.common.sequence import frames_of, outputs_of, overlapped
 from wamnet.cli.files import exr
-from wamnet.kernels.bench.peers.peer_oidn import Kept
 from wamnet.refimpl.frame import Frame
+from wamnet_peers.peer_oidn import Kept
 
 MODEL = "minicubes"
 LAYERS = ("color", "normal", "albedo", "position", "unshadowed")

@@ -25,7 +25,8 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench.measure_primitives import NO_CACHES
-from wamnet.kernels.devices.executor import Executor, Part
+from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.measure import environment
 from wamnet.refimpl.light.materials import MATERIALS, Dielectric
 from wamnet.refimpl.light.scene import Box, Quad, Scene, Sky, Sphere, Vector

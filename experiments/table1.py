@@ -398,7 +398,7 @@ def left(
             if found is None or _may_go_on(found, now):
                 yield row, seed
             elif found.get("settings") != now:
-                rule = f"it was made with {json.dumps(found.get('settings'))}, not {json.dumps(now)}"
+                rule = f"was made with {json.dumps(found.get('settings'))}, not {json.dumps(now)}"
                 raise InputError(f"record of {row}, seed {seed}", str(kept.path), rule, results.WAY_OUT)
 
 

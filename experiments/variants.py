@@ -17,11 +17,11 @@ from pathlib import Path
 
 from wamnet.cli.files import dataset_files
 from wamnet.compiler import variants
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels import open_executor, train_on
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.run.curve import Point
 from wamnet.kernels.run.measure_curve import NAMES, Pairs, measure, names_for
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl import metrics
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise

@@ -1,7 +1,7 @@
 """What renderers do with scenes whose answers are known: `wamnet verify-renderer` on each that is here.
 
-1. Each renderer is asked all cases [kernels/verify/run.py]; a row of the first table says for each rule how
-   many of its cases passed, and which profile explains the others.
+1. Each renderer is asked all cases [spec/conformance/renderers/run.py]; a row of the first table says for
+   each rule how many of its cases passed, and which profile explains the others.
 2. The second table has a row for each deviation, with what a smaller case with other seeds said of it.
 3. Those of `renderers.KNOWN` have commands; the path tracer of three.js is a page [lab/in_page.py].
 4. What was found of a renderer is kept in the folder of results: an interrupted run resumes there. One that
@@ -25,12 +25,12 @@ from lab import in_page
 from lab.command import begin
 from lab.tables import markdown
 
-from wamnet.cli.commands.verify.renderer import read_layers
 from wamnet.cli.files.outputs import write_text
-from wamnet.kernels.verify import judgement, renderers, report, run
-from wamnet.kernels.verify.case import RULES
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.judgement import Verdict
+from wamnet_verify import judgement, renderers, report, run
+from wamnet_verify.case import RULES
+from wamnet_verify.cases import questions
+from wamnet_verify.command import read_layers
+from wamnet_verify.judgement import Verdict
 
 NAMES = ("wamnet", *renderers.KNOWN, in_page.NAME)
 """Renderers, in the order of the table."""

@@ -24,9 +24,9 @@ from lab.frames import Pair, frames, noisy, pairs
 from lab.sets import SETS
 
 from models import MADE_OF
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import AMPLITUDES
-from wamnet.kernels.run.frame_plan import TEST, TRAIN
+from wamnet.models.data.frame_plan import TEST, TRAIN
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import metrics
 from wamnet.refimpl.network import dataset, whole
 from wamnet.refimpl.network.denoise import Model, denoise

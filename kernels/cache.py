@@ -25,7 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..compiler.core.writing import write_bytes
+from ..models.writing import write_bytes
 from ..refimpl.errors import InputError, shown
 from ..refimpl.reading import BROKEN, parse_json, read_file
 from .folders import cache_base, is_private
@@ -70,7 +70,7 @@ def key(*parts: object) -> str:
 def program_version() -> str:
     """Return a hash of names, sizes and times of the modules: another program makes other kernels."""
     root, digest = Path(__file__).parents[1], hashlib.sha256()
-    for folder in (root / name for name in ("compiler", "kernels", "refimpl")):
+    for folder in (root / name for name in ("compiler", "kernels", "models", "refimpl")):
         for path in sorted(folder.rglob("*.py")):
             facts = path.stat()
             digest.update(f"{path.relative_to(root)} {facts.st_size} {facts.st_mtime_ns}\n".encode())

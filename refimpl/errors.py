@@ -1,23 +1,30 @@
 """Errors that a user can cause, and the one form in which they are reported.
 
-Every message is one line with four parts: what is wrong, its value, the rule that it breaks, and the way out.
-Programs catch [`WamnetError`]; the command line prints its text and exits with status 2.
+Every message is one line with four parts: `WHAT 'VALUE': RULE (REMEDY)`, as in
+`input file 'x.exr': not found (check the name)`. One fact has one phrase: a file is `not found`, a name is
+`unknown` and its remedy a [`choice`]. Programs catch [`WamnetError`]; the command line prints the message and
+exits with status 2.
 
-Parts of a message come from untrusted files, and a terminal obeys what it is shown: [`escaped`] replaces
-its control characters, and [`shown`] also makes one line of a stated length.
+Parts of a message may come from untrusted files, and a terminal executes control characters: [`escaped`]
+replaces them, and [`shown`] also makes one line of a stated length.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from types import EllipsisType
+from typing import Final
 
 LONGEST_MESSAGE = 1000
 """Most characters of a message: some lines of a terminal, not a dump."""
 
 _MOST_OF_WHAT, _MOST_OF_VALUE, _MOST_OF_RULE = 200, 120, 320
-"""Most characters of a message's parts: the name of the thing, its value, the rule and, as long, the way out.
-Together with the text between them they are at most LONGEST_MESSAGE."""
+"""Most characters of a message's parts: the name of the thing, its value, the rule and, as long, the remedy.
+Together with the punctuation between them they are at most LONGEST_MESSAGE."""
+
+NO_VALUE: Final[EllipsisType] = ...
+"""The value in an error about something without one, such as a missing argument."""
 
 
 def escaped(text: str) -> str:
@@ -43,11 +50,11 @@ def shown(text: str, most: int = LONGEST_MESSAGE) -> str:
     return f"{line[: most - 3 - tail]}...{line[len(line) - tail :]}"
 
 
-def suggested(name: str, names: Iterable[str]) -> str:
-    """Return the remedy for an unknown name: the nearest of the names, if one is near, and all of them."""
+def choice(name: str, names: Iterable[str]) -> str:
+    """Return the remedy for an unknown name: all names, and first the most similar one, if any is similar."""
     names = list(names)
     near = get_close_matches(name, names, n=1)
-    return f"{f'did you mean {near[0]}? ' if near else ''}known are {', '.join(names)}"
+    return f"{f'did you mean {near[0]!r}? ' if near else ''}choose one of {', '.join(names)}"
 
 
 class WamnetError(Exception):
@@ -61,17 +68,17 @@ class WamnetError(Exception):
 class InputError(WamnetError, ValueError):
     """An argument, file or array that breaks a stated rule.
 
-    `what` names the thing, `value` is shown as it was met, `rule` says what must hold, `way_out` what to do.
+    `what` names the thing, `value` is what was found (text in quotation marks), `rule` states the requirement
+    that it breaks, `way_out` the remedy.
     """
 
     def __init__(self, what: str, value: object, rule: str, way_out: str) -> None:
-        given = shown(value if isinstance(value, str) else repr(value), _MOST_OF_VALUE)
-        thing, law, help_ = (
-            shown(what, _MOST_OF_WHAT),
-            shown(rule, _MOST_OF_RULE),
-            shown(way_out, _MOST_OF_RULE),
-        )
-        super().__init__(f"{thing} is {given}: {law}; {help_}")
+        subject = shown(what, _MOST_OF_WHAT)
+        if isinstance(value, str):
+            subject += f" '{shown(value, _MOST_OF_VALUE)}'"
+        elif value is not NO_VALUE:
+            subject += f" {shown(repr(value), _MOST_OF_VALUE)}"
+        super().__init__(f"{subject}: {shown(rule, _MOST_OF_RULE)} ({shown(way_out, _MOST_OF_RULE)})")
         self.what, self.value, self.rule, self.way_out = what, value, rule, way_out
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import NO_VALUE, InputError
 
 Floats = NDArray[Any]
 """An array of float32 or float64, whichever the caller chose; results keep it."""
@@ -106,7 +106,7 @@ class Frame:
         """Return the layer `name` (H, W, C), or say which layers there are."""
         if name not in self.layers:
             raise InputError(
-                "the frame's list of layers", ", ".join(self.layers), f"layer {name!r} is needed", "render it"
+                "layers of the frame", ", ".join(self.layers), f"layer {name!r} is missing", "render it"
             )
         return self.layers[name]
 
@@ -131,7 +131,7 @@ def validate(frame: Frame, finite: bool = True) -> None:
     `finite` False leaves the last rule out, for a reader that states one of its own [`dataset.known`].
     """
     if not frame.layers:
-        raise InputError("the frame's list of layers", "empty", "at least one layer is needed", _known())
+        raise InputError("frame", NO_VALUE, "has no layers", _known())
     for name, values in frame.layers.items():
         _check_form(name, values)
     _check_sizes(frame.layers)
@@ -153,22 +153,22 @@ def check_finite(what: str, image: Floats) -> None:
         count = int(bad.any(axis=-1).sum())
         where = f"{what} at x={x}, y={y} (first of {count} such pixel{'s' if count > 1 else ''})"
         raise InputError(
-            where, str(image[y, x, channel]), "every pixel must be finite", "render or repair these pixels"
+            where, float(image[y, x, channel]), "every pixel must be finite", "render or repair these pixels"
         )
 
 
 def _check_form(name: str, values: Floats) -> None:
     """Refuse a layer with an unknown name, another element type, another number of channels or no pixel."""
     if name not in LAYERS:
-        raise InputError("layer name", name, "it is not a known layer", _known())
+        raise InputError("layer", name, "unknown", _known())
     if not isinstance(values, np.ndarray) or values.dtype.name not in FLOAT_KINDS:
         kind = getattr(values, "dtype", type(values).__name__)
         raise InputError(
-            f"element type of layer {name!r}", str(kind), "it must be float32 or float64", "convert it"
+            f"element type of layer {name!r}", str(kind), "must be float32 or float64", "convert it"
         )
     channels = LAYERS[name].channels
     if values.ndim != 3 or values.shape[-1] != channels or values.size == 0:
-        rule = f"it must be (height, width, {channels}) with at least one pixel"
+        rule = f"must be (height, width, {channels}) with at least one pixel"
         raise InputError(f"shape of layer {name!r}", values.shape, rule, "reshape or render it again")
 
 
@@ -183,5 +183,5 @@ def _check_sizes(layers: Mapping[str, Floats]) -> None:
 
 
 def _known() -> str:
-    """Return the way out of a wrong layer name."""
-    return "use one of " + ", ".join(LAYERS)
+    """Return the remedy for a wrong layer name."""
+    return f"choose one of {', '.join(LAYERS)}"

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import NO_VALUE, InputError
 from .frame import Floats
 
 Float64 = NDArray[np.float64]
@@ -137,19 +137,19 @@ def _pair(image: Floats, reference: Floats) -> tuple[Float64, Float64]:
     try:
         x, r = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     except (TypeError, ValueError):
-        rule = "both must be numbers in rows of one length"
-        raise InputError("the images", "lists of other lengths", rule, "give a matching pair") from None
+        rule = "must be arrays of numbers, with rows of one length"
+        raise InputError("images", NO_VALUE, rule, "give a matching pair") from None
     if x.shape != r.shape or x.size == 0:
         shapes = f"{x.shape} against {r.shape}"
         raise InputError(
-            "shape of the images", shapes, "both must have one shape, not empty", "give a matching pair"
+            "shape of the images", shapes, "must be equal, and not empty", "give a matching pair"
         )
     for what, values in (("the image", x), ("the reference", r)):
         bad = int(np.count_nonzero(~np.isfinite(values)))
         if bad:
             value: Any = values[~np.isfinite(values)][0]
             rule = f"every value must be finite, and {bad} of {values.size} are not"
-            raise InputError(f"a value of {what}", str(value), rule, "repair or leave out these pixels")
+            raise InputError(f"value of {what}", float(value), rule, "repair or leave out these pixels")
     return x, r
 
 

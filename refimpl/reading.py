@@ -25,7 +25,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from .errors import InputError
+from .errors import NO_VALUE, InputError, choice
 
 LARGEST_FILE_BYTES = 256 * 2**20
 """Longest file that is read whole: thousands of times a usual model."""
@@ -81,22 +81,21 @@ def read_file(
         raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(what, shown, f"it cannot be read ({reason})", way_out) from None
+        rule = "not found" if isinstance(error, FileNotFoundError) else f"cannot be read: {reason}"
+        raise InputError(what, shown, rule, way_out) from None
     if size > most:
         raise InputError(f"size of {shown} in bytes", size, f"at most {most} bytes are read", way_out)
     if stated is not None and not size == len(content) == stated:
-        raise InputError(f"size of {shown} in bytes", size, f"it must be the stated one, {stated}", way_out)
+        raise InputError(f"size of {shown} in bytes", size, f"must be the stated one, {stated}", way_out)
     return content
 
 
 def _check_regular(found: os.stat_result, what: str, shown: str) -> None:
     """Refuse what is not a regular file."""
     if stat.S_ISDIR(found.st_mode):
-        raise InputError(what, shown, "it is a folder", "give the name of a file in it")
+        raise InputError(what, shown, "is a folder", "give the name of a file in it")
     if not stat.S_ISREG(found.st_mode):
-        raise InputError(
-            what, shown, "it is not a regular file (a pipe or a device)", "give a file on a disk"
-        )
+        raise InputError(what, shown, "is a pipe or a device, not a regular file", "give a file on a disk")
 
 
 def check_room(needed: int, what: str, shown: object, way_out: str) -> None:
@@ -125,7 +124,7 @@ def _free_bytes() -> float:
 def plain_name(name: Any, what: str, way_out: str) -> str:
     """Return a name of a file that leads out of no folder, or refuse it."""
     if not isinstance(name, str) or name in ("", ".", "..") or any(sign in name for sign in "/\\\0"):
-        raise InputError(what, name, "it must be the plain name of a file in its own folder", way_out)
+        raise InputError(what, name, "must be the plain name of a file in its own folder", way_out)
     return name
 
 
@@ -136,7 +135,7 @@ def stated_bytes(manifest: Mapping[str, Any], name: str, what: str, way_out: str
     sizes = manifest[SIZES]
     size = sizes.get(name) if isinstance(sizes, dict) else None
     if type(size) is not int or size < 0:
-        rule = "it must be the file's length in bytes, an integer"
+        rule = "must be the file's length in bytes, an integer"
         raise InputError(f"{what}: {SIZES}: {name}", size, rule, way_out)
     return size
 
@@ -153,16 +152,16 @@ def parse_json(text: str | bytes, what: str, way_out: str, most: int = LARGEST_J
 
     def refused(rule: str) -> InputError:
         beginning = text[:_BEGINNING] if isinstance(text, str) else text[:_BEGINNING].decode(errors="replace")
-        return InputError(what, beginning, f"no JSON that can be taken: {rule}", way_out)
+        return InputError(what, beginning, f"is not acceptable JSON: {rule}", way_out)
 
     if len(text) > most:
-        raise refused(f"it has more than {most} bytes")
+        raise refused(f"more than {most} bytes")
     unusual: list[str] = []
 
     try:
         read = text if isinstance(text, str) else text.decode("utf-8")
         if sum(map(read.count, ",[{")) > MOST_VALUES:
-            raise refused(f"it has more than {MOST_VALUES} values")
+            raise refused(f"more than {MOST_VALUES} values")
         value = json.loads(
             read,
             parse_int=partial(_read_number, unusual, int),
@@ -239,7 +238,7 @@ def _unusual(value: Any, path: str) -> Iterator[tuple[str, str, str]]:
     if isinstance(value, str) and _has_half_character(value):
         yield path, ascii(value), HALF
     elif isinstance(value, float) and not math.isfinite(value):
-        yield path, str(value), "it must be a finite number, as JSON knows no other"
+        yield path, str(value), "must be a finite number, as JSON has no other"
     elif isinstance(value, list):
         for index, item in enumerate(value):
             yield from _unusual(item, f"{path}[{index}]")
@@ -266,7 +265,7 @@ def refusing(what: str, value: object, rule: str, way_out: str) -> Iterator[None
     except InputError:
         raise
     except BROKEN as error:
-        raise InputError(what, value, f"{rule} ({_reason(error)})", way_out) from None
+        raise InputError(what, value, f"{rule}: {_reason(error)}", way_out) from None
 
 
 def _reason(error: BaseException) -> str:
@@ -301,15 +300,12 @@ def to_dataclass(
     ones without a default (of a `whole` record all missing ones), and values of another type are refused.
     """
     if not isinstance(data, dict):
-        raise InputError(
-            path, data, "it must be a JSON object", f"give the keys of a {kind.__name__.lower()}"
-        )
+        raise InputError(path, data, "must be a JSON object", f"give the keys of a {kind.__name__.lower()}")
     known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
     for key in data:
         if key not in known:
-            rule = f"{kind.__name__} has no such key"
-            way_out = f"known are {', '.join(known)}" if known else "remove it: there are none"
-            raise InputError(f"{path}.{key}", data[key], rule, way_out)
+            way_out = choice(key, known) if known else "remove it"
+            raise InputError(f"{path}.{key}", data[key], f"{kind.__name__} has no such key", way_out)
     hints = _hints(kind)  # type: ignore[arg-type]
     convert = _Converter(largest, special or {})
     values = {}
@@ -317,7 +313,7 @@ def to_dataclass(
         if name in data:
             values[name] = convert(hints[name], data[name], f"{path}.{name}")
         elif whole or (spec.default is MISSING and spec.default_factory is MISSING):
-            raise InputError(f"{path}.{name}", "missing", "it is required", f"add the key to {path}")
+            raise InputError(f"{path}.{name}", NO_VALUE, "missing", f"add the key to {path}")
     return kind(**values)
 
 
@@ -339,7 +335,7 @@ class _Converter:
             return _text(value, path)
         if hint == dict[str, str]:
             if not isinstance(value, dict):
-                raise InputError(path, value, "it must map texts to texts", "write {} for none")
+                raise InputError(path, value, "must map texts to texts", "write {} for none")
             return {_text(key, path): _text(item, f"{path}.{key}") for key, item in value.items()}
         if is_dataclass(hint):
             return to_dataclass(hint, value, path, largest=self.largest, special=self.special)  # type: ignore[arg-type]
@@ -351,11 +347,11 @@ class _Converter:
     def _tuple(self, arguments: tuple[Any, ...], value: Any, path: str) -> Any:
         """Convert a list to a tuple, of any length where the annotation ends in dots."""
         if not isinstance(value, list):
-            raise InputError(path, value, "it must be a list", "write it in square brackets")
+            raise InputError(path, value, "must be a list", "write it in square brackets")
         if arguments[-1] is Ellipsis:
             return tuple(self(arguments[0], item, f"{path}[{i}]") for i, item in enumerate(value))
         if len(value) != len(arguments):
-            raise InputError(path, value, f"it must have {len(arguments)} entries", "add or remove entries")
+            raise InputError(path, value, f"must have {len(arguments)} entries", "add or remove entries")
         pairs = zip(arguments, value, strict=True)
         return tuple(self(hint, item, f"{path}[{i}]") for i, (hint, item) in enumerate(pairs))
 
@@ -364,7 +360,7 @@ def _number(value: Any, path: str, largest: float) -> float:
     """Return a JSON number as a finite float."""
     largest = min(largest, _LARGEST_DOUBLE)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= largest:
-        rule = f"it must be a finite number of at most {largest:g} in magnitude"
+        rule = f"must be a finite number of at most {largest:g} in magnitude"
         raise InputError(path, _shortened(value), rule, "write a decimal number; choose other units")
     return float(value)
 
@@ -376,21 +372,21 @@ _LARGEST_DOUBLE = float.fromhex("0x1.fffffffffffffp+1023")
 def _count(value: Any, path: str) -> int:
     """Return a JSON number that is whole, and is written so."""
     if type(value) is not int:
-        raise InputError(path, _shortened(value), "it must be an integer", "write it without a point")
+        raise InputError(path, _shortened(value), "must be an integer", "write it without a point")
     return value
 
 
-def _shortened(value: Any) -> str:
-    """Return a value as text; an integer of thousands of digits would be no line."""
+def _shortened(value: Any) -> Any:
+    """Return a value, but of an integer of thousands of digits its length."""
     if type(value) is int and abs(value) > 1e18:
         return f"an integer of {value.bit_length()} bits"
-    return repr(value)
+    return value
 
 
 def _text(value: Any, path: str) -> str:
     """Return a JSON string that can be written to a file."""
     if not isinstance(value, str):
-        raise InputError(path, value, "it must be a text", "put it in quotation marks")
+        raise InputError(path, value, "must be a string", "put it in quotation marks")
     if _has_half_character(value):
-        raise InputError(path, ascii(value), HALF, "fix the text")
+        raise InputError(path, ascii(value)[1:-1], HALF, "fix the string")
     return value

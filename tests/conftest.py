@@ -192,7 +192,7 @@ def chromium(executor_named: Callable[[str], Any]) -> Any:
 
 def _open_mitsuba() -> tuple[Any, str]:
     """Return the module and what it is."""
-    from wamnet.kernels.bench.peers import peer_mitsuba
+    from wamnet_peers import peer_mitsuba
 
     peer = peer_mitsuba.open_mitsuba("scalar_rgb")
     return peer, f"version {peer.__version__}, {peer.variant()}"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from . import models
 from .kernel import PLAIN, Certificate, CertificateError, Function, Kernel, target_of
-from .refimpl.errors import InputError
+from .refimpl.errors import NO_VALUE, InputError, choice
 from .refimpl.frame import Frame, validate
 
 if TYPE_CHECKING:
@@ -52,23 +52,22 @@ def load(
 
         model = wamnet.load("minicubes")
     """
-    from .compiler.model_file import load_model
+    from .models.model_file import load_model
     from .refimpl.network.denoise import Model
 
     if isinstance(model, Model):
         return model
     path = Path(model)
     if path.suffix.lower() == ".onnx":
-        from .compiler.importing.network import import_network
+        from .models.importing.network import import_network
 
         return import_network(path, dict(ranges or {}), border).model
     if ranges is not None or border:
-        raise InputError("ranges, border", str(model), "they belong to an .onnx file", "leave them out")
+        raise InputError("ranges, border", str(model), "belong to an .onnx file", "leave them out")
     if path.suffix or path.exists():
         return load_model(path)
     if str(model) not in models.names():
-        known = ", ".join(models.names())
-        raise InputError("model", str(model), "no such file or bundled model", f"bundled models: {known}")
+        raise InputError("model", str(model), "not found", f"{choice(str(model), models.names())}, or a file")
     return load_model(models.path(str(model)))
 
 
@@ -140,7 +139,7 @@ def train(
     from .refimpl.network.train import train as train_reference
 
     if preset not in PRESETS:
-        raise InputError("preset", preset, f"must be one of {', '.join(PRESETS)}", "choose one of these")
+        raise InputError("preset", preset, "unknown", choice(preset, PRESETS))
     changes: dict[str, Any] = {"steps": steps, "features": features and tuple(features), "seed": seed}
     recipe = replace(PRESETS[preset], **{key: value for key, value in changes.items() if value is not None})
     inputs, targets = _frames(noisy), _frames(clean)
@@ -179,7 +178,7 @@ def denoise(
 
     model = load(model)
     if model.is_imported:
-        rule = "it was imported, and reads images of its own, not the layers of a frame"
+        rule = "was imported, and reads its own images, not the layers of a frame"
         raise InputError("model", repr(model), rule, "use wamnet.compile(model, target).run(...)")
     whole = _frame({**(frame.layers if isinstance(frame, Frame) else frame or {}), **layers})
     name = _name(executor)
@@ -284,7 +283,7 @@ def export(
     from .kernels.export.package import export as exported
 
     if target is None and not host:
-        raise InputError("target", "None", "an export has a target or a host", "pass target= or host=")
+        raise InputError("target", NO_VALUE, "missing, and so is the host", "pass target= or host=")
     loaded = None if scene is None else _scene(scene, {})
     row = target or host_named(host).target
     made = exported(Request(load(model), row, loaded, variant=variant, schedule=schedule, host=host))
@@ -375,7 +374,7 @@ def _name(executor: str, trains: bool = False) -> str:
 
 def _scene(scene: Paths | Scene, parameters: Mapping[str, Any]) -> Scene:
     """Return a canonical scene by name, or that of a file."""
-    from .kernels.run.scene_source import scene_source
+    from .models.data.scene_source import scene_source
     from .refimpl.light.scene import Scene
 
     if not isinstance(scene, Scene):

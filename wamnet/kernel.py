@@ -14,7 +14,7 @@ from .compiler import artifact as artifacts
 from .compiler.artifact import Artifact
 from .compiler.core import ir
 from .compiler.targets import DENOISERS, EXPORTED
-from .refimpl.errors import InputError, WamnetError
+from .refimpl.errors import InputError, WamnetError, choice
 
 PLAIN = "plain"
 """The schedule that every target has."""
@@ -27,8 +27,7 @@ def target_of(language: str) -> str:
     """Return the compiler's target for a language; raise InputError for an unknown one."""
     target = LANGUAGES.get(language, language)
     if target not in {**DENOISERS, **EXPORTED}:
-        known = ", ".join([*LANGUAGES, *DENOISERS, *EXPORTED])
-        raise InputError("target", language, f"must be one of {known}", "choose one of these")
+        raise InputError("target", language, "unknown", choice(language, [*LANGUAGES, *DENOISERS, *EXPORTED]))
     return target
 
 

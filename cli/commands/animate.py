@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...compiler.core.writing import remove_temporaries
+from ...models.writing import remove_temporaries
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.domain import Watch
@@ -75,7 +75,7 @@ SceneToShow = Annotated[
     str | None,
     typer.Option(
         help="Canonical scene, or scene file (.json), which is static.",
-        show_default="the one that the model was trained on",
+        show_default="the model's training scene",
     ),
 ]
 TracedBy = Annotated[
@@ -83,15 +83,21 @@ TracedBy = Annotated[
     typer.Option(
         "--renderer",
         envvar=options.EXECUTOR_VARIABLE,
-        help="What traces the paths: [bold]auto[/] is the fastest of those available.",
+        help="Backend that traces the paths: [bold]auto[/] is the fastest available.",
     ),
 ]
 Rays = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="Camera rays per pixel of the features, spread evenly.",
-        show_default="worth those of the training",
+        help="Stratified camera rays per pixel for the features.",
+        show_default="equivalent to those in training",
+    ),
+]
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o", "--output", metavar="PATH", help="Output: animation (.mp4, .gif) or folder of images."
     ),
 ]
 
@@ -99,15 +105,13 @@ Rays = Annotated[
 def animate(
     model: options.ModelFile,
     scene: SceneToShow = None,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="PATH", help="Film (.mp4, .gif), or folder of pictures.")
-    ] = Path("animation"),
-    start: Annotated[float, typer.Option(help="Begin, in seconds of the animation.")] = 0.0,
-    seconds: Annotated[float, typer.Option(help="Length; minicubes turn in 8 s.")] = 8.0,
-    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
-    size: Annotated[int, typer.Option(help="Width and height of each of the pictures, in pixels.")] = 128,
+    output: Output = Path("animation"),
+    start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
+    seconds: Annotated[float, typer.Option(help="Duration in seconds; minicubes rotate in 8 s.")] = 8.0,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 10.0,
+    size: Annotated[int, typer.Option(help="Width and height of each image, in pixels.")] = 128,
     reference_spp: Annotated[
-        int, typer.Option(help="Paths per pixel of a reference beside them; 0 shows none.")
+        int, typer.Option(help="Paths per pixel of a reference image shown alongside; 0 for none.")
     ] = 0,
     seed: options.Seed = 0,
     feature_spp: Rays = None,
@@ -121,12 +125,12 @@ def animate(
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
 ) -> None:
-    """Show what a model does over an animation: noisy, denoised and reference side by side.
+    """Render and denoise an animation: noisy, denoised and reference images side by side.
 
-    After any interruption the same command resumes where it was.
+    After an interruption, the same command resumes where it stopped.
     """
     from ...compiler.scenes.lower_encode import feature_rays
-    from ...kernels.run.frame_plan import animation_times
+    from ...models.data.frame_plan import animation_times
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -155,7 +159,7 @@ def animate(
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
     watch.report(output)
-    say(f"{output}: {len(shots)} pictures, {made} of them made now")
+    say(f"{output}: {len(shots)} frames, {made} of them rendered now")
 
 
 def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
@@ -216,7 +220,7 @@ def _check_names(output: Path, model: Path, fps: float) -> None:
         check_output(output, tuple(movie.WRITERS), [model])
         movie.check(output, fps)
     elif output.suffix:
-        rule = f"a film's name must end in {' or '.join(movie.WRITERS)}, a folder's in none"
+        rule = f"must end in {' or '.join(movie.WRITERS)}, or name a folder"
         raise InputError("output", str(output), rule, "rename it")
 
 
@@ -225,7 +229,7 @@ def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
     chosen = options.parse_parameters(assignments or [])
     if "time" in chosen:
         value = chosen["time"]
-        raise InputError("parameter time", value, "each picture has its own", "use --start and --seconds")
+        raise InputError("parameter time", value, "every frame has its own", "use --start and --seconds")
     return dict(chosen)
 
 
@@ -236,15 +240,15 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
     found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
-        say(f"{output}: {len(unlike)} of {len(shots)} pictures are unlike those of the training: {sentence}")
+        say(f"{output}: {len(unlike)} of {len(shots)} frames are unlike those of the training: {sentence}")
 
 
 def scene_of(model: Model) -> str:
     """Return the canonical scene that a model was trained on, or minicubes; reject that of a file."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
 
     if f"trained_on_{SCENE_FILE}" in model.info:
-        name, rule = model.info.get("trained_on_scene", ""), "it is that of a scene file"
+        name, rule = model.info.get("trained_on_scene", ""), "is that of a scene file"
         raise InputError("scene that the model was trained on", name, rule, "name the file with --scene")
     return trained_scene(model) or "minicubes"
 
@@ -273,7 +277,7 @@ def plan_shots(
     and camera rays of the features (or 0).
     """
     from ...compiler.scenes.lower_encode import sees
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
 
@@ -295,7 +299,7 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
     from ..files import images
 
     if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
     check_parent(folder)
     known = {shot.path: shot for shot in shots}
     there = {}
@@ -304,7 +308,7 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
             continue
         origin = images.read_origin(path) if path in known else ""
         if path not in known or origin not in (None, known[path].origin):
-            rule = f"it holds something else: {path.name}"
+            rule = f"holds something else: {path.name}"
             raise InputError("output folder", str(folder), rule, "choose another with -o, or empty it")
         there[path] = origin
     return [shot for shot in shots if there.get(shot.path) is None]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import packages
 from ..common.effort import said_of_measuring
 from ..common.executors import fastest
@@ -72,84 +72,92 @@ ModelFile = Annotated[
     Path | None,
     typer.Argument(
         metavar="MODEL",
-        help="Trained model (.safetensors), or the name of one that ships with the package; "
-        "paper: the paper's network, untrained, on noise.",
+        help="Trained model (.safetensors) or bundled model; paper: the paper's network, untrained, "
+        "on noise.",
         show_default=SHIPPED,
     ),
 ]
-Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the results.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.")]
 DataSet = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Data set on whose test frames all are measured.",
+        help="Data set to measure on (its test frames).",
         show_default="frames of the model's scene, rendered into the output folder",
     ),
 ]
 Size = Annotated[
-    int | None, typer.Option(help="Width and height of the picture.", show_default="1024; quick: 256")
+    int | None,
+    typer.Option(help="Width and height of the image, in pixels.", show_default="1024; quick: 256"),
 ]
 Sizes = Annotated[
-    str, typer.Option(metavar="N,N,...", help="Further sizes: how cost grows.", show_default="none")
+    str,
+    typer.Option(
+        metavar="N,N,...", help="Further image sizes, to show how the cost scales.", show_default="none"
+    ),
 ]
 Only = Annotated[
     str,
     typer.Option(
-        metavar="NAME,...", help="Only these; * stands for any letters.", show_default="all there are"
+        metavar="NAME,...", help="Run only these; * matches any characters.", show_default="all available"
     ),
 ]
 Executors = Annotated[
     list[ExecutorName] | None,
-    typer.Option(
-        help="Only the kernels of this executor, beside the peers; repeat for more.", show_default="all"
-    ),
+    typer.Option(help="Run only this backend's kernels, and the baselines. Repeatable.", show_default="all"),
 ]
 Features = Annotated[
     str,
     typer.Option(
         metavar="NAME,...",
-        help="What the untrained network of --synthetic sees.",
-        show_default="color,normal: the paper's",
+        help="Input features of the untrained network of --synthetic.",
+        show_default="color,normal, as in the paper",
     ),
 ]
 Repeats = Annotated[
-    int | None, typer.Option(help="Rounds; in each, all take turns.", show_default="5; quick: 3")
+    int | None, typer.Option(help="Number of interleaved rounds.", show_default="5; quick: 3")
 ]
 Budget = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="Seconds that one of them may take at one size; what is slower takes fewer turns, or none.",
+        help="Time budget per contender and size, in seconds; slower ones get fewer repetitions, or none.",
         show_default="30; quick: 4",
     ),
 ]
 FirstRuns = Annotated[
-    bool, typer.Option("--first-runs", help="Also measure compilation with empty caches on disk.")
+    bool, typer.Option("--first-runs", help="Also measure compilation with empty disk caches.")
 ]
 Synthetic = Annotated[
     bool,
     typer.Option(
         "--synthetic",
-        help="Noise in place of frames, for times only; without MODEL of the paper's network, untrained.",
+        help="Use noise instead of frames, to measure times only; without MODEL, with the paper's "
+        "untrained network.",
     ),
 ]
 TrainVariants = Annotated[
     bool,
     typer.Option(
         "--train-variants",
-        help="Also ranks and windows of the network, each trained first, from the model; kept in the folder.",
+        help="Also benchmark low-rank and small-window variants, fine-tuned from the model and "
+        "cached in the folder.",
     ),
 ]
-Steps = Annotated[int | None, typer.Option(help="Steps of such a training.", show_default="3000; quick: 500")]
+Steps = Annotated[
+    int | None, typer.Option(help="Fine-tuning steps per variant.", show_default="3000; quick: 500")
+]
 TestFrames = Annotated[
     int | None,
-    typer.Option("--frames", help="Test frames that are rendered.", show_default="4; quick: 2"),
+    typer.Option("--frames", help="Number of test frames to render.", show_default="4; quick: 2"),
 ]
 ReferenceSpp = Annotated[
     int | None,
-    typer.Option(help="Paths per pixel of their references.", show_default="256; quick: 64"),
+    typer.Option(help="Paths per pixel of the reference images.", show_default="256; quick: 64"),
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="A reduced run: one schedule a device, few peers.")]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Reduced run: one schedule per device and few baselines.")
+]
 
 
 def bench(
@@ -171,15 +179,15 @@ def bench(
     first_runs: FirstRuns = False,
     quick: Quick = False,
 ) -> None:
-    """Measure speed against error: kernels, schedules, forms of the network, and peers, in one run.
+    """Measure speed against error: kernels, schedules, variants of the network, and baselines.
 
-    Frames of all of them are interleaved: drift of the machine affects them alike.
+    All contenders are interleaved, so that drift of the machine affects them alike.
 
-    The bundled mini-cubes model is measured on unseen frames of its scene, which are rendered first; another
-    model on those of its own scene, or of a data set. Baselines that are installed take part: PyTorch, ONNX
-    Runtime, OpenVINO, Halide, tinygrad on the same OpenCL device, and the denoiser Open Image Denoise:
-    [bold]pip install torch onnxruntime openvino halide tinygrad pyoidn[/]. Errors are against float64, PSNR
-    against the references. Predictions come from operations, sines and bytes and measured rates.
+    The bundled mini-cubes model is measured on unseen frames of its scene; another model on its training
+    scene or a data set. Installed baselines take part: PyTorch, ONNX Runtime, OpenVINO, Halide,
+    tinygrad, and Open Image Denoise: [bold]pip install torch onnxruntime openvino halide tinygrad
+    pyoidn[/]. Errors are against float64, PSNR against the references. Predicted times follow from
+    measured rates.
     """
     packages.need("matplotlib", "for the plots")
     check_folder(output)
@@ -248,7 +256,7 @@ class Wanted:
             raise InputError("--dataset", str(self.dataset), rule, "leave it out, or name a trained model")
         if self.trains and (self.on_noise or not self._has_frames(network)):
             rule = "forms are trained on frames, and there are none"
-            raise InputError("--train-variants", "given", rule, "name a trained model, and its --dataset")
+            raise InputError("--train-variants", NO_VALUE, rule, "name a trained model, and its --dataset")
 
     def _has_frames(self, network: Model) -> bool:
         """Return whether there is a data set, or a scene to render."""
@@ -358,7 +366,7 @@ def check_counts(counts: dict[str, int]) -> None:
     for name, value in counts.items():
         if not 1 <= value <= most[name]:
             option = f"--{name.replace('_', '-')}"
-            rule = f"it must be from 1 to {most[name]}"
+            rule = f"must be from 1 to {most[name]}"
             raise InputError(option, value, rule, f"for example {option} {USUAL[name]}")
 
 
@@ -369,10 +377,10 @@ def check_numbers(numbers: dict[str, Any]) -> None:
     for size in (numbers["size"], *numbers["sizes"]):
         check_size(size)
     if not 1 <= numbers["repeats"] <= MOST_REPEATS:
-        rule = f"it must be from 1 to {MOST_REPEATS}"
+        rule = f"must be from 1 to {MOST_REPEATS}"
         raise InputError("--repeats", numbers["repeats"], rule, "for example --repeats 5")
     if not 0.0 < numbers["budget_s"] < float("inf"):
-        raise InputError("--budget", numbers["budget_s"], "it must be positive and finite", "give seconds")
+        raise InputError("--budget", numbers["budget_s"], "must be positive and finite", "give seconds")
 
 
 def _sizes(text: str) -> tuple[int, ...]:
@@ -380,14 +388,14 @@ def _sizes(text: str) -> tuple[int, ...]:
     try:
         return tuple(int(part) for part in parse_names(text))
     except ValueError:
-        rule = "it must be integers with commas"
+        rule = "must be integers with commas"
         raise InputError("--sizes", text, rule, "for example --sizes 256,512,1024") from None
 
 
 def check_folder(output: Path) -> None:
     """Refuse an output folder in which the results cannot be written."""
     if output.exists() and not output.is_dir():
-        raise InputError("output folder", str(output), "it is a file", "choose another with -o")
+        raise InputError("output folder", str(output), "is a file", "choose another with -o")
     if output.is_dir():
         for name in (JSON_NAME, TEXT_NAME):
             check_output(output / name)

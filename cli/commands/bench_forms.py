@@ -106,7 +106,7 @@ def recipe_of(model: Model, steps: int) -> Recipe:
 
 def _kept(path: Path, begin: TrainState) -> TrainState:
     """Return the state of an earlier run of the same recipe on the same frames, or the first one."""
-    from ...compiler.model_file import load_checkpoint
+    from ...models.model_file import load_checkpoint
 
     if not path.exists():
         return begin

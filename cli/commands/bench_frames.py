@@ -24,7 +24,7 @@ from ..files import dataset_files
 from . import dataset
 
 if TYPE_CHECKING:
-    from ...kernels.run.frame_plan import Request
+    from ...models.data.frame_plan import Request
     from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
 
@@ -74,7 +74,7 @@ def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
 
     pairs = dataset_files.read_pairs(folder, split, tell=say)
     if not pairs:
-        raise InputError("data set", str(folder), f"it has no {split} frames", "make one with --test 1")
+        raise InputError("data set", str(folder), f"has no {split} frames", "make one with --test 1")
     for noisy, _ in pairs:
         exr.need_layers(
             folder, noisy, model.features, "the model was trained with it", "make another data set"
@@ -108,7 +108,7 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
     from ...compiler.scenes.lower_encode import sees
-    from ...kernels.run.frame_plan import Request
+    from ...models.data.frame_plan import Request
     from ...refimpl.light.render import FEATURE_SAMPLER
     from ...refimpl.network.denoise import learned_feature_spp
 
@@ -163,6 +163,6 @@ def for_training(model: Model, folder: Path) -> Sequence[Pair]:
 
 def _make(folder: Path, request: Request) -> None:
     """Render what the folder lacks of a request."""
-    from ...kernels.run.frame_plan import plan
+    from ...models.data.frame_plan import plan
 
     dataset.make(folder, request, plan(request), workers=1, scheduler=None)

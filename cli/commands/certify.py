@@ -32,36 +32,39 @@ ASSUMED = (
 )
 """What a verified source rests on."""
 
+Source = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Check this source file instead, for example one edited by hand.",
+    ),
+]
+
 
 def certify(
     file: Annotated[
         Path,
         typer.Argument(
             metavar="FILE",
-            help="A denoise.certificate.json, or the folder of its kernel.",
+            help="Certificate (denoise.certificate.json), or the kernel's folder.",
             show_default=False,
         ),
     ],
-    source: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Check this source instead of the kernel's own: one that was changed by hand.",
-        ),
-    ] = None,
+    source: Source = None,
     text: Annotated[
-        bool, typer.Option(help="Check the kernel's source too: does it compute the certified program?")
+        bool, typer.Option(help="Also check that the kernel's source computes the certified program.")
     ] = True,
 ) -> None:
-    """Check the proof of a kernel's error bound, step by step, and that its source computes what was proven.
+    """Check the proof of a kernel's error bound, and that its source computes the certified program.
 
-    The checker derives every value again, from the weights and the program, and shows what each layer adds.
-    The source checker then runs the source on unknowns, for pixels of images of any size, and compares every
-    sum and every operation with the program's. Both share no code with the compiler. It assumes that compiler
-    and device keep to the language's standard and to IEEE 754's float32, rounded to nearest, and that the
-    host calls the kernel as the manifest says, with finite values in the stated ranges. Exit status 0: all
-    steps hold, and the source computes the program; 1: one does not, which is named; 2: the file is not a
-    certificate; 3: the source has not been checked, and the reason is printed.
+    The checker derives every value again from the weights and the program, and prints each layer's
+    contribution. The source checker then executes the source symbolically, for pixels of images of any
+    size, and compares every sum and every operation with the program's. Neither shares code with the
+    compiler. They assume that compiler and device keep to the language's standard and to IEEE 754's
+    float32, rounded to nearest, and that the host calls the kernel as the manifest states, with finite
+    values in the stated ranges. Exit status 0: the proof holds, and the source computes the program; 1:
+    a step fails, and is named; 2: the file is not a certificate; 3: the source was not checked, and the
+    reason is printed.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import check
@@ -71,7 +74,7 @@ def certify(
 
     path = file / CERTIFICATE_NAME if file.is_dir() else file
     if not path.is_file():
-        rule = "no such file"
+        rule = "not found"
         raise InputError(
             "certificate", str(path), rule, "kernels of profile ieee have one; see wamnet compile"
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common.terminal import progress, say
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def check_request(request: Request, variant: str | None) -> None:
         rule = "its points are measured already"
         raise InputError("--curve", str(request.curve), rule, "leave out --frames and --size")
     if request.size is not None and not SMALLEST_PX <= request.size <= LARGEST_PX:
-        rule = f"it must be from {SMALLEST_PX} to {LARGEST_PX}"
+        rule = f"must be from {SMALLEST_PX} to {LARGEST_PX}"
         raise InputError("--size", request.size, rule, "for example --size 1024")
     curve.check_limits(_limits(request))
 
@@ -115,8 +115,8 @@ def _curve(model: Model, request: Request, executor: str, profile: str) -> Curve
         curve.check_fits(found, wanted, str(request.curve))
         return found
     if request.frames is None:
-        rule = "errors are measured on frames"
-        raise InputError("--frames", "missing", rule, "name a data set, or a curve with --curve")
+        rule = "missing, and errors are measured on frames"
+        raise InputError("--frames", NO_VALUE, rule, "name a data set, or a curve with --curve")
     pairs, digest = _frames(request.frames)
     with open_executor(executor) as runner:
         return _kept_or_measured(model, runner, profile, request.size or 1024, pairs, digest)
@@ -128,7 +128,7 @@ def _frames(folder: Path) -> tuple[list[tuple[Frame, Frame]], str]:
 
     pairs = dataset_files.read_pairs(folder, "test")
     if not pairs:
-        rule = "it has no test frames"
+        rule = "has no test frames"
         raise InputError("--frames", str(folder), rule, "give a data set made with --test 1 or more")
     manifest = (folder / dataset_files.MANIFEST).read_bytes()
     return pairs, hashlib.sha256(manifest).hexdigest()

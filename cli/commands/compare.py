@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.options import ExecutorName
 from ..common.terminal import table, tell
@@ -40,18 +40,19 @@ OF_PICTURES = ("image", "reference", "exposure")
 def compare(
     context: typer.Context,
     image: Annotated[
-        Path | None, typer.Argument(metavar="IMAGE", help="Picture (.exr or .png).", show_default=False)
+        Path | None,
+        typer.Argument(metavar="IMAGE", help="Image to compare (.exr or .png).", show_default=False),
     ] = None,
     reference: Annotated[
-        Path | None, typer.Argument(metavar="REFERENCE", help="What it should be.", show_default=False)
+        Path | None, typer.Argument(metavar="REFERENCE", help="Reference image.", show_default=False)
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     exposure: options.Exposure = 0.0,
     paths: Annotated[
         str | None,
         typer.Option(
             metavar="SCENE",
-            help="In place of pictures, compare the paths of a kernel with the reference's in this scene.",
+            help="Compare a kernel's paths in this scene with the reference's, instead of two images.",
             show_default=False,
             rich_help_panel=PANEL,
         ),
@@ -59,35 +60,34 @@ def compare(
     executor: Annotated[ExecutorName, typer.Option(rich_help_panel=PANEL)] = ExecutorName.opencl,
     width: Annotated[int, typer.Option(help="Width in pixels.", rich_help_panel=PANEL)] = 64,
     height: Annotated[int, typer.Option(help="Height in pixels.", rich_help_panel=PANEL)] = 64,
-    sample: Annotated[
-        int, typer.Option(help="Number of the sample whose paths are compared.", rich_help_panel=PANEL)
-    ] = 0,
+    sample: Annotated[int, typer.Option(help="Index of the sample to compare.", rich_help_panel=PANEL)] = 0,
     spp: Annotated[
-        int, typer.Option(help="Paths per pixel of the reference's picture.", rich_help_panel=PANEL)
+        int, typer.Option(help="Paths per pixel of the reference image.", rich_help_panel=PANEL)
     ] = 64,
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.", rich_help_panel=PANEL)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", rich_help_panel=PANEL)] = 0,
     max_depth: Annotated[
-        int, typer.Option(help="Greatest number of bounces of a path.", rich_help_panel=PANEL)
+        int, typer.Option(help="Maximum number of bounces per path.", rich_help_panel=PANEL)
     ] = 5,
     time: options.Time = None,
     parameters: options.Parameters = None,
 ) -> None:
-    """Measure how far a picture is from its reference, or a path kernel from the reference's path tracer.
+    """Compare an image with its reference, or a kernel's paths with the reference path tracer's.
 
-    MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare linear
-    radiance.
+    MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare
+    linear radiance.
 
-    With --paths each step of each path has a bound of what rounding may change: what differs more is
-    [bold]unexplained[/]. A step with a decision within the bound of its threshold is [bold]undecided[/]; if
-    it went another way than the reference, [bold]different[/]. Of the reference's own paths, [bold]parted[/]
-    have gone another way so far; the vertices of the others have [bold]moved[/]. Welch's test compares
-    pictures. Exit status 1 if anything is unexplained or the test fails.
+    With --paths every step of every path has a rounding-error bound; a larger difference is
+    [bold]unexplained[/]. A step whose decision is within the bound of its threshold is
+    [bold]undecided[/], and [bold]different[/] if it went the other way than the reference. Of the
+    reference's paths, [bold]parted[/] have taken another course so far; the vertices of the others have
+    [bold]moved[/]. Welch's test compares the images. The exit status is 1 if anything is unexplained or
+    the test fails.
     """
     if paths is None:
         options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
         if image is None or reference is None:
-            rule = "it needs IMAGE and REFERENCE, or --paths SCENE"
-            raise InputError("wamnet compare", "incomplete", rule, "see wamnet compare --help")
+            rule = "needs IMAGE and REFERENCE, or --paths SCENE"
+            raise InputError("wamnet compare", NO_VALUE, rule, "see wamnet compare --help")
         compare_pictures(image, reference, exposure, as_json)
         return
     options.refuse_given(context, OF_PICTURES, "with --paths")
@@ -108,7 +108,7 @@ def compare_pictures(image: Path, reference: Path, exposure: float, as_json: boo
     if a.display.shape != b.display.shape:
         (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape
         rule = f"{reference} has {columns}x{rows}"
-        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare pictures of one size")
+        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare images of one size")
     scores = measure(a, b)
     if as_json:
         typer.echo(json.dumps({"image": str(image), "reference": str(reference), **as_data(scores)}))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...refimpl.reading import parse_json, read_file
 from ..common import options
 from ..common.effort import said_of_compiling
@@ -42,7 +42,7 @@ wamnet compile model.safetensors --target opencl --variant window8+rank16 -o ker
 
 wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
 
-wamnet compile model.safetensors --target c --profile exact -o kernel-c
+wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
 
 wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
 
@@ -55,6 +55,11 @@ HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
 
+Lanes = Annotated[
+    int | None,
+    typer.Option(help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"),
+]
+
 
 def compile_model(
     model: Annotated[
@@ -65,24 +70,21 @@ def compile_model(
             show_default=False,
         ),
     ],
-    target: Annotated[Target, typer.Option(help="Language of the kernel.", show_default=False)],
+    target: Annotated[Target, typer.Option(help="Target language.", show_default=False)],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder for the files.", show_default="TARGET"),
+        typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.", show_default="TARGET"),
     ] = None,
     profile: options.Profile = "ieee",
     time: options.Time = None,
     parameters: options.Parameters = None,
     max_depth: Annotated[
-        int | None, typer.Option(help="Greatest number of bounces of a scene's paths.", show_default="5")
+        int | None, typer.Option(help="Maximum number of bounces per path (scenes only).", show_default="5")
     ] = None,
     sampler: Annotated[
-        Sampler | None, typer.Option(help="Random numbers of a scene's paths.", show_default="pcg4d")
+        Sampler | None, typer.Option(help="Sampler (scenes only).", show_default="pcg4d")
     ] = None,
-    lanes: Annotated[
-        int | None,
-        typer.Option(help="Paths that a work item follows: 16 suit CPUs, 1 GPUs.", show_default="1"),
-    ] = None,
+    lanes: Lanes = None,
     schedule: options.Schedule = None,
     here: options.Here = False,
     variant: options.Variant = None,
@@ -93,11 +95,12 @@ def compile_model(
     frames: options.CurveFrames = None,
     size: options.CurveSize = None,
 ) -> None:
-    """Compile a model, or a scene, to a kernel: source, weights, and a manifest with its interface.
+    """Compile a model or a scene to a kernel: source, weights, and a manifest of its interface.
 
-    The source is meant to be read and pasted into another program: a model's denoises, with a bound on its
-    error; a scene's traces paths. No device is needed, except for --here, or to choose a variant by limits.
-    The fastest one that keeps them is taken, from a curve that is measured once for each device.
+    The source is human-readable, for pasting into another program. A model's kernel denoises, with a
+    proven error bound; a scene's kernel traces paths. No device is needed, except for --here and for
+    limits (--max-error, --max-ms, --max-loss-db): they choose the variant from a speed-error curve that
+    is measured once per device.
     """
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
     request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
@@ -167,10 +170,10 @@ def _compiled_model(
     if request.limited:
         if model.is_imported:
             rule = "limits are measured on frames, which an imported network does not read"
-            raise InputError("limits", "given", rule, "leave them out")
+            raise InputError("limits", NO_VALUE, rule, "leave them out")
         if here:
             rule = "limits choose the schedule too"
-            raise InputError("--here", "given", rule, "leave it out")
+            raise InputError("--here", NO_VALUE, rule, "leave it out")
         variant, schedule = choose(model, request, target, profile, schedule)
     elif here:
         schedule = _chosen_here(model, target, profile, schedule, variant or FULL)
@@ -196,9 +199,11 @@ def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
     _only_for("a scene", of_scenes, f"{name} is not a scene: neither a canonical one nor a .json file")
     comes_along = name.startswith(MODEL_PREFIX)
     if not comes_along and not Path(name).suffix and not Path(name).exists():
-        rule = "neither a canonical scene nor a file"
-        way_out = f"scenes are {options.SCENES}; shipped models: {MODEL_PREFIX}NAME, {options.MODELS}"
-        raise InputError("model or scene", name, rule, way_out)
+        from ... import models
+        from ...refimpl.light.scenes import CANONICAL
+
+        known = [*CANONICAL, *(f"{MODEL_PREFIX}{model}" for model in models.names())]
+        raise InputError("model or scene", name, "not found", f"{choice(name, known)}, or give a file")
 
 
 def _compiled_scene(
@@ -229,7 +234,7 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
     from ...compiler.scenes import path_kernel
 
     if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
+        raise InputError("output folder", str(folder), "is a file", "choose another name with -o")
     check_parent(folder)
     path = folder / artifact.MANIFEST_NAME
     data: Any = None
@@ -245,10 +250,10 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
         raise InputError("output folder", str(folder), rule, "choose another with -o")
     wanted = path_kernel.SCHEMA if of_scene else artifact.SCHEMA
     if schema != wanted:
-        rule = f"it holds {kinds[schema]}, and this is {kinds[wanted]}"
+        rule = f"holds {kinds[schema]}, and this is {kinds[wanted]}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
     if data.get("target") != target:
-        rule = f"it holds a kernel for {data.get('target')}, and this one is for {target}"
+        rule = f"holds a kernel for {data.get('target')}, and this one is for {target}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
 
 

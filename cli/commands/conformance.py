@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError, choice
 from ..common import options
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_output, write_text
@@ -41,14 +41,16 @@ REFERENCE = "reference"
 
 Program = Annotated[
     str | None,
-    typer.Option("--program", metavar="CMD", help="Command of the program under test.", show_default=False),
+    typer.Option(
+        "--program", metavar="CMD", help="Command that runs the program under test.", show_default=False
+    ),
 ]
 Executor = Annotated[
     str | None,
     typer.Option(
         "--executor",
         metavar="NAME",
-        help="In its place an executor of this project (numpy, opencl, opengl, c), or [bold]reference[/].",
+        help="Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
         show_default=False,
     ),
 ]
@@ -57,38 +59,41 @@ Words = Annotated[
     typer.Option(
         "-k",
         metavar="WORD",
-        help="Only cases whose id holds this word, or whose clause or flag it is; repeat for more.",
+        help="Run only cases whose ID contains this word, or that have this clause or flag. Repeatable.",
         show_default=False,
     ),
 ]
 Vectors = Annotated[
     Path | None,
-    typer.Option("--vectors", metavar="DIR", help="Folder of vectors.", show_default="those of this wamnet"),
+    typer.Option(
+        "--vectors", metavar="DIR", help="Folder with the test vectors.", show_default="the bundled vectors"
+    ),
 ]
 Track = Annotated[
     Path | None,
     typer.Option(
         "--track",
         metavar="FILE",
-        help="Keep the verdicts here, show what has changed, and fail only where it is worse.",
+        help="Store the verdicts in this file, show the differences from the last run, and fail "
+        "only on regressions.",
         show_default=False,
     ),
 ]
-Timeout = Annotated[float, typer.Option("--timeout", help="Longest time for an answer, in seconds.")]
+Timeout = Annotated[float, typer.Option("--timeout", help="Timeout per answer, in seconds.")]
 Json = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", help="Write a report as JSON.", show_default=False),
+    typer.Option("--json", metavar="FILE", help="Write a JSON report.", show_default=False),
 ]
 Junit = Annotated[
     Path | None,
-    typer.Option("--junit", metavar="FILE", help="Write a report as JUnit.", show_default=False),
+    typer.Option("--junit", metavar="FILE", help="Write a JUnit report.", show_default=False),
 ]
 Write = Annotated[
     Path | None,
     typer.Option(
         "--write",
         metavar="DIR",
-        help="Make the vectors again with the reference, and end.",
+        help="Regenerate the vectors from the reference and exit.",
         show_default=False,
     ),
 ]
@@ -106,10 +111,10 @@ def conformance(
     junit: Junit = None,
     write: Write = None,
 ) -> None:
-    """Ask a program the questions of the spec's vectors, and hold its answers to their bounds.
+    """Test a program against the spec's vectors and their error bounds.
 
-    The program reads one JSON request a line and writes one answer a line: spec/conformance.md says how, and
-    has a program of forty lines. Ends with status 1 if a case fails.
+    The program reads one JSON request per line and writes one answer per line; spec/conformance.md has
+    the protocol and a working program of forty lines. The exit status is 1 if a case fails.
     """
     from ...compiler.core.profiles import profile_named
     from ...spec.conformance import report, run
@@ -157,32 +162,31 @@ def _refuse_others(write: Path, program: str | None, executor: str | None) -> No
 def _command(program: str | None, executor: str | None) -> list[str]:
     """Return the command of the program under test."""
     if (program is None) == (executor is None):
-        value = "neither given" if program is None else "both given"
-        way_out = "for example --executor numpy"
-        raise InputError("--program, --executor", value, "exactly one says who is asked", way_out)
+        rule = "one of them is needed" if program is None else "exclude each other"
+        raise InputError("--program and --executor", NO_VALUE, rule, "for example --executor numpy")
     if program is not None:
         try:
             command = shlex.split(program)
         except ValueError as error:
             raise InputError(
-                "--program", program, f"it is not a command ({error})", "close quotation marks"
+                "--program", program, f"is not a command: {error}", "close quotation marks"
             ) from None
         if not command:
-            raise InputError("--program", repr(program), "it is not a command", "name a program")
+            raise InputError("--program", program, "is not a command", "name a program")
         return command
     from ...kernels.devices.registry import EXECUTORS
     from ...kernels.export.runners import RUNNERS
 
     if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
-        known = ", ".join(dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS)))
-        raise InputError("--executor", executor, "it is unknown", f"known are {known}")
+        known = dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS))
+        raise InputError("--executor", executor, "unknown", choice(str(executor), known))
     return [sys.executable, "-m", "wamnet.spec.conformance.program", "--executor", str(executor)]
 
 
 def _check_options(timeout: float, outputs: Sequence[Path]) -> None:
     """Refuse what could not be done at the end."""
     if not 0.0 < timeout < math.inf:
-        raise InputError("--timeout", timeout, "it must be a positive number of seconds", "60 is usual")
+        raise InputError("--timeout", timeout, "must be a positive number of seconds", "60 is usual")
     for path in outputs:
         check_output(path)
 

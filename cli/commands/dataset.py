@@ -1,6 +1,6 @@
 """`wamnet dataset`: pairs of noisy pictures and targets over an animation, on as many processes as there are.
 
-1. The request says what the data set consists of [`kernels/run/frame_plan.py`]; the folder says what of it is
+1. The request says what the data set consists of [`models/data/frame_plan.py`]; the folder says what of it is
    there [`cli/files/dataset_files.py`].
 2. Before anything is rendered, what the frames show is compared; test frames that are not unseen are refused
    [`compared`].
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
@@ -29,8 +29,8 @@ from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
 if TYPE_CHECKING:
-    from ...kernels.run.frame_plan import FramePlan, Request, Task
-    from ...kernels.run.scene_source import Parameters
+    from ...models.data.frame_plan import FramePlan, Request, Task
+    from ...models.data.scene_source import Parameters
 
 EXAMPLES = """Examples:
 
@@ -72,63 +72,83 @@ SceneOrNone = Annotated[
 
 
 Outside = Annotated[
-    int, typer.Option(help="Test frames in the arc, 10 degrees beyond --yaw, beyond --saturation.")
+    int,
+    typer.Option(
+        help="Test frames outside the training range: in the arc, 10 degrees beyond --yaw, beyond "
+        "--saturation."
+    ),
 ]
-TestSpp = Annotated[int, typer.Option(help="Paths per pixel of a test target.", show_default="as --spp")]
-Arc = Annotated[float, typer.Option(help="Seconds at the animation's end that training leaves out.")]
-Yaw = Annotated[str, typer.Option(metavar=LIMITS, help="Camera about the vertical, degrees.")]
-Pitch = Annotated[str, typer.Option(metavar=LIMITS, help="Camera up and down, degrees.")]
-Distance = Annotated[str, typer.Option(metavar=LIMITS, help="Camera's distance, as a factor.")]
+TestSpp = Annotated[
+    int, typer.Option(help="Paths per pixel of each test target.", show_default="same as --spp")
+]
+Arc = Annotated[float, typer.Option(help="Seconds at the end of the animation to hold out from training.")]
+Yaw = Annotated[str, typer.Option(metavar=LIMITS, help="Range of camera orbit angles, in degrees.")]
+Pitch = Annotated[str, typer.Option(metavar=LIMITS, help="Range of camera elevation angles, in degrees.")]
+Distance = Annotated[
+    str, typer.Option(metavar=LIMITS, help="Range of factors applied to the camera distance.")
+]
 Saturation = Annotated[
     str | None,
     typer.Option(
         metavar=LIMITS,
-        help="Lamps of any hue and such a saturation, as bright as their own.",
-        show_default="the lamps' own colours",
+        help="Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
+        show_default="the scene's colours",
     ),
 ]
 Power = Annotated[
     str | None,
     typer.Option(
         metavar=LIMITS,
-        help="Lamps of such factors of their own power.",
-        show_default="the lamps' own power",
+        help="Range of factors applied to each light's power.",
+        show_default="the scene's powers",
     ),
 ]
 Before = Annotated[
     int,
     typer.Option(
-        metavar="N", help="Pictures before each noisy one, 24 a second: layers of history after them."
+        metavar="N",
+        help="Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
     ),
 ]
-Workers = Annotated[
-    int | None, typer.Option(help="Processes that share the work.", show_default="one per core")
-]
+Workers = Annotated[int | None, typer.Option(help="Number of worker processes.", show_default="one per core")]
 Scheduler = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Running Dask scheduler whose workers share the work.")
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler whose workers to use."),
 ]
 
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the data set.")]
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Data set folder.")]
 OnlyCheck = Annotated[
-    bool, typer.Option("--check", help="Compare the files with their checksums; change nothing.")
+    bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
 ]
 FromBlender = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Frames of this Blender file, in place of a scene.",
+        help="Render frames of this Blender file instead of a scene.",
         show_default=False,
     ),
 ]
-NoisySpp = Annotated[int, typer.Option(help="Paths per pixel of a noisy picture of Blender.")]
-Percent = Annotated[int, typer.Option(help="Of the width and height that the Blender file says.")]
+NoisySpp = Annotated[int, typer.Option(help="Paths per pixel of a noisy Blender frame.")]
+Percent = Annotated[int, typer.Option(help="Percentage of the Blender file's render resolution.")]
 ViewLayer = Annotated[
     str,
-    typer.Option(metavar="NAME", help="View layer of the Blender file.", show_default="the only one"),
+    typer.Option(
+        metavar="NAME", help="View layer of the Blender file to render.", show_default="the only one"
+    ),
 ]
 BlenderProgram = Annotated[
     str | None,
-    typer.Option(metavar="PROGRAM", help="Blender.", show_default="the package bpy, or blender on the path"),
+    typer.Option(
+        metavar="PROGRAM",
+        help="Path of the Blender program.",
+        show_default="the bpy package, or blender on the PATH",
+    ),
+]
+TestFrames = Annotated[
+    int, typer.Option(help="Number of test frames, sampled separately within the same ranges.")
+]
+Duration = Annotated[
+    float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
 ]
 
 OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
@@ -148,16 +168,16 @@ def dataset(
     command: typer.Context,
     scene: SceneOrNone = None,
     output: Output = Path("dataset"),
-    frames: Annotated[int, typer.Option(help="Frames to train on.")] = 8,
-    test: Annotated[int, typer.Option(help="Test frames inside of the ranges, at other draws.")] = 2,
+    frames: Annotated[int, typer.Option(help="Number of training frames.")] = 8,
+    test: TestFrames = 2,
     outside: Outside = 0,
     size: Annotated[int, typer.Option(help="Width and height in pixels.")] = 64,
-    spp: Annotated[int, typer.Option(help="Paths per pixel of a target; a noisy picture has 1.")] = 64,
+    spp: Annotated[int, typer.Option(help="Paths per pixel of each target; noisy frames have 1.")] = 64,
     test_spp: TestSpp = 0,
     feature_spp: options.FeatureSpp = 0,
     seen: options.Seen = False,
-    start: Annotated[float, typer.Option(help="Begin of the animation, in seconds.")] = 0.0,
-    seconds: Annotated[float, typer.Option(help="Length of the animation; minicubes turn in 8 s.")] = 8.0,
+    start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
+    seconds: Duration = 8.0,
     arc: Arc = 0.0,
     yaw: Yaw = "0:0",
     pitch: Pitch = "0:0",
@@ -167,7 +187,7 @@ def dataset(
     before: Before = 0,
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
-    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
     executor: options.Renderer = ExecutorChoice.auto,
     context: options.OpenGLContext = None,
     sampler: options.SamplerName = Sampler.pcg4d,
@@ -180,14 +200,13 @@ def dataset(
     blender: BlenderProgram = None,
     only_check: OnlyCheck = False,
 ) -> None:
-    """Render the frames of a data set: noisy pictures and their targets over an animation.
+    """Render a data set: noisy frames and their targets over an animation.
 
-    Each frame draws a time, and a camera and lamps from the ranges that are given. Test frames that show what
-    another frame shows are refused. The folder gets a manifest with draws, seeds and checksums. The same
-    command resumes after any interruption, and makes damaged files again. Workers change no byte.
+    Each frame samples a time, and a camera and lights from the given ranges. A test frame that repeats
+    another frame's view is rejected. The manifest in the folder lists the samples, seeds and checksums.
+    After an interruption, the same command resumes, and replaces damaged files. The files do not depend
+    on the number of workers.
     """
-    from ...kernels.run.frame_plan import plan
-
     if only_check:
         check(output, scene)
         return
@@ -202,8 +221,7 @@ def dataset(
     request = _request(command, named, (*numbers, *ways), limits, (seen, power, before))
     _check_workers(workers, scheduler)
     request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
-    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {output}"):
-        make(output, request, plan(request), workers, scheduler)
+    _make_from_scene(output, request, workers, scheduler)
 
 
 def _request(
@@ -214,8 +232,8 @@ def _request(
     last: tuple[bool, str | None, int],
 ) -> Request:
     """Return the request of a scene's name and parameters, of fields, ranges by option and the last three."""
-    from ...kernels.run.frame_plan import Request
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.frame_plan import Request
+    from ...models.data.scene_source import scene_source
 
     options.refuse_given(command, OF_BLENDER, "without --from-blender")
     source, (seen, power, before) = scene_source(*named), last
@@ -225,6 +243,14 @@ def _request(
     factors = None if power is None else options.parse_limits("--power", power)
     request = Request(source.name, source.parameters, *numbers, *ranges)
     return replace(request, seen=seen, power=factors, before=before, still=source.still)
+
+
+def _make_from_scene(folder: Path, request: Request, workers: int | None, scheduler: str | None) -> None:
+    """Make the data set of a request, and say how to resume after an interrupt."""
+    from ...models.data.frame_plan import plan
+
+    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
+        make(folder, request, plan(request), workers, scheduler)
 
 
 def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:
@@ -241,8 +267,7 @@ def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, .
 
 def _missing_scene() -> str:
     """Refuse a command without a scene."""
-    rule = "a data set shows a scene"
-    raise InputError("argument SCENE", "missing", rule, f"name one: {options.SCENES}")
+    raise InputError("argument SCENE", NO_VALUE, "missing", f"choose one of {options.SCENES}")
 
 
 def _check_workers(workers: int | None, scheduler: str | None) -> None:
@@ -278,20 +303,13 @@ def make(
             _render(store, request, frames[0], workers, scheduler)
     for line in summed_up(nearest):
         say(line)
-    say_what_was_made(store, made)
-
-
-def say_what_was_made(store: dataset_files.Store[Any], made: int) -> None:
-    """Say how many pictures there are, and which have other bytes than an earlier run's."""
-    for name in store.changed:
-        say(f"{store.folder / name}: has other bytes than before; another NumPy or processor made it")
-    count = f"{len(store.pictures)} pictures of {len(store.frames)} frames"
-    say(f"{store.folder}: {count}, {made} of them made now")
+    for line in store.summary(made):
+        say(line)
 
 
 def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     """Return how far the nearest training frame is, by split of test frames; refuse frames that are alike."""
-    from ...kernels.run import frame_plan
+    from ...models.data import frame_plan
 
     tests = any(frame.split != frame_plan.TRAIN for frame in frames)
     with progress("comparing what the frames show", len(frames) if tests else 0) as advance:
@@ -317,8 +335,9 @@ def _render(
     scheduler: str | None,
 ) -> None:
     """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
-    from ...kernels.run.frame_plan import KINDS, carry_out
+    from ...kernels.run.before import carry_out
     from ...kernels.run.render_frame import renderer
+    from ...models.data.frame_plan import KINDS
     from ...refimpl.frame import Frame
 
     tasks = store.tasks()

@@ -20,7 +20,7 @@ import shlex
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -36,6 +36,7 @@ from ..files import dataset_files
 from ..files.alone import working_in
 from ..files.outputs import write_text
 from ..reports import report
+from ..reports.report import Plan, Results, Unseen
 from ..reports.runs import Run, run_all
 from ..reports.scores import Score, measure
 from . import bench, bench_forms, bench_frames, dataset, train
@@ -83,37 +84,6 @@ FORM_STEPS = 1000
 
 _Result = TypeVar("_Result")
 
-Limits = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """All sizes of a demonstration; the defaults take two to four minutes on two cores.
-
-    The frames are those of `wamnet dataset`: the network never sees a test frame's pose. Many targets of
-    `train_spp` samples teach more than few clean ones; what is judged has references of `reference_spp`.
-    `steps` None means the preset's. A scene that moves is shown at different times, one of a file, which is
-    static and has a SHA-256, from cameras in the ranges.
-    """
-
-    scene: str = "minicubes"
-    scene_sha256: str = ""
-    size_px: int = 256
-    train_frames: int = 48
-    test_frames: int = 2
-    train_spp: int = 64
-    reference_spp: int = 1024
-    feature_spp: int = 4
-    preset: str = "best"
-    steps: int | None = None
-    seed: int = 1
-    renderer: str = "opencl"
-    trainer: str = "opencl"
-    yaw_deg: Limits = (0.0, 0.0)
-    pitch_deg: Limits = (0.0, 0.0)
-    distance: Limits = (1.0, 1.0)
-
-
 QUICK = Plan(size_px=24, train_frames=2, test_frames=2, train_spp=8, reference_spp=8, steps=60)
 """Small enough to test the whole way; its pictures are not meant to be looked at."""
 
@@ -127,38 +97,6 @@ TRAIN_FRAMES_OF_NUMPY = 12
 """Training frames there, for the same reason."""
 
 
-@dataclass(frozen=True)
-class Unseen:
-    """A test frame: time, heading, noisy frame, its reference, the denoised image (H, W, 3), the scores.
-
-    `scores` has a tuple for each picture, input and denoised.
-    """
-
-    time_s: float
-    label: str
-    noisy: Frame
-    reference: Frame
-    denoised: Any
-    scores: dict[str, tuple[Score, ...]]
-
-
-@dataclass(frozen=True)
-class Results:
-    """What a demonstration has found.
-
-    The test frames' pictures are those of the executor `denoised_by`; `runs` were made on the first of them.
-    """
-
-    train_times_s: tuple[float, ...]
-    unseen: tuple[Unseen, ...]
-    denoised_by: str
-    model: Model
-    state: TrainState
-    seconds_per_step: float | None
-    runs: tuple[Run, ...]
-    seconds: dict[str, float]
-
-
 def demo(
     scene: Annotated[
         str, typer.Option(help=f"Canonical scene ({options.SCENES}) or scene file (.json).")
@@ -169,29 +107,32 @@ def demo(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="Folder for all results.",
+            help="Output folder.",
             show_default=f"{FOLDER}, or {QUICK_FOLDER} with --quick",
         ),
     ] = None,
     size: Annotated[
         int | None,
         typer.Option(
-            help="Width and height of the frames, in pixels; not with --quick.",
+            help="Width and height of the frames, in pixels; cannot be combined with --quick.",
             show_default=str(Plan.size_px),
         ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Tiny frames: try whether everything works.")
+        bool,
+        typer.Option(
+            "--quick", help="Use tiny frames, as a quick check that everything works (one to two minutes)."
+        ),
     ] = False,
 ) -> None:
-    """Render, train, compile, denoise unseen frames and write a report, in a few minutes.
+    """Render, train, compile, denoise unseen frames and write a report, in about five minutes.
 
-    Open FOLDER/report.html afterwards. After Ctrl-C, the same command resumes where it was.
+    Then open FOLDER/report.html. After Ctrl-C, the same command resumes where it stopped.
     """
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report")
     if quick and size is not None:
-        raise InputError("--size", size, "--quick has a size of its own", "leave out one of them")
+        raise InputError("--size", size, "cannot be combined with --quick", "leave out one of them")
     sizes = QUICK if quick else Plan(size_px=Plan.size_px if size is None else size)
     plan = for_this_machine(of_scene(sizes, scene))
     folder = output or Path(QUICK_FOLDER if quick else FOLDER)
@@ -209,7 +150,7 @@ def demo(
 
 def of_scene(plan: Plan, name: str) -> Plan:
     """Return the plan for a scene: the preset that suits its materials, and views if it is static."""
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
     from ...refimpl.light.shading import build, ever_follows
 
     source = scene_source(name)
@@ -246,7 +187,7 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
 
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
     if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
     text = json.dumps(asdict(plan), indent=2) + "\n"
     _check_note(folder, text)
     with working_in(folder, "making a demonstration"):
@@ -267,7 +208,7 @@ def _check_note(folder: Path, text: str) -> bool:
     except InputError:
         found = ""
     if found != text:
-        rule = "it holds results of another plan" if found else "it holds files that are not the demo's"
+        rule = "holds results of another plan" if found else "holds files that are not the demo's"
         raise InputError("output folder", str(folder), rule, "choose another with -o, or remove it")
     return True
 
@@ -315,8 +256,8 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
     from ...compiler.scenes.lower_encode import sees
-    from ...kernels.run import frame_plan
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data import frame_plan
+    from ...models.data.scene_source import scene_source
     from ...refimpl.network.train import PRESETS
 
     source = scene_source(plan.scene)
@@ -349,8 +290,8 @@ def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
 
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
     """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
-    from ...compiler.model_file import load_checkpoint
     from ...kernels.run.trainer import facts_of
+    from ...models.model_file import load_checkpoint
     from ...refimpl.network.train import PRESETS, model_of
 
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)

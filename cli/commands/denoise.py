@@ -48,7 +48,7 @@ wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.p
 
 wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
 
-wamnet denoise model.safetensors noisy.exr --executor c --profile exact
+wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
 
 wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
 
@@ -62,12 +62,24 @@ wamnet executors"""
 
 KeepLayers = Annotated[
     bool,
-    typer.Option("--keep-layers", help="Write all layers of FRAME too, and the picture as layer wamnet."),
+    typer.Option(
+        "--keep-layers", help="Also copy all layers of FRAME, and write the result as layer wamnet."
+    ),
 ]
 ViewLayer = Annotated[
     str,
     typer.Option(
         metavar="NAME", help="View, part or view layer of FRAME to denoise.", show_default="the first view"
+    ),
+]
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
+        "folder or a pattern with %04d for the frame number.",
     ),
 ]
 
@@ -133,27 +145,22 @@ def denoise(
         list[Path],
         typer.Argument(
             metavar="FRAME...",
-            help="Noisy frames with the model's layers (.exr); shot.*.exr and shot.%04d.exr are sequences.",
+            help="Noisy frames with the layers that the model reads (.exr); shot.*.exr and "
+            "shot.%04d.exr are sequences.",
             show_default=False,
         ),
     ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Linear colour (.exr) or display-encoded image (.png); for several frames a folder, or a "
-            "name with %04d for their numbers.",
-        ),
-    ] = Path("denoised.png"),
+    output: Output = Path("denoised.png"),
     executor: options.Executor = ExecutorChoice.auto,
     profile: options.Profile = "ieee",
     schedule: options.Schedule = None,
     rank: options.CutRank = 0,
     variant: options.Variant = None,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Denoise another program's frame that is unlike the training's.")
+        bool,
+        typer.Option(
+            "--anyway", help="Denoise frames of other programs even if they lie outside the training domain."
+        ),
     ] = False,
     keep_layers: KeepLayers = False,
     view_layer: ViewLayer = "",
@@ -161,9 +168,10 @@ def denoise(
 ) -> None:
     """Denoise frames with a trained model.
 
-    The kernel's schedule is the one that suits the device, unless another is named. With profile exact the
-    result is the same to the last bit on every executor; its digest is printed, to be compared. Kernels are
-    kept: a second command compiles nothing. Of a sequence, results that are there are not made again.
+    The schedule is the fastest known for the device, unless --schedule names one. An integer network
+    (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for
+    comparison. Kernels are cached: a second run compiles nothing. In a sequence, existing results are not
+    computed again.
     """
     from ...kernels import open_executor
     from ...kernels.run.denoise_on import Denoiser
@@ -206,7 +214,7 @@ def _denoise_one(job: Job, path: Path, output: Path) -> None:
         say(result.variant)
     before = "" if first == result.seconds_compile else f" (the first time {first:.3f} s)"
     say(f"{result.seconds_run:.3f} s, after {result.seconds_compile:.3f} s of compilation{before}")
-    if denoiser.profile == "exact":
+    if denoiser.model.is_whole:
         say(f"sha256 of the float32 result, the same on every executor: {result.digest}")
 
 
@@ -281,7 +289,7 @@ def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes
 
 def chosen_variant(variant: str | None, rank: int) -> str:
     """Return the variant of a network that two options name; the compiler is imported only for one."""
-    from ...compiler.languages.interface import FULL
+    from ...compiler.kernel.interface import FULL
 
     if not rank:
         return variant or FULL
@@ -291,7 +299,7 @@ def chosen_variant(variant: str | None, rank: int) -> str:
 
 
 def executors() -> None:
-    """List what can run a kernel here, or what is missing for it."""
+    """List the available backends, and what the others lack."""
     found = [probe(name.value) for name in ExecutorName]
     heads = ("name", "state", "schedule", "device, or what is missing")
     table("Executors", heads, found, texts=4)

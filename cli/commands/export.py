@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene
 from ..common.options import Sampler
@@ -70,8 +70,8 @@ Place = Annotated[
     str | None,
     typer.Option(
         metavar="PLACE",
-        help="Where the weights are: inline, uniform, texture or buffer, as far as the target has it.",
-        show_default="the target's usual place",
+        help="Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
+        show_default="the target's default",
     ),
 ]
 
@@ -80,8 +80,8 @@ ScheduleName = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="How the denoiser's work is ordered: plain, the one that is made to be read, or a faster one.",
-        show_default="the fastest that the target has for this model",
+        help="Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
+        show_default="the fastest for this target and model",
     ),
 ]
 
@@ -90,47 +90,52 @@ Moving = Annotated[
     str | None,
     typer.Option(
         metavar="LIST",
-        help="What of the scene the path kernel is given as numbers: time, camera, lights, positions.",
-        show_default="nothing: the scene is constant",
+        help="Scene parameters to pass at run time instead of baking in: time, camera, lights, positions.",
+        show_default="none: the scene is baked in",
     ),
 ]
 
 
 Seconds = Annotated[
-    float | None, typer.Option(help="Length of the table of times.", show_default=f"{SECONDS:g}")
+    float | None,
+    typer.Option(help="Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"),
 ]
-Fps = Annotated[float | None, typer.Option(help="Times per second in the table.", show_default=f"{FPS:g}")]
+Fps = Annotated[float | None, typer.Option(help="Table entries per second.", show_default=f"{FPS:g}")]
 SceneToo = Annotated[
     str | None,
     typer.Option(
         metavar="SCENE",
-        help="The path tracer too, of this scene: a canonical one or a file (.json).",
-        show_default="only the denoiser",
+        help="Also export the path tracer for this scene: a canonical scene or a file (.json).",
+        show_default="denoiser only",
     ),
 ]
 
 
 TargetName = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help=f"Where it is going: {TARGETS}.", show_default="the host's"),
+    typer.Option(
+        metavar="NAME", help=f"Target language or host format: {TARGETS}.", show_default="the host's target"
+    ),
 ]
 HostName = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help=f"A whole program around it: {HOSTS}.", show_default="none"),
+    typer.Option(metavar="NAME", help=f"Complete host program to generate: {HOSTS}.", show_default="none"),
 ]
 Folder = Annotated[
     Path | None,
     typer.Option(
-        "-o", "--output", metavar="FOLDER", help="New folder for the files.", show_default="HOST or TARGET"
+        "-o", "--output", metavar="FOLDER", help="New output folder.", show_default="HOST or TARGET"
     ),
 ]
 Checked = Annotated[
     bool,
-    typer.Option("--check", help="Compile and run it here, and compare with the reference's picture."),
+    typer.Option(
+        "--check", help="Compile and run the export here, and compare its output with the reference."
+    ),
 ]
 Measured = Annotated[
     bool,
-    typer.Option("--measure", help="Measure on this machine how long it takes, and say so in the README."),
+    typer.Option("--measure", help="Measure the time per frame on this machine and report it in the README."),
 ]
 
 
@@ -148,7 +153,7 @@ class Span:
         Some scenes are laid out in another way at time 0, where their boxes are parallel to the axes.
         """
         from ...kernels.export.motion import TIME, Motion
-        from ...kernels.run.frame_plan import animation_times
+        from ...models.data.frame_plan import animation_times
 
         if TIME not in self.kinds:
             given = {"--seconds": self.seconds, "--fps": self.fps}
@@ -168,7 +173,7 @@ def export(
     scene: SceneToo = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
-    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = DEPTH,
+    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = DEPTH,
     sampler: options.SamplerName = Sampler.pcg4d,
     profile: options.Profile = "ieee",
     variant: options.Variant = None,
@@ -180,13 +185,13 @@ def export(
     check: Checked = False,
     measure: Measured = False,
 ) -> None:
-    """Write a denoiser for another program: kernels, a manifest, a README, and a pair to check with.
+    """Export a denoiser for another program: kernels, a manifest, a README and a reference test image.
 
-    With --host there is a program around it that runs as it is: see "Run it" in the README.
+    --host adds a complete program around them; see "Run it" in its README.
 
-    Each target's files were compiled by its own tools, run, and checked against the bound in the manifest.
-    With a scene the path tracer and the encoding of its features are written too; with --target html, a web
-    page that does all of it.
+    Every target's files have been compiled by the target's own tools, run, and checked against the bound
+    in the manifest. --scene also exports the path tracer and its feature encoding; --target html writes
+    a web page with all of them.
     """
     target = _target(target, host)
     folder = output or Path(host or target)
@@ -223,8 +228,8 @@ def _target(target: str | None, host: str | None) -> str:
 
         return target or host_named(host).target
     if target is None:
-        rule = "an export has a target or a host"
-        raise InputError("--target", "not given", rule, "add --target NAME or --host NAME; --help lists both")
+        rule = "one of them is needed"
+        raise InputError("--target or --host", NO_VALUE, rule, "--help lists their values")
     return target
 
 

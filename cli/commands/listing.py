@@ -34,16 +34,16 @@ def listing(
             show_default=False,
         ),
     ],
-    target: Annotated[Target, typer.Option(help="Language of the kernel.", show_default=False)],
+    target: Annotated[Target, typer.Option(help="Target language.", show_default=False)],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write it there.", show_default="the terminal"),
+        typer.Option("-o", "--output", metavar="FILE", help="Output file.", show_default="the terminal"),
     ] = None,
     profile: options.Profile = "ieee",
 ) -> None:
-    """Show a kernel, and above its lines those of the reference that they came from.
+    """Print a kernel interleaved with the lines of the reference that it came from.
 
-    A denoiser has the plain schedule, a scene one path at a time. Nothing is written but with -o.
+    A denoiser has the plain schedule, a scene one path at a time. Only -o writes a file.
     """
     from ...compiler.core.listing import as_text
 

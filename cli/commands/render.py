@@ -52,7 +52,7 @@ def render(
             "-o",
             "--output",
             metavar="FILE",
-            help="Frame with all layers (.exr), or a picture of its colour (.png).",
+            help="Output: frame with all layers (.exr), or its colour only (.png).",
             show_default="SCENE.exr",
         ),
     ] = None,
@@ -68,20 +68,22 @@ def render(
     pitch: options.Pitch = 0.0,
     distance: options.Distance = 1.0,
     light: options.Lights = None,
-    max_depth: Annotated[int, typer.Option(help="Greatest number of bounces of a path.")] = 5,
+    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
     sampler: options.SamplerName = Sampler.pcg4d,
-    dtype: Annotated[FloatType, typer.Option(help="Arithmetic; files hold float32.")] = FloatType.float32,
+    dtype: Annotated[
+        FloatType, typer.Option(help="Floating-point type of the computation; files store float32.")
+    ] = FloatType.float32,
     executor: options.Renderer = ExecutorChoice.auto,
     context: options.OpenGLContext = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes that share NumPy's work.", show_default="one per core")
+        int | None, typer.Option(help="Number of worker processes (NumPy only).", show_default="one per core")
     ] = None,
     exposure: options.Exposure = 0.0,
 ) -> None:
-    """Path-trace a scene: colour, and albedo, normal, depth, position and ray direction with it.
+    """Path-trace a scene: colour, albedo, normal, depth, position and ray direction.
 
-    The same scene, size, samples and seed give the same frame, whatever the number of workers; kernels
-    (OpenCL, OpenGL) give it up to rounding, much sooner.
+    The same scene, size, samples and seed give the same frame, whatever the number of workers. Compiled
+    backends (OpenCL, OpenGL, C) give the same frame up to rounding, and much sooner.
     """
     from ...kernels.run.render_frame import render_frame
     from ...refimpl.light.render import Job
@@ -131,7 +133,7 @@ def scene(
     name: options.SceneName,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default="the terminal"),
+        typer.Option("-o", "--output", metavar="FILE", help="Output file.", show_default="the terminal"),
     ] = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
@@ -140,7 +142,7 @@ def scene(
     distance: options.Distance = 1.0,
     light: options.Lights = None,
 ) -> None:
-    """Write a scene as JSON text, to be changed and rendered."""
+    """Write a scene as a JSON file that you can edit and render."""
     from ...refimpl.light.scene import to_json
 
     view = options.View(yaw, pitch, distance, tuple(light or ()))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK
@@ -53,22 +53,28 @@ CHECKPOINT_INTERVAL_S = 30.0
 
 Inputs = Annotated[
     list[Path] | None,
-    typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr); repeat.", show_default=False),
+    typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr). Repeatable.", show_default=False),
 ]
 Targets = Annotated[
     list[Path] | None,
     typer.Option(
-        "-t", "--target", metavar="FILE", help="Its reference, in the same order.", show_default=False
+        "-t",
+        "--target",
+        metavar="FILE",
+        help="Reference of each noisy frame, in the same order. Repeatable.",
+        show_default=False,
     ),
 ]
 DataSet = Annotated[
     Path | None,
-    typer.Option(metavar="FOLDER", help="Data set, in place of frames.", show_default=False),
+    typer.Option(
+        metavar="FOLDER", help="Data set to train on, instead of single frames.", show_default=False
+    ),
 ]
 Rank = Annotated[
     int | None,
     typer.Option(
-        help="Rank of the first layer: 16 takes a fifth of the operations; 0 for no restriction.",
+        help="Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank.",
         show_default="the preset's",
     ),
 ]
@@ -77,7 +83,7 @@ Begin = Annotated[
     typer.Option(
         "--from",
         metavar="MODEL",
-        help="Begin with the weights of this model, cut to --rank or --variant, not with random ones.",
+        help="Start from this model's weights, cut to --rank or --variant, instead of random ones.",
         show_default=False,
     ),
 ]
@@ -86,18 +92,32 @@ Cut = Annotated[
     typer.Option(
         "--variant",
         metavar="NAME",
-        help="Train on this variant of the model that --from names, as in window8+rank16. whole8 and whole10 "
-        "end with integers, rounded on the frames; with --from and no --steps nothing else is done.",
+        help="Fine-tune this variant of the model given by --from, for example window8+rank16. "
+        "whole8 and whole10 round the weights to integers at the end; with --from and without "
+        "--steps they only round.",
         show_default=False,
     ),
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Resume from the checkpoint beside the model, with its own recipe.")
+    bool,
+    typer.Option(
+        "--resume", help="Resume from the checkpoint next to the model, with the checkpoint's recipe."
+    ),
 ]
 Restart = Annotated[
-    bool, typer.Option("--restart", help="Start again, and replace the checkpoint of an earlier run.")
+    bool, typer.Option("--restart", help="Start again and overwrite the checkpoint of an earlier run.")
 ]
-Integers = Annotated[bool, typer.Option("--whole", help="Short for --variant whole8: integers of 8 bits.")]
+Integers = Annotated[
+    bool, typer.Option("--whole", help="Short for --variant whole8: an 8-bit integer network.")
+]
+PresetName = Annotated[
+    Preset | None,
+    typer.Option(
+        help="Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
+        "sky (under an environment).",
+        show_default="best",
+    ),
+]
 
 
 def train(
@@ -107,17 +127,11 @@ def train(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
     ] = Path("model.safetensors"),
-    preset: Annotated[
-        Preset | None,
-        typer.Option(
-            help="Protocol: the project's best, for mirrors and glass, the paper's, short, or under a sky.",
-            show_default="best",
-        ),
-    ] = None,
+    preset: PresetName = None,
     features: Annotated[
         str | None,
         typer.Option(
-            help="What the network sees, with commas: color, highlights, normal, albedo, seen_albedo, ...",
+            help="Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ...",
             show_default="the preset's",
         ),
     ] = None,
@@ -126,19 +140,23 @@ def train(
     variant: Cut = None,
     whole: Integers = False,
     activation: options.ActivationName = None,
-    steps: Annotated[int | None, typer.Option(help="Training steps.", show_default="the preset's")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the first weights and of the draws.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Number of training steps.", show_default="the preset's")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Random seed of the initial weights and of sampling.")
+    ] = None,
     resume: Resume = False,
     restart: Restart = False,
     executor: options.Trainer = TrainerName.auto,
 ) -> None:
-    """Train a network on noisy frames and their references, or on the training frames of a data set.
+    """Train a network on noisy frames and their references, or on a data set.
 
-    A checkpoint is kept beside the model. After Ctrl-C, --resume continues from there, to the same bits. With
-    more --steps it continues after the end; the learning rate, which falls over the length of the run, then
-    jumps, so the model differs from that of a run which had this length from the start.
+    A checkpoint is kept next to the model. After Ctrl-C, --resume continues from it with bit-identical
+    results. With more --steps it continues past the end; the learning rate, which decays over the run,
+    then jumps back up, so the model differs from that of a run with this length from the start.
     """
-    from ...compiler.model_file import load_checkpoint
+    from ...models.model_file import load_checkpoint
 
     inputs, targets = inputs or [], targets or []
     check_output(output, (".safetensors",), [*inputs, *targets])
@@ -219,7 +237,7 @@ def _of_variant(
 
 def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
     """Write a model in integers, rounded on the frames and not trained, and say so."""
-    from ...compiler.model_file import save_model
+    from ...models.model_file import save_model
     from ...refimpl.network.train import whole_of
     from ..common.inputs import load_model
 
@@ -250,7 +268,7 @@ def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe
     from ..common.inputs import load_model
 
     if begin is None:
-        raise InputError("--variant", name, "it is cut from a trained model", "name one with --from")
+        raise InputError("--variant", name, "is cut from a trained model", "name one with --from")
     return varied(recipe, load_model(begin), name)
 
 
@@ -308,13 +326,12 @@ def _fit_to_the_end(
 def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool) -> None:
     """Refuse options that contradict each other, and to replace an earlier run's checkpoint unasked."""
     if resume and restart:
-        rule = "a run resumes or starts again"
-        raise InputError("pair of options", "--resume, --restart", rule, "choose one of them")
+        raise InputError("--resume and --restart", NO_VALUE, "exclude each other", "choose one of them")
     if resume and preset is not None:
-        rule = "with --resume the checkpoint's own recipe counts"
+        rule = "cannot be combined with --resume, which uses the checkpoint's recipe"
         raise InputError("--preset", preset.value, rule, "leave it out, or start again with --restart")
     if saved.exists() and not (resume or restart):
-        rule = "it is there from an earlier run, which would be lost"
+        rule = "belongs to an earlier run, which would be lost"
         raise InputError(
             "checkpoint",
             str(saved),
@@ -338,13 +355,12 @@ def read_training(
     from ..files import dataset_files
 
     if dataset is None and not inputs and not targets:
-        rule = "training needs frames"
-        raise InputError("list of frames", "empty", rule, "give -i and -t, or --dataset")
+        raise InputError("training frames", NO_VALUE, "missing", "give -i and -t, or --dataset")
     if dataset is None:
         return read_pairs(inputs, targets, features)
     if inputs or targets:
-        rule = "the frames come from there"
-        raise InputError("--dataset", str(dataset), rule, "leave out --dataset, or -i and -t")
+        rule = "cannot be combined with -i and -t"
+        raise InputError("--dataset", str(dataset), rule, "choose one of them")
     return dataset_files.read_pairs(dataset, tell=say)
 
 
@@ -379,8 +395,8 @@ def fit(
 
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
-    from ...compiler.model_file import save_checkpoint, save_model
     from ...kernels.run.trainer import model_of_run
+    from ...models.model_file import save_checkpoint, save_model
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
 from ..common.inputs import load_model, model_path
@@ -42,7 +42,7 @@ EXAMPLES = """Examples:
 
 wamnet triage model.safetensors noisy.exr
 
-wamnet triage model.safetensors noisy.exr --schedules all --profile exact
+wamnet triage model.safetensors noisy.exr --schedules all
 
 wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
 """Shown below the help of `wamnet triage`."""
@@ -61,15 +61,15 @@ Executors = Annotated[
     typer.Option(
         "--executor",
         metavar="NAME",
-        help="Only this executor; repeat for more. opengl means opengl-egl and opengl-osmesa.",
-        show_default="all that are here",
+        help="Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable.",
+        show_default="all available",
     ),
 ]
 Schedules = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Schedules: [bold]picked[/] by each executor, [bold]all[/] that its target has, or one by name.",
+        help="Schedules: [bold]picked[/] by each backend, [bold]all[/] of its target, or one by name.",
     ),
 ]
 KeptKernel = Annotated[
@@ -77,7 +77,7 @@ KeptKernel = Annotated[
     typer.Option(
         "--kernel",
         metavar="FOLDER",
-        help="Run this kernel's files instead of what the compiler makes for its target and schedule.",
+        help="Run this kernel's files instead of compiling for its target and schedule.",
         show_default=False,
     ),
 ]
@@ -87,7 +87,9 @@ def triage(
     model: options.ModelFile,
     frame: Annotated[
         Path,
-        typer.Argument(metavar="FRAME", help="Frame with the model's layers (.exr).", show_default=False),
+        typer.Argument(
+            metavar="FRAME", help="Frame with the layers that the model reads (.exr).", show_default=False
+        ),
     ],
     executor: Executors = None,
     profile: options.Profile = "ieee",
@@ -95,14 +97,16 @@ def triage(
     kernel: KeptKernel = None,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Folder of the reproducer, if one is needed."),
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="Output folder of the reproducer, if a fault is found."
+        ),
     ] = Path("triage"),
 ) -> None:
-    """Run a model on every executor, and name the one that is beyond its error bound.
+    """Run a model on every backend, and find the one that exceeds its error bound.
 
-    Each kernel is held against the float64 reference and the bound that its schedule has at this frame. If
-    one deviates, the first stage that does is looked for, and the smallest part of the frame that shows it is
-    kept in FOLDER with the kernel's source. Exit status 1 says that a kernel deviates.
+    Each kernel is compared with the float64 reference, within its schedule's bound for this frame. If
+    one deviates, FOLDER gets the first deviating stage and the smallest part of the frame that
+    reproduces it, with the kernel's source. The exit status is 1 if a kernel deviates.
     """
     from ...compiler.core.profiles import profile_named
     from ...kernels.run.denoise_on import images_of
@@ -158,8 +162,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
 
     for name in wanted:
         if name not in {*WAYS, *EXECUTORS}:
-            rule = f"must be one of {', '.join(dict.fromkeys([*EXECUTORS, *WAYS]))}"
-            raise InputError("--executor", name, rule, "see wamnet executors")
+            raise InputError("--executor", name, "unknown", choice(name, dict.fromkeys([*EXECUTORS, *WAYS])))
     runners: list[Runner] = []
     for way, (name, _) in WAYS.items():
         if wanted and not {way, name} & set(wanted):
@@ -286,7 +289,7 @@ def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str
         "conclusion": conclusion(verdicts),
         "profile": task.profile,
         "schedules": task.schedules,
-        "program": ir.digest(analysed(lower(task.model), task.profile)),
+        "program": ir.digest(analysed(lower(task.model))),
         "frame": {"height": task.frame.height, "width": task.frame.width},
         "verdicts": [_entry(verdict) for verdict in verdicts],
         "part": {**asdict(found.box), "verdicts": [_entry(verdict) for verdict in found.verdicts]},
@@ -322,7 +325,6 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
         "found": _number(verdict.found),
         "expected": _number(verdict.expected),
         "bound": _number(verdict.bound),
-        "other_bits": verdict.bits,
     }
 
 
@@ -407,14 +409,14 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     from ...compiler.plan import analysed
 
     way_out = "give a folder that triage or compile wrote"
-    rule = f"it must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
+    rule = f"must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
     with refusing("--kernel", str(folder), rule, way_out):
         path = folder / artifact.MANIFEST_NAME
         manifest = parse_json(read_file(path, "--kernel", way_out), f"--kernel {path}", way_out)
         wanted, name = manifest["program"], str(manifest["profile"]["name"])
         target, schedule = str(manifest["target"]), str(manifest["schedule"]["name"])
     program = lower(model)
-    if wanted != ir.digest(analysed(program, profile)) or name != profile:
+    if wanted != ir.digest(analysed(program)) or name != profile:
         rule = f"its kernel is of another model or profile ({name})"
         raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
     made = compile_program(program, target, profile, schedule)
@@ -434,9 +436,9 @@ def _with_files(made: Artifact, folder: Path) -> Artifact:
     content = read_file(folder / made.source_name, "--kernel")
     raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")
     if len(raw) != 4 * made.weights.size:
-        rule = f"it must hold {made.weights.size} float32 weights, {4 * made.weights.size} bytes"
+        rule = f"must hold {made.weights.size} float32 weights, {4 * made.weights.size} bytes"
         raise InputError(f"--kernel: length of {artifact.WEIGHTS_NAME}", len(raw), rule, "restore the file")
-    with refusing(f"--kernel: {made.source_name}", str(folder), "it must be UTF-8", "restore the file"):
+    with refusing(f"--kernel: {made.source_name}", str(folder), "must be UTF-8", "restore the file"):
         source = content.decode("utf-8")
     own = {made.source_name: ir.sha256(content), artifact.WEIGHTS_NAME: ir.sha256(raw)}
     files = {**made.manifest["files"], **own}

@@ -42,35 +42,38 @@ def tune(
     model: Annotated[
         Path | None,
         typer.Argument(
-            metavar="MODEL", help="Trained model (.safetensors).", show_default="a network like the paper's"
+            metavar="MODEL",
+            help="Trained model (.safetensors).",
+            show_default="a network of the paper's size",
         ),
     ] = None,
-    executor: Annotated[ExecutorName, typer.Option(help="What runs the kernel.")] = ExecutorName.opencl,
-    size: Annotated[int, typer.Option(help="Width and height of the picture, in pixels.")] = 512,
+    executor: Annotated[
+        ExecutorName, typer.Option(help="Backend that runs the kernel.")
+    ] = ExecutorName.opencl,
+    size: Annotated[int, typer.Option(help="Width and height of the image, in pixels.")] = 512,
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
-    force: Annotated[bool, typer.Option("--force", help="Measure again what is known.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Ignore cached measurements.")] = False,
     cache: Annotated[
         Path | None,
         typer.Option(
             "--cache",
             metavar="DIR",
-            help="Folder for what is measured; other commands look there if WAMNET_CACHE names it.",
+            help="Folder for the measurements; other commands use it if WAMNET_CACHE names it.",
             show_default="~/.cache/wamnet",
         ),
     ] = None,
 ) -> None:
-    """Measure which schedule of the denoiser is fastest here, and remember it.
+    """Measure which schedule of the denoiser is fastest on this machine, and cache the result.
 
-    Every schedule that the device holds is checked against the reference, then timed. Other commands take the
-    fastest for networks of this shape and pictures of about this size.
+    Schedules are checked against the reference first. Other commands use the result for similar networks.
     """
     from ...compiler.variants import FULL, plan_model, with_rank
     from ...kernels import open_executor
     from ...kernels.run import tune as tuning
 
     if not 1 <= size <= LARGEST_SIZE:
-        raise InputError("--size", size, f"it must be from 1 to {LARGEST_SIZE}", "for example --size 512")
+        raise InputError("--size", size, f"must be from 1 to {LARGEST_SIZE}", "for example --size 512")
     if cache is not None:
         os.environ["WAMNET_CACHE"] = str(cache)
     network = load_model(model) if model else paper()

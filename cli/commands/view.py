@@ -59,37 +59,37 @@ def view(
         typer.Option(
             metavar="SCENE",
             help=f"Canonical scene ({options.SCENES}) or scene file (.json).",
-            show_default="the one that the model was trained on",
+            show_default="the model's training scene",
         ),
     ] = None,
     fast: Annotated[
         Path | None,
         typer.Option(
             metavar="MODEL",
-            help="Model whose first layer is cut to rank 16 for the fast variant: one trained on so.",
-            show_default="the same",
+            help="Model for the fast variant, fine-tuned at rank 16; its first layer is cut to rank 16.",
+            show_default="same as MODEL",
         ),
     ] = None,
     parameters: options.Parameters = None,
-    port: Annotated[int, typer.Option(help="Port to serve the page at; 0 takes one that is free.")] = 0,
-    browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
+    port: Annotated[int, typer.Option(help="Port to serve the page on; 0 picks a free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     output: Annotated[
         Path | None,
         typer.Option(
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the page (.html) and serve nothing.",
-            show_default="the page is served",
+            help="Write the page (.html) instead of serving it.",
+            show_default="serve the page",
         ),
     ] = None,
 ) -> None:
-    """Show a model at work in the browser: a scene, path-traced live, its normals, and the denoised picture.
+    """Show a model in the browser: the scene, path-traced live, its normals, and the denoised image.
 
-    The page is one file that runs anywhere where WebGL 2 does, without a server: -o writes it.
+    The page is a single file that needs WebGL 2 and no server; -o writes it.
     """
     if not 0 <= port <= LARGEST_PORT:
-        raise InputError("--port", port, f"it must be from 0 to {LARGEST_PORT}", "for example --port 8080")
+        raise InputError("--port", port, f"must be from 0 to {LARGEST_PORT}", "for example --port 8080")
     if output is not None:
         check_output(output, (".html", ".htm"), [path for path in (model, fast) if path])
     page = page_of(model, scene, parameters or [], fast)
@@ -105,8 +105,8 @@ def serve(page: bytes, port: int, browser: bool) -> None:
     try:
         server = PageServer((HOST, port), handler_of(page))
     except OSError as error:
-        reason = error.strerror or "it is taken"
-        raise InputError("--port", port, f"it cannot be had ({reason})", "choose another, or 0") from None
+        reason = error.strerror or "in use"
+        raise InputError("--port", port, f"cannot be opened: {reason}", "choose another, or 0") from None
     with server:
         address = f"http://{HOST}:{server.server_address[1]}/"
         say(f"{address} (Ctrl-C ends)")

@@ -18,8 +18,8 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
-from ...compiler.core.writing import signals_wait
-from ...refimpl.errors import InputError
+from ...models.writing import signals_wait
+from ...refimpl.errors import NO_VALUE, InputError
 from .packages import need
 
 _Task = TypeVar("_Task")
@@ -81,15 +81,15 @@ def do_on_cluster(
             on_result(under_way.pop(future), result)
             del future, result  # lets the scheduler forget it
     except ImportError as error:
-        rule = "a worker needs what this process has"
+        rule = "missing"
         way_out = "install it there: pip install 'wamnet[full]'"
-        raise InputError(f"Python package {error.name!r} on a worker", "missing", rule, way_out) from None
+        raise InputError(f"Python package {error.name!r} on a worker", NO_VALUE, rule, way_out) from None
     except distributed.KilledWorker:
-        rule = "several workers have ended while they did the same task"
-        raise InputError("cluster", "short of memory, perhaps", rule, "use fewer workers") from None
+        rule = "several workers died during the same task, perhaps for lack of memory"
+        raise InputError("cluster", NO_VALUE, rule, "use fewer workers") from None
     except (distributed.comm.CommClosedError, distributed.CancelledError):
-        rule = "the connection to it was lost"
-        raise InputError("Dask scheduler", "gone", rule, "run the same command again to resume") from None
+        rule = "the connection was lost"
+        raise InputError("Dask scheduler", NO_VALUE, rule, "run the same command again to resume") from None
 
 
 @contextmanager

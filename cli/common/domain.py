@@ -39,15 +39,15 @@ def check_domain(
     is_outside = found is not None and found.is_outside
     if found and is_outside and foreign and not anyway:
         rule = (
-            f"the model has learned frames within {found.threshold:.3g}, and of another program's frame it "
+            f"the model was trained on frames within {found.threshold:.3g}, and of this frame it "
             f"reads {read}; {farthest(found)}"
         )
         way_out = "export it as the training frames were, or give --anyway"
-        raise InputError(f"{path}: distance from the model's domain", f"{found.distance:.3g}", rule, way_out)
+        raise InputError(f"{path}: distance from the model's domain", round(found.distance, 2), rule, way_out)
     if foreign:
         say(f"{path}: another program's frame, of which the model reads {read}")
     if found and domain and is_outside:
-        named = [f"outside of the model's domain: {'; '.join([how_far(found, domain), *named])}"]
+        named = [f"outside the model's domain: {'; '.join([how_far(found, domain), *named])}"]
     for sentence in named:
         say(f"{path}: {sentence}")
 
@@ -108,5 +108,5 @@ class Watch:
         if self.domain is None or not beyond:
             return
         name, found = max(beyond, key=lambda each: each[1].distance)
-        count = f"{len(beyond)} of {len(self.pictures)} pictures are outside of the model's domain"
+        count = f"{len(beyond)} of {len(self.pictures)} frames are outside the model's domain"
         say(f"{output}: {count}; the farthest is {name}: {how_far(found, self.domain)}")

@@ -100,7 +100,7 @@ def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) ->
     seconds, pixels = contenders * len(sizes) * budget_s, max(sizes) ** 2
     if seconds < LONG_S and pixels < MANY_PIXELS:
         return []
-    work = f"{contenders} contender{'s' if contenders > 1 else ''} and pictures of up to {pixels:,} pixels"
+    work = f"{contenders} contender{'s' if contenders > 1 else ''} and images of up to {pixels:,} pixels"
     return [
         f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C ends it"
     ]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ... import models
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from . import options
 from .terminal import tell
 
@@ -25,11 +25,11 @@ CHECKPOINT_MARK = ".checkpoint"
 def check_input(path: Path) -> None:
     """Refuse an input that is not a file."""
     if path.is_dir():
-        raise InputError("input file", str(path), "it is a folder", "give the name of a file in it")
+        raise InputError("input file", str(path), "is a folder", "give the name of a file in it")
     if not path.exists():
-        raise InputError("input file", str(path), "it does not exist", "check the name")
+        raise InputError("input file", str(path), "not found", "check the name")
     if not path.is_file():
-        rule = "it is not a regular file (a pipe or a device)"
+        rule = "is a pipe or a device, not a regular file"
         raise InputError("input file", str(path), rule, "give a file on a disk")
 
 
@@ -40,10 +40,11 @@ def model_path(path: Path) -> Path:
     if path.suffix or (path.exists() and not (name in known and path.is_dir())):
         return path
     if path.is_dir():
-        tell(f"{path}/ is a folder, and no model: the model of this name that ships with wamnet is taken")
+        tell(f"{path}/ is a folder, not a model: using the bundled model of this name")
     if name not in known:
-        rule = "there is no such file, and wamnet ships no model of this name"
-        raise InputError("model", str(path), rule, f"give a .safetensors file, or one of {', '.join(known)}")
+        raise InputError(
+            "model", str(path), "not found", f"{choice(name, known)}, or give a .safetensors file"
+        )
     return models.path(name)
 
 
@@ -52,26 +53,26 @@ def load_model(path: Path, imported: bool = False) -> Model:
 
     `imported`: networks of other programs too, which do not read frames.
     """
-    from ...compiler import model_file
+    from ...models import model_file
 
     path = model_path(path)
     try:
         found = model_file.load_model(path)
         if not found.is_imported or imported:
             return found
-        rule = f"it was imported and reads {', '.join(found.features)}, not the features of a frame"
+        rule = f"was imported and reads {', '.join(found.features)}, not the features of a frame"
         raise InputError("model", str(path), rule, "use it with wamnet compile, listing or export --check")
     except InputError as error:
         if error.value != model_file.CHECKPOINT_FORMAT:
             raise
     name = path.name.replace(CHECKPOINT_MARK + path.suffix, path.suffix)
-    way_out = f"give the model beside it: {path.with_name(name)}" if name != path.name else "give the model"
-    raise InputError("model file", str(path), "it is a checkpoint of training, not a model", way_out)
+    way_out = f"give the model next to it: {path.with_name(name)}" if name != path.name else "give the model"
+    raise InputError("model file", str(path), "is a checkpoint of training, not a model", way_out)
 
 
 def trained_scene(model: Model) -> str | None:
     """Return the canonical scene that a model was trained on; None for several, a file's, and no name."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
     from ...refimpl.light.scenes import CANONICAL
 
     name = model.info.get("trained_on_scene", "")
@@ -80,16 +81,16 @@ def trained_scene(model: Model) -> str | None:
 
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
 
     told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
-        told.append(f"it shows {scene}, and the model has learned only {scenes}: expect a poor picture")
+        told.append(f"it shows {scene}, but the model was trained only on {scenes}: expect a poor image")
     elif files and scene and info.get(SCENE_FILE, "") not in files.split(", "):
         told.append(f"{scene} is another scene file than the one the model was trained on: expect errors")
     elif beyond := outside_ranges(model, info):
-        told.append(f"outside of what the model has learned: {', '.join(beyond)}; expect errors")
+        told.append(f"outside the training ranges: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info and (rule := unlike_features(model, info)):
         told.append(f"{rule}: expect worse edges")
     return told
@@ -107,14 +108,12 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
     if rays in counts and (source or not learned):
         return ""
     at_random = "" if source or not learned else " at random"
-    return (
-        f"its features are of --feature-spp {rays}{at_random}, those that the model learned from of {wanted}"
-    )
+    return f"its features are of --feature-spp {rays}{at_random}, those of the training of {wanted}"
 
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
-    from ...kernels.run.scene_source import SCENE_FILE
+    from ...models.data.scene_source import SCENE_FILE
     from ...refimpl.light.scenes import CANONICAL, canonical
     from ...refimpl.light.variation import RANGES, outside, ranges_from_json
 
@@ -130,7 +129,7 @@ def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
     """Return a canonical scene by name, or that of a scene file, as a view has it."""
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
 
     parameters = options.parse_parameters(assignments)
     if time is not None:

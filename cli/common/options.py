@@ -34,7 +34,7 @@ LARGEST_EXPOSURE_STOPS = 64.0
 def _finite(value: float | None) -> float | None:
     """Refuse a time that is not a number."""
     if value is not None and not math.isfinite(value):
-        raise InputError("--time", value, "it must be finite", "give seconds, for example --time 2.5")
+        raise InputError("--time", value, "must be finite", "give seconds, for example --time 2.5")
     return value
 
 
@@ -61,7 +61,7 @@ def _context(command: typer.Context, value: ContextName | None) -> ContextName |
 def _stops(value: float) -> float:
     """Refuse an exposure that is not a number or that leaves no picture."""
     if not abs(value) <= LARGEST_EXPOSURE_STOPS:
-        rule = f"it must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
+        rule = f"must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
         raise InputError("--exposure", value, rule, "for example --exposure 1")
     return value
 
@@ -141,7 +141,8 @@ Executor = Annotated[
     typer.Option(
         "--executor",
         envvar=EXECUTOR_VARIABLE,
-        help="What runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet executors[/] lists.",
+        help="Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
+        "executors[/] lists.",
     ),
 ]
 Renderer = Annotated[
@@ -149,7 +150,7 @@ Renderer = Annotated[
     typer.Option(
         "--executor",
         envvar=EXECUTOR_VARIABLE,
-        help="What traces the paths: [bold]auto[/] is the fastest of those available.",
+        help="Backend that traces the paths: [bold]auto[/] is the fastest available.",
     ),
 ]
 OpenGLContext = Annotated[
@@ -157,21 +158,19 @@ OpenGLContext = Annotated[
     typer.Option(
         "--context",
         callback=_context,
-        help="How OpenGL gets a context: [bold]egl[/], without a display; [bold]osmesa[/], in main memory.",
-        show_default="the first of them that is here; WAMNET_OPENGL_CONTEXT names another",
+        help="OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main memory.",
+        show_default="the first one available, or WAMNET_OPENGL_CONTEXT",
     ),
 ]
 Exposure = Annotated[
     float,
-    typer.Option(
-        "--exposure", callback=_stops, help="Stops by which pictures are brightened; +1 doubles the light."
-    ),
+    typer.Option("--exposure", callback=_stops, help="Exposure in stops; +1 doubles the brightness."),
 ]
 ModelFile = Annotated[
     Path,
     typer.Argument(
         metavar="MODEL",
-        help=f"Trained model (.safetensors), or the name of one that ships with wamnet ({MODELS}).",
+        help=f"Trained model (.safetensors), or bundled model ({MODELS}).",
         show_default=False,
     ),
 ]
@@ -179,9 +178,8 @@ Profile = Annotated[
     str,
     typer.Option(
         "--profile",
-        help="What the arithmetic promises: [bold]ieee[/] brings its own sine and a bound on the error, "
-        "[bold]ieee-sine7[/] one of degree 7 (3 to 13), [bold]exact[/] gives the same bits everywhere, "
-        "[bold]native[/] uses the target's sine.",
+        help="Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
+        "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
     ),
 ]
 Trainer = Annotated[
@@ -189,14 +187,15 @@ Trainer = Annotated[
     typer.Option(
         "--executor",
         envvar=EXECUTOR_VARIABLE,
-        help="What trains: the reference, or its step compiled; [bold]auto[/] is the fastest available.",
+        help="Backend that trains: numpy is the reference, opencl a compiled training step; "
+        "[bold]auto[/] is the fastest available.",
     ),
 ]
 ActivationName = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="What hidden layers do with their sums: sine or relu.",
+        help="Hidden-layer activation: sine or relu.",
         show_default="the preset's: sine",
     ),
 ]
@@ -205,8 +204,8 @@ CutRank = Annotated[
     typer.Option(
         "--rank",
         metavar="R",
-        help="Short for --variant rankR: cut the first layer to this rank, and run it along rows, then "
-        "columns. Trained on with it, a model loses little.",
+        help="Short for --variant rankR: cut the first layer to rank R and run it as two passes, "
+        "rows then columns. Loses little quality after fine-tuning.",
         show_default="no cut",
     ),
 ]
@@ -215,8 +214,9 @@ Variant = Annotated[
     typer.Option(
         "--variant",
         metavar="NAME",
-        help="Fewer operations: [bold]full[/], or some of without-FEATURE, windowN, hiddenN, rankN, sineN "
-        "with + between them, as in window8+rank16; or integers: whole8, the same bits on every device.",
+        help="Cheaper network: [bold]full[/], or any of without-FEATURE, windowN, hiddenN, rankN "
+        "and sineN joined by +, as in window8+rank16; or whole8, an 8-bit integer network, "
+        "bit-identical on every device.",
         show_default="full",
     ),
 ]
@@ -225,8 +225,8 @@ MaxError = Annotated[
     typer.Option(
         "--max-error",
         metavar="E",
-        help="Choose the fastest variant whose measured error is at most E: the largest difference of "
-        "display-encoded colour (0 to 1) from the full network in float64, on the frames.",
+        help="Choose the fastest variant whose measured error is at most E: the largest difference "
+        "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
         show_default="no limit",
     ),
 ]
@@ -235,7 +235,7 @@ MaxMs = Annotated[
     typer.Option(
         "--max-ms",
         metavar="T",
-        help="Choose the most accurate variant that takes at most T milliseconds here.",
+        help="Choose the most accurate variant that takes at most T milliseconds on this machine.",
         show_default="no limit",
     ),
 ]
@@ -244,7 +244,8 @@ MaxLoss = Annotated[
     typer.Option(
         "--max-loss-db",
         metavar="D",
-        help="Choose the fastest variant that loses at most D dB of the full network's PSNR on the frames.",
+        help="Choose the fastest variant whose PSNR over the frames is at most D dB below the full "
+        "network's.",
         show_default="no limit",
     ),
 ]
@@ -253,8 +254,8 @@ CurveFile = Annotated[
     typer.Option(
         "--curve",
         metavar="FILE",
-        help="Choose among the points of this file (.json).",
-        show_default="measured, and kept in the cache folder",
+        help="Choose from the measured points in this file (.json).",
+        show_default="measured and cached",
     ),
 ]
 CurveFrames = Annotated[
@@ -262,28 +263,30 @@ CurveFrames = Annotated[
     typer.Option(
         "--frames",
         metavar="FOLDER",
-        help="Data set whose test frames errors are measured on.",
+        help="Data set; errors are measured on its test frames.",
         show_default=False,
     ),
 ]
 CurveSize = Annotated[
     int | None,
-    typer.Option("--size", metavar="N", help="Times are those of N x N pixels.", show_default="1024"),
+    typer.Option("--size", metavar="N", help="Frame size for the times: N x N pixels.", show_default="1024"),
 ]
 Here = Annotated[
     bool,
-    typer.Option("--here", help="Take the schedule that suits this machine: as tuned, or built in."),
+    typer.Option(
+        "--here", help="Use the best schedule for this machine: the tuned one, or else the built-in choice."
+    ),
 ]
 Schedule = Annotated[
     str | None,
     typer.Option(
         "--schedule",
         metavar="NAME",
-        help="Order of the kernel's work: [bold]plain[/] is made to be read, others to be fast.",
+        help="Kernel schedule: [bold]plain[/] is human-readable, the others are faster.",
         show_default=False,
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Any other number gives other random numbers.")]
+Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
 Time = Annotated[
     float | None,
     typer.Option("--time", callback=_finite, help="Time in the animation, in seconds.", show_default="0"),
@@ -293,14 +296,15 @@ Parameters = Annotated[
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="Parameter of a canonical scene: a number or three with commas; repeat for more.",
+        help="Parameter of a canonical scene: one number, or three separated by commas. Repeatable.",
         show_default=False,
     ),
 ]
 SamplerName = Annotated[
     Sampler,
     typer.Option(
-        "--sampler", help="Random numbers: independent, or evenly spread (less noise at many samples)."
+        "--sampler",
+        help="Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many samples.",
     ),
 ]
 FeatureSpp = Annotated[
@@ -308,34 +312,40 @@ FeatureSpp = Annotated[
     typer.Option(
         "--feature-spp",
         metavar="N",
-        help="Camera rays per pixel, spread evenly, whose first hits the features are means over: 4 show "
-        "edges without jags, and cost a fraction of a path each.",
-        show_default="the colour's",
+        help="Stratified camera rays per pixel for the features; 4 give smooth edges, and each "
+        "costs a fraction of a path.",
+        show_default="same as --spp",
     ),
 ]
 Seen = Annotated[
     bool,
     typer.Option(
-        "--seen", help="Also layers of what is seen past mirrors and glass: seen_albedo, seen_normal, ..."
+        "--seen",
+        help="Also write specular features, traced through mirrors and glass: seen_albedo, seen_normal, ...",
     ),
 ]
 Yaw = Annotated[
     float,
-    typer.Option("--yaw", metavar="DEG", help="Turn the camera around what it looks at, in degrees."),
+    typer.Option("--yaw", metavar="DEG", help="Orbit the camera around its target, in degrees."),
 ]
 Pitch = Annotated[
-    float, typer.Option("--pitch", metavar="DEG", help="Move the camera up (or down), in degrees.")
+    float,
+    typer.Option(
+        "--pitch", metavar="DEG", help="Raise the camera around its target, in degrees (negative: lower it)."
+    ),
 ]
 Distance = Annotated[
-    float, typer.Option("--distance", metavar="X", help="Factor of the camera's distance; 2 is farther away.")
+    float,
+    typer.Option("--distance", metavar="X", help="Scale the camera distance; 2 moves it twice as far away."),
 ]
 Lights = Annotated[
     list[str] | None,
     typer.Option(
         "--light",
         metavar="N=R,G,B",
-        help="Hue and saturation of lamp N, from 1, in linear RGB; it keeps its brightness. Repeat for more.",
-        show_default="the lamps' own",
+        help="Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. "
+        "Repeatable.",
+        show_default="as in the scene",
     ),
 ]
 SceneName = Annotated[
@@ -358,10 +368,10 @@ def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...
         except ValueError:
             numbers = ()
         if not sign or len(numbers) not in (1, 3):
-            rule = "it must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
+            rule = "must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"
             raise InputError("--set", text, rule, "for example --set albedo=0.8")
         if not all(map(math.isfinite, numbers)):
-            raise InputError("--set", text, "all numbers must be finite", "for example --set albedo=0.8")
+            raise InputError("--set", text, "must have finite numbers", "for example --set albedo=0.8")
         parameters[name.strip()] = numbers if len(numbers) > 1 else numbers[0]
     return parameters
 
@@ -371,7 +381,7 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
-        raise InputError(option, text, "it must be LOW:HIGH", f"for example {option}=-24:24") from None
+        raise InputError(option, text, "must be LOW:HIGH", f"for example {option}=-24:24") from None
     return low, high
 
 
@@ -401,10 +411,10 @@ def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, .
     for text in texts:
         number, color = _parse_light(text)
         if number not in colors:
-            rule = f"the scene's lamps are 1 to {len(own)}" if own else "the scene has no lamps"
+            rule = f"the scene's lights are 1 to {len(own)}" if own else "the scene has no lights"
             raise InputError("--light", text, rule, "choose another" if own else "leave it out")
         if number in chosen:
-            raise InputError("--light", text, f"lamp {number} has a colour already", "give one for each lamp")
+            raise InputError("--light", text, f"light {number} already has a colour", "give one per light")
         chosen.add(number)
         hue, saturation, _ = colorsys.rgb_to_hsv(*color)
         colors[number] = lamp_color(own[number - 1], hue, saturation)
@@ -418,7 +428,7 @@ def _parse_light(text: str) -> tuple[int, Vector]:
         red, green, blue = (float(part) for part in value.split(","))
         found = int(number)
     except ValueError:
-        rule = "it must be N=R,G,B: a lamp's number and three numbers"
+        rule = "must be N=R,G,B: a light's number and its colour"
         raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2") from None
     color = (red, green, blue)
     if not (all(map(math.isfinite, color)) and min(color) >= 0.0 and max(color) > 0.0):
@@ -439,4 +449,4 @@ def refuse_given(context: typer.Context, names: Sequence[str], where: str) -> No
         if source is not None and source.name not in ("DEFAULT", "ENVIRONMENT"):
             option = f"--{name.replace('_', '-')}"
             shown = {"parameters": "--set", "image": "IMAGE", "scene": "SCENE"}.get(name, option)
-            raise InputError("argument", shown, f"it has no meaning {where}", "leave it out")
+            raise InputError("argument", shown, f"has no meaning {where}", "leave it out")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ...compiler.core.writing import signals_wait
+from ...models.writing import signals_wait
 from ...refimpl.errors import InputError
 
 
@@ -15,7 +15,5 @@ def need(module: str, purpose: str, package: str = "'wamnet[full]'") -> Any:
         with signals_wait():
             return importlib.import_module(module)
     except ImportError:
-        rule = f"it is needed {purpose}"
-        raise InputError(
-            f"Python package {module!r}", "missing", rule, f"install it: pip install {package}"
-        ) from None
+        rule = f"missing, and needed {purpose}"
+        raise InputError("Python package", module, rule, f"install it: pip install {package}") from None

@@ -47,7 +47,7 @@ def frames_of(names: Sequence[Path]) -> list[Path]:
         root = Path(name.anchor)
         matching = _numbered(name) if NUMBER.search(text) else sorted(root.glob(str(name.relative_to(root))))
         if not matching:
-            raise InputError("input frames", text, "no file matches this pattern", "check the name")
+            raise InputError("input frames", text, "not found", "check the pattern")
         frames.extend(matching)
     return list(dict.fromkeys(frames))
 
@@ -96,7 +96,7 @@ def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> li
             raise InputError("output file", str(result), rule, "rename a frame, or choose another with -o")
     for frame in frames:
         if frame.resolve() in first:
-            rule = "it is one of the input frames"
+            rule = "is one of the input frames"
             raise InputError("output file", str(frame), rule, "choose another folder or pattern with -o")
     return outputs
 

@@ -6,7 +6,7 @@
 2. A lock is made or opened as itself: a link of its name, anything but a regular file, and a file with
    content are somebody else's, refused, and stay.
 3. While a lock is taken or given back SIGINT and SIGTERM wait, so that none ends a run in between
-   [`signals_wait`, compiler/core/writing.py].
+   [`signals_wait`, models/writing.py].
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from ...compiler.core.writing import making_parents, signals_wait
+from ...models.writing import making_parents, signals_wait
 from ...refimpl.errors import InputError
 from .outputs import unwritable
 
@@ -115,7 +115,7 @@ def _open(path: Path) -> int:
         if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
             raise _strange(path) from None
         raise InputError(
-            "lock file", str(path), f"cannot be written ({error.strerror})", "choose another output with -o"
+            "lock file", str(path), f"cannot be written: {error.strerror}", "choose another output with -o"
         ) from None
     found = os.fstat(handle)
     if not stat.S_ISREG(found.st_mode) or found.st_size:

@@ -29,14 +29,14 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from ...compiler.core.writing import TEMPORARY_NAME, is_regular, remove_temporaries
+from ...models.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
 from ...refimpl.reading import BROKEN, parse_json, read_file
 from .alone import working_in
 from .outputs import check_real_folder, write_text
 
 if TYPE_CHECKING:
-    from ...kernels.run.render_frame import Rows
+    from ...models.data.frame_plan import Rows
     from ...refimpl.frame import Frame
 
 SCHEMA = "wamnet-dataset-2"
@@ -146,7 +146,7 @@ def sum_of(path: Path, stated: int | None = None) -> Sum:
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(handle)
         if not stat.S_ISREG(found.st_mode):
-            raise InputError("file", str(path), "it is not a regular file", "remove it")
+            raise InputError("file", str(path), "is not a regular file", "remove it")
         if stated not in (None, found.st_size):
             return Sum(found.st_size, "")
         # It may grow while it is read.
@@ -196,7 +196,7 @@ def manifest_of(
 
     `nearest` says of each split of test frames how far the nearest training frame is.
     """
-    from ...kernels.run.frame_plan import version
+    from ...models.data.frame_plan import version
 
     facts = [frame.describe() for frame in frames]
     for frame in facts:
@@ -218,14 +218,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Return a data set's manifest; refuse a folder that is not a data set, and a damaged manifest."""
     path = folder / MANIFEST
     if not path.is_file():
-        raise InputError("data set", str(folder), f"it has no {MANIFEST}", "make one: wamnet dataset")
+        raise InputError("data set", str(folder), f"has no {MANIFEST}", "make one: wamnet dataset")
     try:
         manifest = parse_json(read_file(path), "manifest", "restore it")
         schema = manifest["schema"]
     except BROKEN:
         raise _damaged(path) from None
     if schema != SCHEMA:
-        raise InputError(f"{path}: schema", str(schema), f"it must be {SCHEMA}", "use that version of wamnet")
+        raise InputError(f"{path}: schema", str(schema), f"must be {SCHEMA}", "use that version of wamnet")
     try:
         good = isinstance(manifest["request"], dict) and isinstance(manifest["wamnet"], str)
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
@@ -241,7 +241,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def _damaged(path: Path) -> InputError:
     """Return the refusal of a manifest that cannot be read."""
-    rule = "it is not a manifest of a data set, or damaged"
+    rule = "is not a manifest of a data set, or damaged"
     return InputError("manifest", str(path), rule, "restore it, or make the data set in another folder")
 
 
@@ -301,7 +301,7 @@ def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
     """Refuse a data set that has wrong pictures; name the first."""
     if wrong:
         name, what = next(iter(wrong.items()))
-        rule = f"{len(wrong)} of its pictures are not as {MANIFEST} says, first {name}: {what}"
+        rule = f"{len(wrong)} of its images do not match {MANIFEST}, first {name}: {what}"
         way_out = "make them: run the command wamnet dataset that began it"
         raise InputError("data set", str(folder), rule, way_out)
 
@@ -344,9 +344,9 @@ class Store(Generic[BandT]):
         When the block ends well and nothing is missing, the data set is finished.
         """
         if folder.exists() and not folder.is_dir():
-            raise InputError("output folder", str(folder), "it is a file", "choose another with -o")
+            raise InputError("output folder", str(folder), "is a file", "choose another with -o")
         if folder.is_dir() and not (folder / MANIFEST).exists() and _visible(folder):
-            rule = "it holds something else"
+            rule = "holds something else"
             raise InputError("output folder", str(folder), rule, "choose a new or empty one with -o")
         check_work_folders(folder)
         before = _known_before(folder, request, frames) if (folder / MANIFEST).exists() else {}
@@ -364,7 +364,7 @@ class Store(Generic[BandT]):
         for name in self.pictures:
             path = self.folder / name
             if path.is_dir() and not path.is_symlink():
-                raise InputError("picture", str(path), "it is a folder", "move it, or use another -o")
+                raise InputError("picture", str(path), "is a folder", "move it, or use another -o")
         remove_temporaries(self.folder)
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)
@@ -401,6 +401,13 @@ class Store(Generic[BandT]):
             if task.rows not in self._bands[name]
         ]
 
+    def summary(self, made: int) -> list[str]:
+        """Return a line per picture with other bytes than an earlier run's, and the number of pictures."""
+        reason = "has other bytes than before; another NumPy or processor made it"
+        count = f"{len(self.pictures)} pictures of {len(self.frames)} frames"
+        changed = [f"{self.folder / name}: {reason}" for name in self.changed]
+        return [*changed, f"{self.folder}: {count}, {made} of them made now"]
+
     def put(self, task: Band, band: Frame) -> None:
         """Keep a rendered band; when it is its picture's last one, finish the picture."""
         self._publish(task.picture, task.rows, band)
@@ -419,7 +426,7 @@ class Store(Generic[BandT]):
 
     def _join_if_whole(self, picture: Pictured[Band]) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
-        from ...kernels.run.frame_plan import join
+        from ...models.data.frame_plan import join
         from . import exr
 
         bands, whole = self._bands[picture.name], (0, picture.height)
@@ -475,7 +482,7 @@ def _known_before(folder: Path, request: Asked, frames: Sequence[Planned[Band]])
     if not different and manifest_of(request, frames, sums)["frames"] != there["frames"]:
         different = ["the frames themselves (now others)"]
     if different:
-        rule = f"it holds another data set: {', '.join(different)}"
+        rule = f"holds another data set: {', '.join(different)}"
         raise InputError("output folder", str(folder), rule, "choose another with -o, or the same request")
     return sums
 
@@ -506,7 +513,7 @@ def check_work_folders(folder: Path) -> None:
         there.append(folder / MANIFEST)
     for path in sorted(there):
         if path.name == MANIFEST or not _is_own(path):
-            what = "it is not one of the files that wamnet makes there"
+            what = "is not one of the files that wamnet writes there"
             raise InputError(
                 "file of a data set", str(path), what, "move it elsewhere, or choose another folder with -o"
             )

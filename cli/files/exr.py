@@ -223,7 +223,7 @@ def _check_planes(path: Path, file: File, selection: Selection) -> None:
     chosen = [plane for planes in selection.layers.values() for plane in planes]
     sampled = [p.name for p in chosen if file.parts[p.part].channels[p.name] != (1, 1)]
     if sampled:
-        rule = "they are subsampled: they have fewer pixels than the image"
+        rule = "are subsampled: they have fewer pixels than the image"
         raise InputError(f"{path}: channels", ", ".join(sampled), rule, "export them in full resolution")
     windows = {_corners(file.parts[plane.part].window) for plane in chosen}
     if len(windows) > 1:
@@ -251,7 +251,7 @@ def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[s
     space = part.text(OIIO_SPACE)
     if space and space.lower() not in OIIO_REC_709 and not set(primaries.STATED) & part.attributes.keys():
         yield f"{OIIO_SPACE} is {space}, and is not used: colours are taken for linear Rec. 709"
-    with refusing(f"{path}: attributes", "damaged", "they must be of OpenEXR's types", "export it again"):
+    with refusing(f"{path}: attributes", "damaged", "must be of OpenEXR's types", "export it again"):
         display = part.numbers("displayWindow", "<i4", part.window)
         (aspect,) = part.numbers("pixelAspectRatio", "<f4", (SQUARE,))
         (white,) = part.numbers("whiteLuminance", "<f4", (0.0,))
@@ -293,7 +293,7 @@ def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], di
     if missing:
         reason = " ".join(log[0].replace(name, str(path)).split())
         of = f" of part {missing[0]!r}" if parts else ""
-        rule = f"its pixels{of} cannot be read ({reason})"
+        rule = f"has pixels{of} that cannot be read: {reason}"
         raise InputError("input file", str(path), rule, "it may be cut short or damaged: export it again")
     return [
         (part.name(), dict(part.header), {name: c.pixels for name, c in part.channels.items()})
@@ -306,7 +306,7 @@ def _stack(path: Path, name: str, planes: Sequence[Plane], pixels: Sequence[Mapp
     channels = [pixels[plane.part][plane.name] for plane in planes]
     kinds = sorted({str(channel.dtype) for channel in channels})
     if not set(kinds) <= {"float16", "float32"}:
-        rule = "they must be half or float"
+        rule = "must be half or float"
         raise InputError(
             f"{path}: pixels of {name}", ", ".join(kinds), rule, "export them as 16 or 32 bit floats"
         )

@@ -150,13 +150,13 @@ def _read(path: Path) -> File:
         size = path.stat().st_size
         content = mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
         if content[:4] != MAGIC:
-            rule = "it is not an OpenEXR image"
+            rule = "is not an OpenEXR image"
             raise InputError("input file", str(path), rule, "render or export it as .exr")
         if size <= PREFIX:
             raise ValueError("it ends before the first attribute")
         version = int.from_bytes(content[4:PREFIX], "little")
         if version & 0xFF != VERSION:
-            rule = f"it is OpenEXR version {version & 0xFF}, and version {VERSION} is read"
+            rule = f"is OpenEXR version {version & 0xFF}, and version {VERSION} is read"
             raise InputError("input file", str(path), rule, "export it again")
         headers: list[list[Attribute]] = []
         end = PREFIX
@@ -184,7 +184,7 @@ def _once(path: Path, what: str, names: Sequence[str]) -> None:
     """Refuse a header with two things of one name: a reader would take either."""
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        raise InputError(f"{path}: {what}", ", ".join(twice), "they appear twice in one header", "rename one")
+        raise InputError(f"{path}: {what}", ", ".join(twice), "appear twice in one header", "rename one")
 
 
 def _attributes(content: mmap.mmap | bytes, at: int) -> tuple[list[Attribute], int]:

@@ -130,7 +130,7 @@ def read_png(path: Path, tell: Callable[[str], None] | None = None) -> Floats:
     except InputError:
         raise
     except (OSError, SyntaxError, ValueError, pillow.DecompressionBombError) as error:
-        rule = f"its pixels cannot be read ({error})"
+        rule = f"has pixels that cannot be read: {error}"
         raise InputError("input file", str(path), rule, "export it again") from None
     encoded, source = png_colors.in_srgb(path, chunks, rgba.convert("RGB"))
     remarks = list(png_colors.notes(chunks, rgba))
@@ -154,4 +154,4 @@ def read_image(path: Path, exposure_stops: float = 0.0, tell: Callable[[str], No
         return Image(encoding.to_display(linear, exposure_stops), linear)
     if path.is_dir():
         check_input(path)
-    raise InputError("input file", str(path), "its name must end in .exr or .png", "convert it")
+    raise InputError("input file", str(path), "must end in .exr or .png", "convert it")

@@ -34,7 +34,7 @@ def check(path: Path, fps: float) -> None:
     elif fps > MOST_FPS_OF_GIF:
         raise InputError("--fps", fps, f"a GIF has {MOST_FPS_OF_GIF:g} at most", "use fewer, or .mp4")
     elif 0.0 < fps < 1.0 / LONGEST_S_OF_GIF:
-        rule = f"a GIF shows each picture for {LONGEST_S_OF_GIF} s at most"
+        rule = f"a GIF shows each frame for {LONGEST_S_OF_GIF} s at most"
         raise InputError("--fps", fps, rule, "use more, or .mp4")
 
 
@@ -47,7 +47,7 @@ def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
                 rgb = picture.convert("RGB")
         except OSError as error:
             reason = error.strerror or str(error)
-            raise InputError("picture", str(path), f"cannot be read ({reason})", "make it again") from None
+            raise InputError("picture", str(path), f"cannot be read: {reason}", "make it again") from None
         yield rgb
 
 
@@ -59,7 +59,7 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
         first.save(path, format="GIF", save_all=True, append_images=others, duration=1000.0 / fps, loop=0)
     except OverflowError:
         # Pillow joins equal pictures to one that is shown for longer.
-        rule = f"a GIF shows no picture for more than {LONGEST_S_OF_GIF} s, nor equal ones together"
+        rule = f"a GIF shows a frame, or equal frames in a row, for {LONGEST_S_OF_GIF} s at most"
         raise InputError("film", str(path), rule, "make it shorter, or .mp4") from None
 
 

@@ -3,7 +3,7 @@
 1. Before long work starts, the output's name is checked: the folder exists and can be written, the name is
    neither a folder nor one of the inputs [`check_output`].
 2. The content goes into a new file of another name in the same folder; only when it is complete does it take
-   the output's name, in one step of the file system [`replacing`, compiler/core/writing.py]. Whatever ends
+   the output's name, in one step of the file system [`replacing`, models/writing.py]. Whatever ends
    the writer before that (an error, Ctrl-C) removes the new file and leaves the old one.
 3. A folder that a command works in is a real one, or is not there yet [`check_real_folder`].
 4. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
@@ -18,16 +18,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...compiler.core import writing
+from ...models import writing
 from ...refimpl.errors import InputError, escaped
 
 
 def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path] = ()) -> None:
     """Refuse an output path that could not be written, or whose writing would destroy an input."""
     if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError(
-            "output file", str(path), f"its name must end in {' or '.join(suffixes)}", "rename it"
-        )
+        raise InputError("output file", str(path), f"must end in {' or '.join(suffixes)}", "rename it")
     try:
         path.lstat()
     except FileNotFoundError:
@@ -35,33 +33,29 @@ def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path
     except (OSError, ValueError) as error:
         raise unwritable(path, error) from None
     if path.is_dir():
-        raise InputError("output file", str(path), "it is a folder", "give the name of a file")
+        raise InputError("output file", str(path), "is a folder", "give the name of a file")
     if path.exists() and not path.is_file():
-        raise InputError(
-            "output file", str(path), "it is a device or the like", "give the name of a plain file"
-        )
+        raise InputError("output file", str(path), "is a device or the like", "give the name of a plain file")
     check_parent(path)
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
-            raise InputError(
-                "output file", str(path), "it is an input of this command", "choose another name"
-            )
+            raise InputError("output file", str(path), "is an input of this command", "choose another name")
 
 
 def check_parent(path: Path) -> None:
     """Refuse a path whose folder does not exist or cannot be written."""
     folder = path.parent
     if not folder.is_dir():
-        raise InputError("output folder", str(folder), "it does not exist", f"create it: mkdir -p '{folder}'")
+        raise InputError("output folder", str(folder), "not found", f"create it: mkdir -p '{folder}'")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError("output folder", str(folder), "it cannot be written", "choose another with -o")
+        raise InputError("output folder", str(folder), "cannot be written", "choose another with -o")
 
 
 def unwritable(path: Path, error: BaseException, what: str = "output file") -> InputError:
     """Return the error for an output that cannot be written, under its own name and not a temporary one."""
     reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
     return InputError(
-        what, str(path), f"cannot be written ({reason})", "free space, or choose another with -o"
+        what, str(path), f"cannot be written: {reason}", "free space, or choose another with -o"
     )
 
 
@@ -110,7 +104,7 @@ def check_real_folder(folder: Path) -> bool:
         return False
     if not stat.S_ISDIR(found):
         kind = "a symbolic link" if stat.S_ISLNK(found) else "no folder"
-        rule = f"it is {kind}, and a folder of this command's own must be there, or nothing"
+        rule = f"is {kind}, and a folder of this command's own must be there, or nothing"
         raise InputError("folder", str(folder), rule, "move it elsewhere, or choose another output with -o")
     return True
 
@@ -118,9 +112,9 @@ def check_real_folder(folder: Path) -> bool:
 def check_new_folder(folder: Path) -> None:
     """Refuse a folder that holds something, or could not be made."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise InputError("output folder", str(folder), "it is a file", "choose another name with -o")
+        raise InputError("output folder", str(folder), "is a file", "choose another name with -o")
     if folder.is_dir() and any(folder.iterdir()):
-        raise InputError("output folder", str(folder), "it is not empty", "choose another with -o")
+        raise InputError("output folder", str(folder), "is not empty", "choose another with -o")
     check_parent(folder)
 
 

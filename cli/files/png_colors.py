@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl import encoding
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Floats
 from ...refimpl.reading import refusing
 from ..common.packages import need
@@ -50,12 +50,12 @@ GAMMA_SRGB, SAME_GAMMA = 0.45455, 1e-3
 def read_chunks(path: Path, content: bytes) -> dict[bytes, bytes]:
     """Return the data of the first chunk of each kind."""
     if not content.startswith(SIGNATURE):
-        raise InputError("input file", str(path), "it is not a PNG", "export it as .png")
+        raise InputError("input file", str(path), "is not a PNG", "export it as .png")
     at, chunks = len(SIGNATURE), dict[bytes, bytes]()
     while at < len(content) and b"IEND" not in chunks:
         length, kind = int.from_bytes(content[at : at + 4], "big"), content[at + 4 : at + 8]
         if kind in chunks and kind in ONCE:
-            raise InputError(f"{path}: chunk", kind.decode(), "it appears twice", "export it again")
+            raise InputError(f"{path}: chunk", kind.decode(), "appears twice", "export it again")
         if kind[:1].isupper() and kind not in CRITICAL:
             rule = "no reader may ignore it, and its meaning is unknown"
             raise InputError(f"{path}: chunk", kind.decode(errors="replace"), rule, "export it again")
@@ -92,14 +92,14 @@ def _by_profile(path: Path, picture: Any) -> tuple[Any, str]:
         converted = color.profileToProfile(picture, profile, color.createProfile("sRGB"))
         return np.asarray(converted), color.getProfileDescription(profile).strip()
     except (OSError, KeyError, color.PyCMSError) as error:
-        rule = f"it is not a profile of RGB colours ({error})"
-        raise InputError(f"{path}: iCCP", "invalid", rule, "convert it to sRGB") from None
+        rule = f"is not an RGB profile: {error}"
+        raise InputError(f"{path}: iCCP", NO_VALUE, rule, "convert it to sRGB") from None
 
 
 def _by_numbers(path: Path, chunks: Mapping[bytes, bytes], encoded: Floats) -> tuple[Floats, str]:
     """Return colours (H, W, 3) in sRGB, by gamma and chromaticities, and what they were converted from."""
     names, matrix, linear = [], None, encoding.srgb_decode(encoded)
-    with refusing(f"{path}: gAMA or cHRM", "invalid", "they must be a colour space", "convert it to sRGB"):
+    with refusing(f"{path}: gAMA or cHRM", NO_VALUE, "must define a colour space", "convert it to sRGB"):
         if b"gAMA" in chunks:
             gamma = int.from_bytes(chunks[b"gAMA"], "big") / UNIT
             if abs(gamma - GAMMA_SRGB) > SAME_GAMMA:

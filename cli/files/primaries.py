@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Floats
 from ...refimpl.reading import refusing
 from .exr_header import Part
@@ -89,7 +89,7 @@ def to_rec_709(what: str, part: Part) -> tuple[Floats | None, str]:
     container = "lin_ap0_scene" if "acesImageContainerFlag" in part.attributes else "lin_rec709_scene"
     default = SPACES[interop if interop in SPACES else container][1]
     with (
-        refusing(f"{what}: chromaticities", "invalid", "they must span a colour space", "export it again"),
+        refusing(f"{what}: chromaticities", NO_VALUE, "must span a colour space", "export it again"),
         np.errstate(all="ignore"),
     ):
         space = part.numbers("chromaticities", "<f4", default)

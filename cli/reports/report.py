@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,11 @@ from ..files.outputs import write_text
 from . import bench_report, machine, plots, scores
 
 if TYPE_CHECKING:
+    from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
-    from ..commands.demo import Plan, Results, Unseen
+    from ...refimpl.network.train import TrainState
+    from .runs import Run
+    from .scores import Score
 
 SCHEMA = "wamnet-demo-2"
 """Name and version of the form of `report.json`."""
@@ -30,6 +33,69 @@ FOLDER = "pictures"
 
 PICTURES = ("noisy", "denoised", "reference", "normal")
 """Pictures of a test frame that the report shows, by the ends of their files' names."""
+
+
+Limits = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All sizes of a demonstration; the defaults take two to four minutes on two cores.
+
+    The frames are those of `wamnet dataset`: the network never sees a test frame's pose. Many targets of
+    `train_spp` samples teach more than few clean ones; what is judged has references of `reference_spp`.
+    `steps` None means the preset's. A scene that moves is shown at different times, one of a file, which is
+    static and has a SHA-256, from cameras in the ranges.
+    """
+
+    scene: str = "minicubes"
+    scene_sha256: str = ""
+    size_px: int = 256
+    train_frames: int = 48
+    test_frames: int = 2
+    train_spp: int = 64
+    reference_spp: int = 1024
+    feature_spp: int = 4
+    preset: str = "best"
+    steps: int | None = None
+    seed: int = 1
+    renderer: str = "opencl"
+    trainer: str = "opencl"
+    yaw_deg: Limits = (0.0, 0.0)
+    pitch_deg: Limits = (0.0, 0.0)
+    distance: Limits = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """A test frame: time, heading, noisy frame, its reference, the denoised image (H, W, 3), the scores.
+
+    `scores` has a tuple for each picture, input and denoised.
+    """
+
+    time_s: float
+    label: str
+    noisy: Frame
+    reference: Frame
+    denoised: Any
+    scores: dict[str, tuple[Score, ...]]
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a demonstration has found.
+
+    The test frames' pictures are those of the executor `denoised_by`; `runs` were made on the first of them.
+    """
+
+    train_times_s: tuple[float, ...]
+    unseen: tuple[Unseen, ...]
+    denoised_by: str
+    model: Model
+    state: TrainState
+    seconds_per_step: float | None
+    runs: tuple[Run, ...]
+    seconds: dict[str, float]
 
 
 def write(

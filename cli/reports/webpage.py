@@ -15,7 +15,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene, trained_scene
 from ..common.packages import need
@@ -44,8 +44,8 @@ FPS = 30.0
 where their boxes are parallel to the axes."""
 
 LEAD = (
-    "One random path per pixel gives the noisy picture; a small network, compiled to a fragment shader with "
-    "a bound on its error, makes the calm one of it. All runs on your device: nothing is loaded or sent."
+    "One random path per pixel gives the noisy image; a small neural network, compiled to a fragment shader "
+    "with a proven bound on its error, removes the noise. All runs on your device: nothing is loaded or sent."
 )
 """The sentence below the title."""
 
@@ -70,7 +70,7 @@ def learned_scene(model: Model) -> str:
     names = model.info.get("trained_on_scene", "")
     name = trained_scene(model) if names else "minicubes"
     if name is None:
-        rule = "it must be one canonical scene, or one must be chosen"
+        rule = "must be one canonical scene, or one must be chosen"
         raise InputError("scene that the model was trained on", names, rule, "name one with --scene")
     return name
 
@@ -78,14 +78,14 @@ def learned_scene(model: Model) -> str:
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
     """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
     from ...kernels.run.page import Animation
-    from ...kernels.run.scene_source import scene_source
+    from ...models.data.scene_source import scene_source
 
     still = scene_source(name, options.parse_parameters(assignments)).still
     if still is not None:
         return Animation((0.0,), (still,))
     if "time" in options.parse_parameters(assignments):
-        rule = "a page shows all times of a canonical scene"
-        raise InputError("parameter time", "given", rule, "leave it out, or give a scene file")
+        rule = "does not apply: a page shows all times of a canonical scene"
+        raise InputError("parameter time", NO_VALUE, rule, "leave it out, or give a scene file")
     times = tuple((number + 0.5) / FPS for number in range(FRAMES))
     scenes = tuple(load_scene(name, time, assignments) for time in times)
     if len({repr(replace(scene, info={})) for scene in scenes}) == 1:

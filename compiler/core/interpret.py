@@ -4,10 +4,6 @@ Lanes are leading axes: an input of type float32[n] is an array (..., n), a numb
 dtype=float64, in which floats are then computed, this is the reference that error bounds speak about; with
 float32 it is one more executor. Integers and booleans are the same in both.
 
-An exact program has one order of operations [`_in_order`]: affine maps add to the bias one rounded product
-after another, in the order of the operand's numbers, or image by image where the operand is the window.
-What it reads is 0 where it is below LEAST [`_kept`], and the zeros that it writes are +0.
-
 A value is dropped after its last use [`loops.last_reads`]: a picture's are large, and programs have hundreds.
 """
 
@@ -19,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .ir import LEAST, Gather, Node, Parameters, Program
+from .ir import Gather, Node, Parameters, Program
 from .loops import Loop, Part, last_reads, loops
 from .ops import OPS
 from .sums import parts
@@ -46,10 +42,7 @@ def interpret(
             values[index] = _value(node, program, values, inputs, parameters, kind)
         for old in unread[index]:
             values[old] = None
-    found = {name: values[index] for name, index in program.outputs}
-    if program.exact:
-        return {name: np.where(value == 0, kind.type(0), value) for name, value in found.items()}
-    return found
+    return {name: values[index] for name, index in program.outputs}
 
 
 def _run(
@@ -89,8 +82,7 @@ def _value(
 ) -> Any:
     """Return the value of one node in all lanes."""
     if node.op == "input":
-        value = np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
-        return _kept(value) if program.exact else value
+        return np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
     if node.op == "constant":
         return element(node.type.dtype, kind).type(node["value"])
     if node.op == "parameter":
@@ -99,34 +91,10 @@ def _value(
         return values[node.args[0]]
     if node.op == "loop":
         return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
-    if program.exact and node.op == "affine":
-        return _in_order(program, node, values[node.args[0]], parameters)
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
     if node.op == "affine" and kind == np.float32 and program.gather and _is_input(program, node.args[0]):
         return _in_parts(node, operands[0], parameters, program.gather)
     return apply(node, operands, parameters, kind)
-
-
-def _kept(value: Array) -> Array:
-    """Return value (...), 0 where it is smaller than an exact program reads."""
-    return np.where(np.absolute(value) < LEAST, value.dtype.type(0), value)
-
-
-def _in_order(program: Program, node: Node, x: Array, parameters: Any) -> Array:
-    """Return W x + b (..., D_out) of x (..., D_in), all rounded, in the order of exact programs."""
-    weight, gather = parameters[str(node["weight"])], program.gather
-    over_window = gather is not None and _is_input(program, node.args[0])
-    blocks = parts(gather if over_window else None, weight.shape[1])
-    total = np.zeros((*np.shape(x)[:-1], len(weight)), weight.dtype)
-    if node.get("bias") is not None:
-        total = total + parameters[str(node["bias"])]
-    for block in blocks:
-        # A single part holds the bias.
-        part = total if len(blocks) == 1 else np.zeros_like(total)
-        for i in block:
-            part = part + weight[:, i] * x[..., i, None]
-        total = part if len(blocks) == 1 else total + part
-    return total
 
 
 def _is_input(program: Program, index: int) -> bool:

@@ -6,7 +6,6 @@
    part of the program; every operation works on each lane by itself.
 3. Weights and tables are beside the nodes, by name [`Program.parameters`]; floats are float32 exactly.
 4. How a kernel fills the input named `window` from images is data of the program, not nodes [`Gather`].
-   So is the promise to give the same bits everywhere [`Program.exact`].
 5. Programs are built by value numbering: asking twice for the same operation gives the same value
    [`Builder`]. They are printed in one stable text [`text`], whose hash is their identity [`digest`].
 
@@ -41,11 +40,6 @@ class Type:
 
     def __str__(self) -> str:
         return self.dtype + "".join(f"[{n}]" for n in self.shape)
-
-
-LEAST = 2.0**-40
-"""An exact program reads any smaller number of an image, and any smaller weight, as 0: then no product and no
-sum in it is a denormal number (grain.py), which targets flush to zero or not."""
 
 
 OUTPUT_ENCODING = "output_encoding"
@@ -160,17 +154,13 @@ class Gather:
 
 @dataclass(frozen=True)
 class Program:
-    """A function of one lane; `info` says where it came from and how its images are encoded.
-
-    `exact`: its outputs are the same bits on every target, those of the interpreter in float32.
-    """
+    """A function of one lane; `info` says where it came from and how its images are encoded."""
 
     nodes: tuple[Node, ...]
     outputs: tuple[tuple[str, int], ...]
     parameters: Parameters = field(default_factory=dict)
     gather: Gather | None = None
     info: tuple[tuple[str, str], ...] = ()
-    exact: bool = False
 
 
 class Builder:
@@ -222,8 +212,6 @@ class Builder:
 def text(program: Program) -> str:
     """Return the program as text: one line a node, the same bytes for the same program."""
     lines = ["program"]
-    if program.exact:
-        lines.append(f"  exact, numbers below {LEAST!r} are read as 0")
     if program.gather is not None:
         taps, border = f"{program.gather.rows}x{program.gather.columns}", program.gather.window.border
         lines.append(f"  window {taps}, border {border}")

@@ -3,10 +3,9 @@
 1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
 2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
    `native` calls the target's, whose promise is in the target's dialect [`sine_contract`].
-3. The passes that bounds see after the common ones, and those that turn the program into the one that is
-   emitted [`Profile`].
+3. The passes that turn the program which bounds see into the one that is emitted [`Profile`].
 4. Profile `ieee` has its sine in other degrees too, under names of their own: a trade of speed for error
-   [`with_degree`]. In `exact` no number is denormal, which is proven for one degree.
+   [`with_degree`].
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
 full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
@@ -21,9 +20,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from . import sine
-from .ir import LEAST
 from .ops import Rounding
 
 UNIT_ROUNDOFF = 2.0**-24
@@ -67,16 +65,12 @@ class SineContract:
 
 @dataclass(frozen=True)
 class Profile:
-    """A promise: `sine` None means the target's own, `passes` run after bounds are computed.
-
-    `common` run before that, after the passes that all profiles share.
-    """
+    """A promise: `sine` None means the target's own, `passes` run after bounds are computed."""
 
     name: str
     text: str
     sine: SineContract | None
     passes: tuple[str, ...]
-    common: tuple[str, ...] = ()
 
 
 def emitted_sine(degree: int = sine.DEGREE) -> SineContract:
@@ -112,13 +106,6 @@ EXPAND_SINE = "expand_sine"
 DEGREE_WORD = "-sine"
 """What joins a profile's name and the degree of its sine, where that is not the one in use."""
 
-EXACT_SINE = SineContract(
-    f"{EMITTED_SINE.text}, 0 where the reduced argument is below {LEAST:g}",
-    sine.POLYNOMIALS[sine.DEGREE].error + LEAST,
-    sine.DOMAIN,
-)
-"""The sine of compiler/core/sine.py in which no number is denormal."""
-
 PROFILES: Mapping[str, Profile] = {
     profile.name: profile
     for profile in (
@@ -129,13 +116,6 @@ PROFILES: Mapping[str, Profile] = {
             (EXPAND_SINE, "fold", "eliminate_dead"),
         ),
         Profile(
-            "exact",
-            "the same bits on every target: one order of summation, every operation rounded, emitted sine",
-            EXACT_SINE,
-            (EXPAND_SINE, "fold", "eliminate_dead"),
-            ("pin",),
-        ),
-        Profile(
             "native", "any order of summation, fused multiply-add allowed, the target's own sine", None, ()
         ),
     )
@@ -143,37 +123,29 @@ PROFILES: Mapping[str, Profile] = {
 """All profiles, by name."""
 
 
-def unpinned(name: str, what: str) -> Profile:
-    """Return the profile of programs that no pass pins, or refuse `exact`."""
-    found = profile_named(name)
-    if found.common:
-        raise CompileError(
-            f"{what} divide and take roots, which targets round differently: profile {name} holds denoisers; "
-            "use profile ieee"
-        )
-    return found
+REMOVED = "exact"
+"""A profile of earlier releases: naming it is an error that names its replacement, for one release."""
 
 
 def profile_named(name: str) -> Profile:
     """Return the profile, or say which ones there are; `ieee-sine7` is `ieee` with a sine of degree 7."""
     if name in PROFILES:
         return PROFILES[name]
+    if name == REMOVED:
+        raise CompileError(
+            f"profile {name} was removed; use an integer network, variant whole8 (--variant whole8), which "
+            "gives the same bits on every device and compiler"
+        )
     base, _, degree = name.partition(DEGREE_WORD)
-    if base in PROFILES and _has_degrees(PROFILES[base]) and degree in map(str, sine.POLYNOMIALS):
+    if base in PROFILES and PROFILES[base].sine and degree in map(str, sine.POLYNOMIALS):
         return with_degree(PROFILES[base], int(degree))
     others = [
         f"{profile.name}{DEGREE_WORD}{degree}"
         for profile in PROFILES.values()
         for degree in sine.POLYNOMIALS
-        if _has_degrees(profile) and degree != sine.DEGREE
+        if profile.sine and degree != sine.DEGREE
     ]
-    known = ", ".join([*PROFILES, *others])
-    raise CompileError(f"profile {name!r} does not exist; there are: {known}")
-
-
-def _has_degrees(profile: Profile) -> bool:
-    """Return whether a profile has its sine in other degrees."""
-    return profile.sine is not None and not profile.common
+    raise CompileError(f"profile {name!r}: unknown ({choice(name, [*PROFILES, *others])})")
 
 
 def with_degree(profile: Profile, degree: int) -> Profile:

@@ -24,12 +24,6 @@ For |x| <= DOMAIN, u = 2**-24:
 The sum is below `error`; the script adds it up over small intervals of r, and tests/compiler/test_sine.py
 compares. Results below 2**-126 may be flushed to zero, which adds at most that.
 
-The sine of profile `exact` [`exact_sine`] replaces r by 0 where |r| < 2**-40, which moves the result by less
-than that, so that no number in it is denormal (below 2**-126): |z| >= 2**-80, |z q| >= 2**-83, since every
-step of Horner's rule stays between its coefficient and half of that, |r (z q)| >= 2**-123, and the result is
-at least 2**-41, or 0. The reduction is of multiples of 2**-126 if x is one, and x / pi is not smaller if
-|x| >= 2**-124.
-
 The cosine, for |x| <= COSINE_DOMAIN: k = floor(x / pi + 1), h = k - 1/2, x = h pi + r and cos(x) = (-1)**k
 sin(r). The steps are the same with h for k: h has 12 bits for |k| < 2**11, and |x / pi - h| < 1/2 + 6.1e-4
 since the sum is smaller. One thing differs: h is never 0, so where |x| < 1 the first difference is rounded
@@ -43,8 +37,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from .ir import LEAST
 
 DOMAIN = 12800.0
 """Largest |x| for which the proof holds, in radians: k needs 12 bits; beyond it the sine is 0."""
@@ -140,18 +132,6 @@ def sine(x: Any, degree: int = DEGREE) -> Any:
     # Reduce to r in [-R_MAX, R_MAX], x = k pi + r.
     k = np.floor(x * INVERSE_PI + 0.5)
     return _within(DOMAIN, x, _signed(k, reduce(x, k), degree))
-
-
-def exact_sine(x: Any) -> Any:
-    """Return sin(x) as `sine` does, 0 where the reduced argument is below LEAST; may be traced.
-
-    Only for x in [-DOMAIN, DOMAIN]: exact programs are refused where an argument may be outside.
-    """
-    k = np.floor(x * INVERSE_PI + 0.5)
-    r = reduce(x, k)
-    # 1 where |r| is large enough, else 0: operations that all targets have, on vectors too.
-    kept = np.minimum(np.floor(np.absolute(r) * (1.0 / LEAST)), 1.0)
-    return _signed(k, r * kept, DEGREE)
 
 
 def cosine(x: Any, degree: int = DEGREE) -> Any:

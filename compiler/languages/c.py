@@ -14,8 +14,10 @@ import re
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
+from ..kernel.kernel import Kernel
 from .dialect import Dialect, Parts
-from .interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
+from .instructions import C_TILE
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 PRAGMAS = """\
@@ -76,6 +78,137 @@ RESTORED = """\
 #endif"""
 """What ends [`IGNORED`]."""
 
+FUSED = """\
+/* A product may be fused with a sum: the bound holds either way. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=fast")
+#else
+#pragma STDC FP_CONTRACT ON
+#endif"""
+"""The lines that allow fusing."""
+
+STRAIGHT = """\
+#if defined(__clang__)
+#define WAMNET_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+/* GCC makes no vector instructions of floorf() while it has to raise the standard's exceptions, on which no
+   number depends. Nor may it carry inputs over from one step to the next, in the registers of the sums. */
+#pragma GCC optimize("no-trapping-math", "no-associative-math", "no-predictive-commoning")
+#define WAMNET_UNROLL _Pragma("GCC unroll 16")
+#define WAMNET_ROLLED _Pragma("GCC unroll 1")
+#endif
+#if !defined(WAMNET_UNROLL)
+#define WAMNET_UNROLL
+#endif
+#if !defined(WAMNET_ROLLED)
+#define WAMNET_ROLLED
+#endif"""
+"""What makes straight code of loops over pixels, so that sums are registers, and vectors of other loops.
+
+GCC would make straight code of the loops over lanes too, instead of vectors."""
+
+OPERATORS = """\
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    *to = (wamnet_vector){0};
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    *to = *(const wamnet_vector *)from;
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    *(wamnet_vector *)to = *from;
+}
+
+static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
+{
+    *sum += *term;
+}
+
+static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
+{
+    *sum += *weight * value;
+}
+"""
+"""What is done with vectors of GCC's type."""
+
+LOOPS = """\
+typedef struct {
+    float lane[LANES];
+} wamnet_vector;
+
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = 0.0f;
+    }
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = from[i];
+    }
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to[i] = from->lane[i];
+    }
+}
+
+static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += term->lane[i];
+    }
+}
+
+static inline void wamnet_add_product(
+    wamnet_vector *restrict sum,
+    const wamnet_vector *restrict weight,
+    float value)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += weight->lane[i] * value;
+    }
+}
+"""
+"""The type of vectors of other compilers, and what is done with it."""
+
+
+def gnu_vectors(lanes: str) -> str:
+    """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
+    kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
+    return f"typedef float wamnet_vector {kind};\n\n{OPERATORS}"
+
+
+VECTORS = f"""\
+/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
+#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
+    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+{gnu_vectors("LANES")}#else
+{LOOPS}#endif
+"""
+"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
+
+
+REFUSED = """\
+#if !defined(__GNUC__)
+#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
+#endif"""
+"""What other compilers say: C99 has no vector type with operators."""
+
 STACK = "stack: {stack} bytes at most, without optimisation too"
 """What a denoiser's text says of the thread that calls it."""
 
@@ -125,9 +258,9 @@ class C(Arguments):
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
     writes = "float *restrict {name}"
-    pixel = "image_{image}[(row * width + column) * {channels} + c]"
+    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
-    store = "result[(y * width + x) * {channels} + {i}] = {value};"
+    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
     painted = "image_{image}[((size_t)y * (size_t)part->width + x) * {channels} + {channel}]"
     said = {
         DENOISE: (
@@ -149,7 +282,22 @@ class C(Arguments):
     }
     max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
-    magnitude = "fabsf({0})"
+    calls_vectors = True
+    casts = True
+    byte = "uint8_t"
+    own = "wamnet_"
+    transforms = True
+    tiles = (16, 8, 4)
+    dot_of_bytes = "wamnet_dot(&{total}, &{weights}, {place});"
+    weight_vector = "*(const wamnet_vector *)(weights + ({index}) * LANES)"
+    wide = False
+    launches = (
+        "wamnet_pixel one pixel: call that from your own loops",
+        "wamnet_pixel {columns} x {rows} pixels from (x, y) on:\n"
+        "call that from your own loops, for each x that is a multiple of {columns} and each y of {rows}",
+        "",
+    )
+    unroll = "WAMNET_UNROLL"
     clamp = "wamnet_clamp"
     unordered = (
         "",
@@ -214,6 +362,90 @@ class C(Arguments):
         if kernel.role == ENCODE:
             return super().head(kernel)
         return self._of_paths(kernel) if kernel.role == PATH else self._of_denoiser(kernel)
+
+    def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
+        """Return the lines of a kernel that is data, up to its first statement."""
+        names = ("float", "math", "stdbool", "stdint")
+        head = [*includes(DENOISE, *names), self.unordered[parts.bounded]]
+        sizes, functions = parts.top.split("\nstatic void", 1) if kernel.functions else (parts.top, "")
+        functions = f"static void{functions}" if functions else ""
+        if kernel.weights.dtype == "int32":
+            top = [*includes(DENOISE, *names, "string"), FUSED, sizes, STRAIGHT, C_TILE]
+        elif kernel.weights.lanes == 1:
+            top = [*head, UNFUSED, parts.top]
+        elif kernel.functions:
+            vectors = gnu_vectors(str(kernel.weights.lanes))
+            top = [*head, REFUSED, FUSED, STRAIGHT, vectors, sizes, functions]
+        else:
+            top = [*head, FUSED, sizes, STRAIGHT, VECTORS]
+        said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
+        if kernel.step[0].value != 1:
+            said = (
+                "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are "
+                "written\n   to `result`, the whole image's array."
+            )
+        unused = "    (void)weights;" if interface.named("weights") else ""
+        return [*top, *self.functions(interface, said, kernel), unused]
+
+    def functions(self, interface: Interface, said: str, kernel: Kernel) -> list[str]:
+        """Return the function of all pixels, and the head of that of a work item's."""
+        along, down = (self.step(each).removeprefix(" * ") for each in kernel.step)
+        steps = (f"x += {along}" if along else "++x", f"y += {down}" if down else "++y")
+        listed, name = super().listed(interface), self.entries[DENOISE]
+        one = self.signature(name, [*listed, *(f"int {place}" for place in kernel.place)])
+        given = ", ".join([*(array.name for array in interface.arrays), *interface.integers, "x", "y"])
+        return [
+            f"/* {said} */",
+            *one[:-1],
+            f"{one[-1]};",
+            "",
+            ALL_PIXELS,
+            *self.signature("wamnet_image", listed),
+            "{",
+            *loops(("x", "y"), ("width", "height"), steps, f"{name}({given});"),
+            "}",
+            "",
+            "static inline int wamnet_clamp(int value, int low, int high)",
+            "{",
+            "    return value < low ? low : value > high ? high : value;",
+            "}",
+            "",
+            *one,
+            "{",
+        ]
+
+    def fitted(self, kernel: Kernel) -> Dialect:
+        """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have."""
+        found = super().fitted(kernel)
+        found.calls_vectors = not kernel.functions
+        return found
+
+    def transform_head(self, name: str, kind: str) -> str:
+        """Return the first lines of a transform."""
+        return f"static {super().transform_head(name, kind)}"
+
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"({kind} *)({name} + {index} * LANES)"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of one value in all lanes."""
+        return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of the vector type."""
+        return {"float32": "wamnet_vector", "int32": "wamnet_sums"}[dtype]
+
+    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
+        """Return the declaration of an array of vectors whose components are read by their own index."""
+        return f"float {name}[{count} * LANES];"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of such an array, or the address of a vector."""
+        if number:
+            return f"{name}[{index}]"
+        address = f"{name} + ({index}) * LANES"
+        return address if self.calls_vectors else f"*(wamnet_vector *)({address})"
 
     def _of_paths(self, kernel: Interface) -> list[str]:
         """Return the functions of a path kernel up to the statements of a pixel."""

@@ -6,10 +6,14 @@ as IEEE 754 says unless an option relaxes them: do not pass -use_fast_math, -ftz
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..core.profiles import CUDA_SINE
+from ..kernel.interface import DENOISE, ENCODE, PATH, Interface
+from ..kernel.kernel import Type
 from .c import C
 from .dialect import Dialect, Parts
-from .interface import DENOISE, ENCODE, PATH, Interface
+from .instructions import CUDA_GROUP
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 CLAMP = """\
@@ -22,6 +26,33 @@ static __device__ inline int wamnet_clamp(int value, int low, int high)
 #endif
 """
 """Limits an index; the language has no such function."""
+
+CUDA_VECTOR = """\
+#ifndef WAMNET_VECTOR
+#define WAMNET_VECTOR
+struct __align__(16) wamnet_vector { float x, y, z, w; };
+static __device__ inline wamnet_vector wamnet_made(float x, float y, float z, float w)
+{
+    wamnet_vector made = {x, y, z, w};
+    return made;
+}
+static __device__ inline wamnet_vector operator*(wamnet_vector a, float b)
+{
+    return wamnet_made(a.x * b, a.y * b, a.z * b, a.w * b);
+}
+static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
+{
+    a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
+}
+#endif
+"""
+"""Vectors of four, with the two operations that sums need: CUDA's own have none."""
+
+GROUPED = (
+    "Start ceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group} items;\n"
+    "those beyond the picture write nothing. Weights at an address that is a multiple of {bytes}"
+)
+"""How all kernels with groups are started."""
 
 ASSUMES = (
     "the compiler is not told to relax arithmetic: no -use_fast_math, no -ftz=true, no -prec-div=false, no "
@@ -46,9 +77,24 @@ class CUDA(Arguments):
     writes = "float *__restrict__ {name}"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     types = scalars = {**Dialect.types, "uint32": "unsigned int"}
-    magnitude = C.magnitude
     clamp = "wamnet_clamp"
     max_output_channels = 2**16
+    group = (16, 8)
+    grouped = {"heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'}
+    launches = (
+        LAUNCH.format(rows="height"),
+        "Launch blocks of any size that together cover (ceil(width / {columns}), ceil(height / {rows})) "
+        "threads",
+        GROUPED,
+    )
+    aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
+    shared_array = "__shared__ {kind} {name}[{count}];"
+    local_place = ("threadIdx.x", "threadIdx.y")
+    group_place = ("blockIdx.x", "blockIdx.y")
+    wait = "__syncthreads();"
+    wide = False
+    casts = True
+    words = "__dp4a, which needs -arch=sm_61 or later"
     table = "static __device__ const {type} {name}[{count}] = {{{values}}};"
     operations = {
         **C.operations,
@@ -74,7 +120,34 @@ class CUDA(Arguments):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
-        return [*super().top(kernel, parts), *([CLAMP] if kernel.role == DENOISE else [])]
+        if kernel.role != DENOISE:
+            return super().top(kernel, parts)
+        vectors = parts.kernel is not None and parts.kernel.weights.lanes > 1
+        words = parts.kernel is not None and parts.kernel.weights.dtype == "int32"
+        top = [CLAMP, *([CUDA_VECTOR] if vectors else []), *([CUDA_GROUP] if words else [])]
+        return ["".join(top) + "\n".join(super().top(kernel, parts))]
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type, which has the operators that sums need: CUDA's own have none."""
+        return "wamnet_vector" if dtype == "float32" else f"int{lanes}"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of values, or of one in all lanes."""
+        made = "wamnet_made" if kind == "wamnet_vector" else f"make_{kind}"
+        return f"{made}({', '.join(values if len(values) > 1 else [*values] * 4)})"
+
+    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
+        """Return the first lines of a function of values."""
+        return f"static __device__ inline {super().function_head(name, takes, result)}"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of an array of vectors, or a vector."""
+        return f"((float *){name})[{index}]" if number else f"{name}[{index}]"
+
+    def weights_as_vectors(self, kind: Type) -> list[str]:
+        """Return the declaration of the weights as vectors."""
+        vector = self.vector_kind(kind.dtype, kind.lanes)
+        return [f"    const {vector} *w = (const {vector} *)weights;"] if kind.lanes > 1 else []
 
     def offset(self, name: str, value: str) -> str:
         """Return the declaration of a place in memory."""

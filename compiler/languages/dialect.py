@@ -16,15 +16,20 @@ A dialect is all that the emitters know of a language, for every role of a kerne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import LEAST, Node
+from ..core.ir import Node
 from ..core.profiles import SineContract
-from .interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
+
+if TYPE_CHECKING:
+    from ..kernel.kernel import Kernel, Type
+
+from ..kernel.interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
@@ -41,14 +46,15 @@ class Parts:
     top: str = ""
     bounded: bool = False
     max_depth: int = 0
+    kernel: Kernel | None = None
 
 
 class Dialect:
     """One language; a subclass sets every attribute that has no value here.
 
-    `exact`: lines that an exact kernel needs at its top. `unordered`: lines for a compiler that may reorder
-    operations, without a bound and with one. `assumes`: what a bound rests on that the language does not
-    promise. `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
+    `unordered`: lines for a compiler that may reorder operations, without a bound and with one.
+    `assumes`: what a bound rests on that the language does not promise.
+    `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
     for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
@@ -81,10 +87,9 @@ class Dialect:
     stepped: str = "for (int {i} = 0; {i} < {count};) {{"
     define: str = "#define {name} {value}"
     choice: str = "{0} ? {1} : {2}"
-    exact: tuple[str, ...] = ()
-    magnitude: str = "fabs({0})"
     clamp: str = "clamp"
     types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    byte: str = "uchar"
     scalars: Mapping[str, str] = types
     qualifiers: Mapping[str, str] = {}
     table: str
@@ -104,6 +109,32 @@ class Dialect:
     load: str = "float {name} = sums[{plane} * plane + at];"
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     painted: str = ""
+    unroll: str = ""
+    casts: bool = False
+    dot_of_bytes: str = ""
+    instructions: str = ""
+    own: str = ""
+    transforms: bool = False
+    tiles: tuple[int, ...] = (4,)
+    words: str = ""
+    widens: bool = True
+    wide: bool = True
+    calls_vectors: bool = False
+    vector_operations: Mapping[str, str] = {}
+    weight_vector: str = "w[{index}]"
+    wait: str = ""
+    texel: str = ""
+    pixel_begin: tuple[str, ...] = ()
+    pixel_end: tuple[str, ...] = ()
+    shared_array: str = ""
+    group: tuple[int, int] | None = None
+    largest_shared: int = 2**15
+    grouped: Mapping[str, Any] = {}
+    vectors: Type | None = None
+    launches: tuple[str, str, str] = ("", "", "")
+    aligned: tuple[str, str] = ("", "")
+    local_place: tuple[str, str] = ("", "")
+    group_place: tuple[str, str] = ("", "")
     operations: Mapping[str, str] = {
         "add": "{0} + {1}",
         "subtract": "{0} - {1}",
@@ -138,10 +169,24 @@ class Dialect:
         """Return the text of a kernel up to its first statement."""
         raise NotImplementedError
 
-    @property
-    def arguments(self) -> str:
-        """Return how a denoiser is called."""
-        return self.said[DENOISE]
+    def called(self, kernel: Kernel) -> str:
+        """Return how a denoiser is called: what its arguments are, and how many items are started."""
+        said, (one, row, group) = self.said[DENOISE], self.launches
+        if kernel.weights.lanes > 1:
+            said = said.replace(*self.aligned)
+        if not one:
+            one = row = group = said
+        if kernel.group:
+            across, down = kernel.group
+            return said.replace(one, group).replace("{group}", f"{across} x {down}")
+        return said if kernel.step[0].value == 1 else said.replace(one, row)
+
+    def placed(self, home: str, weight: str, where: str) -> Dialect:
+        """Return the dialect of a target whose weights are elsewhere."""
+        found = copy(self)
+        said = {DENOISE: f"{self.said[DENOISE]}.\nWeights {where}, whatever stands above"}
+        vars(found).update(target=f"{self.target}:{home}", home=home, weight=weight, said=said)
+        return found
 
     def cast(self, dtype: str, text: str) -> str:
         """Return the text of a number converted to another kind."""
@@ -224,6 +269,82 @@ class Dialect:
         """Return the declaration of one number, also in a language whose values are vectors."""
         return f"float {name} = {value};"
 
+    # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
+
+    def fitted(self, kernel: Kernel) -> Dialect:
+        """Return the dialect for a kernel: with other words where it has work groups."""
+        found = copy(self)
+        vars(found).update(self.grouped if kernel.group else {}, vectors=kernel.weights)
+        if kernel.weights.dtype == "int32":
+            found.first = (*self.first, *self.extensions)
+        return found
+
+    extensions: tuple[str, ...] = ()
+
+    def group_memory(self, kernel: Kernel) -> list[str]:
+        """Return the declarations of memory that a group shares."""
+        found = []
+        for array in kernel.shared:
+            (size,) = array.sizes
+            count = size if isinstance(size, int) else size.value
+            kind = self.scalars[array.type.dtype]
+            found.append(self.shared_array.format(kind=kind, name=array.name, count=count))
+        return found
+
+    def item_place(self) -> list[str]:
+        """Return the declarations of where an item is in its group, and of its first pixel."""
+        inside = [self.cast("int32", text) for text in self.local_place]
+        column, row = (self.cast("int32", text) for text in self.group_place)
+        places = {
+            "local_x": inside[0],
+            "local_y": inside[1],
+            "item": "local_y * GROUP_WIDTH + local_x",
+            "x": f"{column} * (GROUP_WIDTH * PIXELS) + local_x",
+            "y": f"{row} * GROUP_HEIGHT + local_y",
+        }
+        return [f"    {self.index(name, text)}" for name, text in places.items()]
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type."""
+        return f"{self.scalars[dtype]}{lanes}"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of values, or of one in all lanes."""
+        return f"{kind}({', '.join(values)})"
+
+    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
+        """Return the first lines of a function of values."""
+        return f"{result} {name}({', '.join(f'{kind} {each}' for each, kind in takes)})\n{{"
+
+    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
+        """Return the declaration of an array of vectors whose components are read by their own index."""
+        return f"{kind} {name}[{count}];"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of such an array, or a vector."""
+        return f"{name}[({index}) / 4][({index}) % 4]" if number else f"{name}[{index}]"
+
+    def transform_head(self, name: str, kind: str) -> str:
+        """Return the first lines of a transform: `from` in steps of `step`, `to` in those of `leap`."""
+        return f"void {self.own}{name}(const {kind} *from, int step, {kind} *to, int leap)\n{{"
+
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"{name} + {index}"
+
+    def let_value(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value that never changes."""
+        return f"{kind} {name} = {value};"
+
+    def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
+        """Return the declaration of an array, or of a variable."""
+        return f"{kind} {name}{''.join(f'[{size}]' for size in sizes)}{f' = {value}' if value else ''};"
+
+    def for_loop(self, name: str, start: str, end: str, step: str) -> str:
+        """Return the line that opens a loop."""
+        turn = f"++{name}" if step == "1" else f"{name} += {step}"
+        return f"for (int {name} = {start}; {name} < {end}; {turn}) {{"
+
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""
         return f"int {name} = {value};"
@@ -253,10 +374,6 @@ class Dialect:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
         return template.format(*operands, type=self.types[node.type.dtype], table=node.get("table"))
-
-    def kept(self, value: str) -> str:
-        """Return the text of a number as an exact program reads it."""
-        return self.select(f"{self.magnitude.format(value)} < {self.literal(LEAST)}", "0.0f", value)
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""

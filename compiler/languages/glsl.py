@@ -9,8 +9,7 @@ planes a buffer, or one buffer for each image of an encoding.
 from __future__ import annotations
 
 from ..core.profiles import SineContract
-from .dialect import Dialect, Parts
-from .interface import (
+from ..kernel.interface import (
     BLOCK,
     DENOISE,
     ENCODE,
@@ -22,6 +21,12 @@ from .interface import (
     WRITE,
     Interface,
 )
+from ..kernel.kernel import Kernel, values, walk
+from ..kernel.kernel import parts as inside
+from .dialect import Dialect, Parts
+
+SHADER_VERSION = 430
+"""The version of GLSL, and of OpenGL, that has compute shaders."""
 
 WEIGHT_TEXTURE_WIDTH = 1024
 """Texels in a row of the weight texture: every implementation takes 1024 rows of 1024, a million weights."""
@@ -61,18 +66,22 @@ def fetch(kind: str, index: str, place: str, part: str) -> list[str]:
     ]
 
 
-def said_of_denoiser(texture: str = "") -> str:
-    """Return how a denoiser is called; `texture`: the format of the weights' texture, if there is one."""
-    width = WEIGHT_TEXTURE_WIDTH
-    weights = (
-        f"weight_texture: {texture}, {width} texels wide, as many rows as weights fill (the last\n"
+def said_of_weights(texture: str) -> str:
+    """Return what the texture of the weights is, of this format."""
+    return (
+        f"weight_texture: {texture}, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill "
+        "(the last\n"
         "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
     )
+
+
+def said_of_denoiser(texture: str) -> str:
+    """Return how a denoiser is called; `texture`: the format of the weights' texture."""
     return (
         "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
         "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
         "bottom, or the window stands on its head;\n"
-        f"{weights if texture else ''}"
+        f"{said_of_weights(texture)}"
         "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
         "the target, the values are encoded already. Draw one triangle that covers it"
     )
@@ -91,9 +100,23 @@ class GLSL(Dialect):
         ENCODE: ("sample_count",),
     }
     preamble = PREAMBLE
-    pixel = "texelFetch(image_{image}, ivec2(column, row), 0)[c]"
+    pixel = "texelFetch(image_{image}, ivec2({column}, {row}), 0)[{c}]"
     weight = "weights({index})"
     store = "{result}[{i}] = {value};"
+    texel = "texelFetch(image_{image}, ivec2({column}, {row}), 0).{part}"
+    weight_vector = "weights({index})"
+    vector_operations = {
+        **{
+            name: f"{text}({{0}}, {{1}})"
+            for name, text in (
+                ("less", "lessThan"),
+                ("less_equal", "lessThanEqual"),
+                ("greater", "greaterThan"),
+                ("greater_equal", "greaterThanEqual"),
+            )
+        },
+        "select": "mix({2}, {1}, {0})",
+    }
     said = {
         DENOISE: said_of_denoiser("R32F"),
         PATH: (
@@ -112,7 +135,7 @@ class GLSL(Dialect):
         ),
     }
     max_output_channels = 4 * MOST_RESULTS
-    channels_per_result = 4
+    channels_per_result: int | None = 4
     planes_per_buffer = 4
     max_planes = 4 * MOST_RESULTS
     max_images = MOST_RESULTS  # of GLSL ES too: most devices draw into more buffers than it promises
@@ -122,7 +145,6 @@ class GLSL(Dialect):
     sum_store = "sums_{buffer}[{component}] = {value};"
     load = "PRECISE float {name} = texelFetch(sums_{buffer}, at, 0)[{component}];"
     image_store = "image_{image}[{channel}] = {value};"
-    magnitude = "abs({0})"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"
@@ -138,6 +160,20 @@ class GLSL(Dialect):
         "convert": "{type}({0})",
     }
 
+    def called(self, kernel: Kernel) -> str:
+        """Return how a denoiser is called: the texture of its weights, if any, has one or four per texel."""
+        said = super().called(kernel)
+        reads = WEIGHTS in {
+            e.value for s in walk(kernel.body) for v in values(s) for e in inside(v) if e.op == "load"
+        }
+        if not reads:
+            return said.replace(said_of_weights("R32F"), "")
+        return said.replace("R32F", "RGBA32F") if kernel.weights.lanes > 1 else said
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type."""
+        return f"{ {'float32': '', 'int32': 'i', 'uint32': 'u', 'bool': 'b'}[dtype] }vec{lanes}"
+
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
         of_role = {DENOISE: self.denoise_begin, PATH: self.path_begin, ENCODE: self.encode_begin}[kernel.role]
@@ -148,14 +184,18 @@ class GLSL(Dialect):
     def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return what follows the first lines of a denoiser."""
         array = kernel.named(WEIGHTS)
-        weights, function = WEIGHT_TEXTURE, [*fetch("float", "index", "texel", ".r"), ""]
+        weights, function = [WEIGHT_TEXTURE], [*fetch("float", "index", "texel", ".r"), ""]
+        if self.vectors and self.vectors.lanes > 1:
+            function = [*fetch("vec4", "texel", "place", ""), ""]
         if array is not None and array.home == BLOCK:
-            weights, function = f"layout(std140) uniform Weights {{ vec4 weights[{array.quads}]; }};", []
+            weights, function = [f"layout(std140) uniform Weights {{ vec4 weights[{array.quads}]; }};"], []
+        if array is None or array.shape == (0,):
+            weights, function = [], []
         first = kernel.images[0].name
         return [
             parts.top,
             *self.images(kernel),
-            weights,
+            *weights,
             *self.declared_results(kernel),
             "",
             *function,
@@ -226,3 +266,55 @@ class GLSL(Dialect):
     def place(self, kernel: Interface) -> tuple[str, str]:
         """Return the texts of a fragment's column and row."""
         return ("gl_FragCoord.x", "int(gl_FragCoord.y)")
+
+
+class GLSLCompute(GLSL):
+    """GLSL 4.30 compute shaders on textures: the result is an image, the weights a buffer of `vec4`."""
+
+    language = f"GLSL {SHADER_VERSION / 100:.2f}, compute shader"
+    suffix = ".comp"
+    group = (16, 8)
+
+    wait = "barrier();"
+    max_output_channels = 4
+    local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
+    group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
+    pixel_begin = ("vec4 color = vec4(0.0, 0.0, 0.0, 1.0);",)
+    pixel_end = ("imageStore(result, ivec2({column}, {row}), color);",)
+    weight_vector = "w[{index}]"
+    shared_array = "shared {kind} {name}[{count}];"
+    channels_per_result = None
+    store = "color[{i}] = {value};"
+    said = {
+        DENOISE: (
+            "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
+            "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
+            "bottom, or the window stands on its head;\n"
+            "weight_buffer: a storage buffer at binding 0, all weights;\n"
+            "result: an image of format RGBA32F at binding 0, width x height, row 0 again the top row. "
+            "Dispatch\nceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of "
+            "{group} items"
+        )
+    }
+
+    def begin(self, kernel: Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        first = kernel.images[0].name
+        return "\n".join(
+            [
+                f"#version {SHADER_VERSION} core",
+                "#define PRECISE precise",
+                parts.top,
+                "layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;",
+                *self.images(kernel),
+                "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
+                "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
+                *(self.group_memory(parts.kernel) if parts.kernel else []),
+                "",
+                "void main()",
+                "{",
+                f"    int width = textureSize({first}, 0).x;",
+                f"    int height = textureSize({first}, 0).y;",
+                *self.item_place(),
+            ]
+        )

@@ -10,11 +10,18 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from ..core.profiles import SineContract
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, SCENE_NUMBERS, WEIGHTS, WRITE, Array, Interface
+from ..kernel.kernel import Kernel
 from .c import C
+from .cuda import GROUPED
 from .dialect import Parts
 from .glsl import GLSL
-from .interface import BLOCK, DENOISE, ENCODE, PATH, SCENE_NUMBERS, WRITE, Array, Interface
+from .instructions import PORTABLE, VULKAN_EXTENSION, VULKAN_GROUP
 from .openings import Buffers
+
+LEAST_SHARED = 2**14
+"""Bytes that a group may share on every device: WebGPU's maxComputeWorkgroupStorageSize, and Vulkan's
+maxComputeSharedMemorySize."""
 
 GROUP = (8, 8)
 """Invocations (x, y) in a work group: 64, which every implementation of Vulkan and of OpenGL 4.3 takes."""
@@ -57,6 +64,15 @@ NUMBERS_SAID = f"1 {SCENE_NUMBERS}: {{count}} floats"
 class Declared(Buffers):
     """Languages whose buffers are declared with numbers, above a function without arguments."""
 
+    group = (8, 8)
+    largest_shared = LEAST_SHARED
+    launches = (
+        GROUPS.format(rows="height"),
+        f"Groups of {GROUP[0]} x {GROUP[1]} items: "
+        f"ceil(width / ({{columns}} * {GROUP[0]})) x ceil(height / ({{rows}} * {GROUP[1]}))",
+        GROUPED,
+    )
+
     entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
     max_output_channels = 2**16
     pixel, weight, store = C.pixel, C.weight, C.store
@@ -69,13 +85,21 @@ class Declared(Buffers):
 
     def element(self, array: Array) -> tuple[str, str]:
         """Return an array's name in the kernel, and the type of its elements."""
+        if array.name == WEIGHTS and self.vectors and self.vectors.lanes > 1:
+            return "w", self.vector_kind(self.vectors.dtype, self.vectors.lanes)
         return array.name, self.types["float32"]
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         tables = [parts.top] if kernel.role == PATH else []
         above = {PATH: [self.depth(parts)], DENOISE: [parts.top]}.get(kernel.role, [])
-        return [*above, *self.declared(kernel), *tables, ""]
+        shared = self.group_memory(parts.kernel) if parts.kernel else []
+        words = parts.kernel is not None and parts.kernel.weights.dtype == "int32"
+        return [*above, *self.declared(kernel), *tables, *shared, "", *([self.instructions] if words else [])]
+
+    def in_function(self, kernel: Kernel) -> list[str]:
+        """Return nothing: a group's memory is declared above."""
+        return []
 
 
 class Vulkan(Declared):
@@ -89,10 +113,21 @@ class Vulkan(Declared):
         "sin() of Vulkan, which promises 2^-11 on [-pi, pi] alone, and that absolutely", None
     )
     qualifiers = GLSL.qualifiers
-    magnitude = GLSL.magnitude
     table = GLSL.table
     operations = GLSL.operations
     group_size: tuple[int | str, int | str] = GROUP
+    grouped = {"group_size": ("GROUP_WIDTH", "GROUP_HEIGHT")}
+    shared_array = "shared {kind} {name}[{count}];"
+    local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
+    group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
+    wait = "barrier();"
+    wide = False
+    words = (
+        f"GL_EXT_integer_dot_product where the compiler knows it and {PORTABLE} is not defined, else shifts"
+    )
+    extensions = VULKAN_EXTENSION
+    instructions = VULKAN_GROUP
+    vector_kind = GLSL.vector_kind
     item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
     word = "precise "
     load = f"{word}float {{name}} = sums[{{plane}} * plane + at];"
@@ -124,6 +159,8 @@ class Vulkan(Declared):
 
 class Compute(Vulkan):
     """The same for OpenGL 4.3."""
+
+    words = ""
 
     target = "glsl-compute"
     language = "GLSL 4.30, compute shader"

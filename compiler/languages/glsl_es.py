@@ -7,12 +7,8 @@ keeps the order of operations [`ASSUMES`].
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from ..core.profiles import SineContract
-from .glsl import GLSL, WEIGHT_TEXTURE, fetch, said_of_denoiser
-from .glsl_inlined import GLSLInlined
-from .interface import DENOISE
+from .glsl import GLSL
 
 VERSION = "#version 300 es"
 """The first line of a shader: the language allows nothing before it."""
@@ -40,13 +36,8 @@ TEXTURES = "float textures to draw into need EXT_color_buffer_float in OpenGL ES
 """What callers of all these shaders must know."""
 
 
-def _with_textures(said: Mapping[str, str]) -> dict[str, str]:
-    """Return how kernels are called, and what else callers must know."""
-    return {role: f"{text}.\n{TEXTURES}" for role, text in said.items()}
-
-
-class _ES(GLSL):
-    """What the shaders have in common."""
+class GLSLES(GLSL):
+    """The dialect's table."""
 
     target = "glsl-es"
     language = "GLSL ES 3.00, fragment shader"
@@ -58,25 +49,4 @@ class _ES(GLSL):
     indexes_results = False
     max_output_channels = 4 * MOST_BUFFERS
     max_planes = 4 * MOST_BUFFERS
-
-
-class GLSLES(_ES):
-    """The dialect's table."""
-
-    said = _with_textures(GLSL.said)
-
-
-class GLSLESInlined(_ES, GLSLInlined):
-    """The dialect's table for weights in the source."""
-
-    said = _with_textures(GLSLInlined.said)
-
-
-class GLSLESPacked(_ES, GLSLInlined):
-    """The dialect's table for weights in a texture of four floats a texel."""
-
-    said = _with_textures({DENOISE: said_of_denoiser("RGBA32F")})
-
-    def weights(self) -> list[str]:
-        """Return the declaration of the weights, and of what reads them."""
-        return [WEIGHT_TEXTURE, "", *fetch("vec4", "texel", "place", ""), ""]
+    said = {role: f"{text}.\n{TEXTURES}" for role, text in GLSL.said.items()}

@@ -1,7 +1,7 @@
 """Fragment shaders inside a host that owns the rest: Shadertoy's tabs and Godot's canvas items.
 
 1. A denoiser reads feature images, and writes the host's colour. Shadertoy can hold weights only
-   in constants [emit_inlined.py]; Godot has a texture.
+   in constants [schedules/inlined.py]; Godot has a texture.
 2. A noisy picture's features come from passes of their own, one feature each, since a pass of either host has
    one colour: a path kernel whose sums stay in variables, then the feature's encoding [host_pass.py].
 
@@ -12,10 +12,10 @@ the tab that is shown turns the picture.
 from __future__ import annotations
 
 from ..core.profiles import SineContract
+from ..kernel.interface import DENOISE, WEIGHTS, Interface
 from .dialect import Parts
 from .glsl import GLSL
-from .glsl_es import ASSUMES, GLSLESInlined
-from .interface import DENOISE, WEIGHTS, Interface
+from .glsl_es import ASSUMES, GLSLES
 
 CHANNELS = 4
 """Inputs of a Shadertoy tab, iChannel0 to iChannel3, and buffers that feed them: A to D."""
@@ -51,7 +51,7 @@ CHANNEL_OF = (
 """The function that picks a channel: the language has no index into a vector."""
 
 
-class ShadertoyDenoise(GLSLESInlined):
+class ShadertoyDenoise(GLSLES):
     """The dialect's table: the tab Image."""
 
     target = "shadertoy"
@@ -82,6 +82,8 @@ class ShadertoyDenoise(GLSLESInlined):
             "{",
             "    int x = int(fragCoord.x);",
             f"    int y = {TURNED};",
+            f"    int width = textureSize({kernel.images[0].name}, 0).x;",
+            f"    int height = textureSize({kernel.images[0].name}, 0).y;",
             NOTHING_YET,
         ]
 
@@ -101,7 +103,7 @@ class GodotDenoise(GLSL):
     max_output_channels = 4
     first = ("shader_type canvas_item;", "render_mode unshaded, blend_disabled;")
     indexes_results = False
-    pixel = "channel_of(texelFetch(image_{image}, ivec2(column, row), 0), c)"
+    pixel = "channel_of(texelFetch(image_{image}, ivec2({column}, {row}), 0), {c})"
     said = {
         DENOISE: (
             "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from ..kernel.kernel import Type
 from .c import C
+from .cuda import GROUPED
 from .dialect import Parts
 from .glsl_buffers import NUMBERS_SAID
-from .interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
 from .openings import Buffers
 
 ASSUMES = (
@@ -50,6 +52,24 @@ class Metal(Buffers):
     early = dict.fromkeys((DENOISE, PATH, ENCODE), ("width",))
     late = {DENOISE: ("height",), PATH: ("samples",)}
     max_output_channels = 2**16
+    group = (16, 8)
+    grouped = {
+        "threads": (
+            "uint2 item_place [[thread_position_in_threadgroup]]",
+            "uint2 group_place [[threadgroup_position_in_grid]]",
+        )
+    }
+    launches = (
+        "Dispatch width x height threads, or more, in groups of any size",
+        "Dispatch ceil(width / {columns}) x ceil(height / {rows}) threads, or more, in groups of any size",
+        GROUPED,
+    )
+    shared_array = "threadgroup {kind} {name}[{count}];"
+    local_place = ("item_place.x", "item_place.y")
+    group_place = ("group_place.x", "group_place.y")
+    wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
+    wide = False
+    casts = True
     said_numbers = NUMBERS_SAID
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -95,6 +115,20 @@ class Metal(Buffers):
         if kernel.role == PATH:
             return [self.depth(parts), TOP, *sizes, parts.top]
         return [TOP, *super().top(kernel, parts), *sizes]
+
+    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
+        """Return the first lines of a function of values."""
+        return f"static inline {super().function_head(name, takes, result)}"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of an array of vectors, or a vector."""
+        return f"((thread float *){name})[{index}]" if number else f"{name}[{index}]"
+
+    def weights_as_vectors(self, kind: Type) -> list[str]:
+        """Return the declaration of the weights as vectors."""
+        vector = self.vector_kind(kind.dtype, kind.lanes)
+        line = f"    device const {vector} *w = (device const {vector} *)weights;"
+        return [line] if kind.lanes > 1 else []
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

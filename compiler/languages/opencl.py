@@ -9,9 +9,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.profiles import OPENCL_SINE
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
+from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
-from .interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
+from .instructions import OPENCL_GROUP, OPENCL_TILE
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
+
+BUILTINS = """\
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif"""
+"""Operations on vectors that no operator means. PoCL's library may be compiled for another processor than the
+kernel: LLVM then inlines none of its functions, and each call saves all vector registers. clang has names for
+the instructions; other compilers get the functions."""
 
 
 class OpenCL(Arguments):
@@ -29,9 +50,9 @@ class OpenCL(Arguments):
     reads = "__global const float *restrict {name}"
     writes = "__global float *restrict {name}"
     item = ("get_global_id(0)", "get_global_id(1)")
-    pixel = "image_{image}[(row * width + column) * {channels} + c]"
+    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
-    store = "result[(y * width + x) * {channels} + {i}] = {value};"
+    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
     image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
     painted = "image_{image}[place * {channels} + {channel}]"
     said = {
@@ -51,7 +72,6 @@ class OpenCL(Arguments):
         ),
     }
     max_output_channels = 2**16
-    exact = ("#pragma OPENCL FP_CONTRACT OFF /* every operation is rounded */",)
     native_sine = OPENCL_SINE
     table = "__constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -67,6 +87,61 @@ class OpenCL(Arguments):
         "convert": "convert_{type}({0})",
     }
 
+    unroll = "#pragma unroll"
+    casts = True
+    transforms = True
+    tiles = (16, 8, 4)
+    dot_of_bytes = "{total} = DOT({total}, {weights}, ((const fours *)({place}))->bytes);"
+    words = "cl_khr_integer_dot_product where -cl-std=CL3.0 and the device have it, else shifts"
+    group = (16, 8)
+    launches = (
+        "Global size: at least (width, height)",
+        "Global size: at least (ceil(width / {columns}), ceil(height / {rows}))",
+        "Groups of {group} items; global size: (ceil(width / {columns}), height), in whole groups",
+    )
+    aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
+    grouped = {
+        "heading": "__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))\n"
+        "void {entry}"
+    }
+    shared_array = "__local {kind} {name}[{count}];"
+    local_place = ("get_local_id(0)", "get_local_id(1)")
+    group_place = ("get_group_id(0)", "get_group_id(1)")
+    wait = "barrier(CLK_LOCAL_MEM_FENCE);"
+    vector_operations = {
+        "absolute": "as_{type}(as_int{lanes}({0}) & 0x7fffffff)",
+        "minimum": "{1} < {0} ? {1} : {0}",
+        "maximum": "{1} > {0} ? {1} : {0}",
+        "floor": "FLOOR({0})",
+        "convert": "CONVERT({0}, {type})",
+    }
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type; truth is an integer with all bits set."""
+        return f"{'int' if dtype == 'bool' else self.scalars[dtype]}{lanes}"
+
+    def vector_of(self, kind: str, values: Sequence[str]) -> str:
+        """Return a vector of values, or of one in all lanes."""
+        return f"({kind})({', '.join(values)})"
+
+    def weights_as_vectors(self, kind: Type) -> list[str]:
+        """Return the declaration of the weights as vectors."""
+        vector = f"{self.scalars[kind.dtype]}{kind.lanes}"
+        line = f"    __global const {vector} *w = (__global const {vector} *)weights;"
+        return [line] if kind.lanes > 1 else []
+
+    def mixed_address(self, name: str, index: str, kind: str) -> str:
+        """Return the address of a vector of an array whose components are read by their own index."""
+        return f"{name}.all + {index}"
+
+    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
+        """Return the declaration of an array of vectors whose components are read by their own index."""
+        return f"union {{ {kind} all[{count}]; float number[{count} * {lanes}]; }} {name};"
+
+    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
+        """Return a component of such an array, or a vector."""
+        return f"{name}.{'number' if number else 'all'}[{index}]"
+
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""
         if array.home == BLOCK:
@@ -76,6 +151,14 @@ class OpenCL(Arguments):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
+        if parts.kernel is not None and parts.kernel.weights.lanes > 1:
+            words = (
+                OPENCL_GROUP
+                if parts.kernel.group
+                else OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")
+            )
+            instructions = [words] if parts.kernel.weights.dtype == "int32" else []
+            return [BUILTINS, *instructions, *super().top(kernel, parts)]
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
         return [*lanes, *super().top(kernel, parts)]
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from .interface import Interface
+from ..kernel.interface import Interface
 from .opencl import OpenCL
 
 LANES = (1, 4, 8, 16)

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..kernel.interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
+from ..kernel.kernel import Expr, Kernel, Type
 from .dialect import Dialect, Parts
-from .interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 
 IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
 """What images are."""
@@ -41,7 +42,37 @@ class Buffers(Dialect):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
-        return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
+        found = [*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)]
+        return "\n".join(found if parts.kernel is None else self.of_kernel(kernel, parts, parts.kernel))
+
+    def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
+        """Return the lines of a kernel that is data, up to its first statement."""
+        along, down = (self.step(each) for each in kernel.step)
+        names, limits = kernel.place, ("width", "height")
+        column, row = (self.cast("int32", text) for text in self.item)
+        outside = " || ".join(f"{name} >= {limit}" for name, limit in zip(names, limits, strict=True))
+        sizes = [f"    {self.index(name, f'{self.size}{name}')}" for name in limits if self.size]
+        place = [self.index(names[0], f"{column}{along}"), self.index(names[1], f"{row}{down}")]
+        end = [f"    if ({outside}) {{", "        return;", "    }"]
+        vectors = self.weights_as_vectors(kernel.weights)
+        if kernel.group is None:
+            opening = [*sizes, *(f"    {line}" for line in place), *end, *vectors]
+        else:
+            opening = [*self.in_function(kernel), *vectors, *sizes, *self.item_place()]
+        return [*self.top(interface, parts), *self.head(interface), *opening]
+
+    def in_function(self, kernel: Kernel) -> list[str]:
+        """Return the declarations of a group's memory, where they are inside the function."""
+        return [f"    {line}" for line in self.group_memory(kernel)]
+
+    @staticmethod
+    def step(step: Expr) -> str:
+        """Return the text of how far an item's first pixel is from its neighbour's."""
+        return "" if step.value == 1 else f" * {' * '.join(str(e.value) for e in (step.args or (step,)))}"
+
+    def weights_as_vectors(self, kind: Type) -> list[str]:
+        """Return the declaration of the weights as vectors, where they are some."""
+        return []
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""

@@ -13,10 +13,10 @@ A tap beyond the picture reads the nearest pixel of it.
 
 from __future__ import annotations
 
+from ..kernel.interface import FOLLOW, GUIDE, SMOOTH, WRITE, Array, Interface
 from .c import ALL_PIXELS, POPPED, PRAGMAS, C, includes, loops
 from .dialect import Parts
 from .glsl import GLSL
-from .interface import FOLLOW, GUIDE, SMOOTH, WRITE, Array, Interface
 from .opencl import OpenCL
 from .opencl_path import OpenCLPath, OpenCLVectorPath
 from .openings import IMAGES

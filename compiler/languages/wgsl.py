@@ -6,10 +6,13 @@ a compiler reorder operations and round results up or down; a bound rests on one
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..core.profiles import SineContract
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 from .dialect import Dialect, Parts
 from .glsl_buffers import GROUP, SAID, Declared
-from .interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
+from .instructions import WGSL_GROUP
 
 ASSUMES = (
     "the compiler keeps the order of the operations of an expression, fused or not, and rounds to nearest. "
@@ -29,6 +32,19 @@ class WGSL(Declared):
     assumes = ASSUMES
     group_size = f"@compute @workgroup_size({GROUP[0]}, {GROUP[1]})"
     places = "@builtin(global_invocation_id) invocation: vec3<u32>"
+    grouped = {
+        "group_size": "@compute @workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)",
+        "places": "@builtin(local_invocation_id) item_place: vec3<u32>, "
+        "@builtin(workgroup_id) group_place: vec3<u32>",
+    }
+    shared_array = "var<workgroup> {name}: array<{kind}, {count}>;"
+    local_place = ("item_place.x", "item_place.y")
+    group_place = ("group_place.x", "group_place.y")
+    wait = "workgroupBarrier();"
+    wide = False
+    words = "dot4I8Packed, of the language feature packed_4x8_integer_dot_product"
+    extensions = ("requires packed_4x8_integer_dot_product;",)
+    instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
     early = {
@@ -37,7 +53,6 @@ class WGSL(Declared):
         ENCODE: ("width", "height"),
     }
     types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
-    magnitude = "abs({0})"
     counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
     define = "const {name}: i32 = {value};"
     choice = "select({2}, {1}, {0})"
@@ -95,6 +110,29 @@ class WGSL(Declared):
     def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
         """Return the declaration of an array."""
         return f"var {name}: array<{self.types[dtype]}, {count}>;"
+
+    def vector_kind(self, dtype: str, lanes: int) -> str:
+        """Return the name of a vector type."""
+        return f"vec{lanes}<{self.scalars[dtype]}>"
+
+    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
+        """Return the first line of a function of values."""
+        return f"fn {name}({', '.join(f'{each}: {kind}' for each, kind in takes)}) -> {result} {{"
+
+    def let_value(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value that never changes."""
+        return f"let {name}: {kind} = {value};"
+
+    def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
+        """Return the declaration of an array, or of a variable."""
+        for size in reversed(sizes):
+            kind = f"array<{kind}, {size}>"
+        return f"var {name}: {kind}{f' = {value}' if value else ''};"
+
+    def for_loop(self, name: str, start: str, end: str, step: str) -> str:
+        """Return the line that opens a loop."""
+        turn = f"{name}++" if step == "1" else f"{name} += {step}"
+        return f"for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
 
     def single(self, name: str, value: str) -> str:
         """Return the declaration of one number."""

@@ -33,7 +33,7 @@ from ..core.enclosure import OVERFLOW
 from ..core.enclosure import Enclosure as Enclosure
 from ..core.intervals import RANGE_OUTWARD, Ends
 from ..core.intervals import sine_range as sine_range
-from ..core.ir import LEAST, Gather, Node, Program
+from ..core.ir import Gather, Node, Program
 from ..core.ops import LOOPS, OPS, image
 from ..core.profiles import (
     EXP2_ULPS,
@@ -372,8 +372,7 @@ def enclose(
             continue
         if node.op == "input":
             low, high = (np.asarray(end, np.float64) for end in inputs[str(node["name"])])
-            # An exact program reads small numbers as 0.
-            found.append(Enclosure(low, high, np.full_like(low, LEAST if program.exact else 0.0)))
+            found.append(Enclosure(low, high, np.zeros_like(low)))
             continue
         operands = [_spread(found[arg], program.nodes[arg], node) for arg in node.args]
         windowed = bool(node.args) and program.nodes[node.args[0]].op == "input"

@@ -34,7 +34,7 @@ U, TINY, WIDER = 2.0**-24, 2.0**-126, 1 + 2.0**-34
 
 def check(path: Path) -> dict[str, Any]:
     """Return a certificate whose every step holds, else raise `Refused`; `InputError` for other files."""
-    told = "it must be a whole certificate beside its kernel", "compile the model again"
+    told = "must be a complete certificate next to its kernel", "compile the model again"
     with refusing("certificate", str(path), *told), np.errstate(over="ignore", invalid="ignore"):
         held, manifest, text, arrays, raw = read(path)
         if held["schema"] == INTEGERS:

@@ -24,9 +24,6 @@ INVERSE_PI = float.fromhex("0x1.45f306p-2")
 PI_PARTS = tuple(map(float.fromhex, ("0x1.922p+1", "-0x1.2aep-17", "-0x1.deap-30")))
 """SIN-1: P1, P2 and P3."""
 
-LEAST = 2.0**-40
-"""Profile exact: a reduced argument below is read as 0."""
-
 TABLE = """
 3  0.00453  0x1.f88ad8p-1 -0x1.23d14cp-3
 5  6.88e-05 0x1.ffd7dap-1 -0x1.5348eap-3 0x1.ec490ap-8
@@ -59,11 +56,6 @@ PROMISES: Mapping[str, Promise] = {
     promise.text: promise
     for promise in (
         *(Promise(f"emitted, odd polynomial of degree {n}", float(error), DOMAIN) for n, error, *_ in ROWS),
-        Promise(
-            f"emitted, odd polynomial of degree 11, 0 where the reduced argument is below {LEAST:g}",
-            float(ROWS[4][1]) + LEAST,
-            DOMAIN,
-        ),
         Promise("sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)", 4 * 2 * U),
         Promise("sinf() of CUDA, 2 ulp on all arguments", 2 * 2 * U),
     )
@@ -71,12 +63,10 @@ PROMISES: Mapping[str, Promise] = {
 """What is known of sines, by name: SIN-6, and what the manuals of two languages promise."""
 
 
-def sine(x: Any, degree: int, exact: bool = False) -> Any:
+def sine(x: Any, degree: int) -> Any:
     """Return sin(x) by the operations of SIN-1, SIN-4 and SIN-7, of anything that NumPy's functions take."""
     k = np.floor(x * INVERSE_PI + 0.5)
     r = x - k * PI_PARTS[0] - k * PI_PARTS[1] - k * PI_PARTS[2]
-    if exact:
-        r = r * np.minimum(np.floor(np.absolute(r) * (1.0 / LEAST)), 1.0)
     first, *others = COEFFICIENTS[degree]
     z, q = r * r, others[-1]
     for coefficient in others[-2::-1]:
@@ -84,4 +74,4 @@ def sine(x: Any, degree: int, exact: bool = False) -> Any:
     value = r + r * (z * q) if first == 1.0 else r * (z * q + first)
     value = (1.0 - 2.0 * (k - 2.0 * np.floor(0.5 * k))) * value
     value = np.maximum(np.minimum(value, 1.0), -1.0)
-    return value if exact else np.where(np.absolute(x) <= DOMAIN, value, x - x)
+    return np.where(np.absolute(x) <= DOMAIN, value, x - x)

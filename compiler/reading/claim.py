@@ -107,9 +107,7 @@ class Claim:
     def _sine(self, held: Any) -> Any:
         """Return the sine that the certificate promises, as the spec defines it."""
         promise = (held.get("sine") or {}).get("text", "")
-        degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)(, .*)?", promise)
-        if held["profile"] == "exact":
-            return partial(sine, degree=11, exact=True)
+        degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)", promise)
         return partial(sine, degree=int(degree[1])) if degree else None
 
     # ---- inputs --------------------------------------------------------------------------------------------
@@ -169,16 +167,7 @@ class Claim:
                         if self.window[2] == "zero":
                             value = np.where(inside, number.value, nothing.value)
                             number = Number(value, np.where(inside, number.known, nothing.known))
-                        yield self._kept(number)
-
-    def _kept(self, number: Number) -> Number:
-        """Return a number as an exact program reads it: 0 where it is below what the program's text says."""
-        (least,) = re.findall(r"(?m)^  exact, numbers below (\S+) are read as 0$", self.text) or [None]
-        if least is None:
-            return number
-        size, end = expression("absolute", number), literal(float(least), "float32")
-        below = expression("less", size, end, kind="bool")
-        return choice(below, literal(0.0, "float32"), number)
+                        yield number
 
     # ---- the program ---------------------------------------------------------------------------------------
 

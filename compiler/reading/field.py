@@ -33,9 +33,6 @@ Words = NDArray[np.uint64]
 Span = tuple[Any, Any]
 """The least and the largest value of an integer, or of a vector's (width,), in any lane."""
 
-ZERO = "is zero"
-"""The kind of the truth that a number is zero, of either sign."""
-
 HALF, MASK = np.uint64(16), np.uint64(0xFFFF)
 """Half the bits of a field element, and which these are."""
 
@@ -268,12 +265,8 @@ def expression(name: str, *operands: Number, commutes: bool = False, kind: str |
 def choice(condition: Number, a: Number, b: Number) -> Number:
     """Return condition ? a : b, which is the minimum or the maximum where these two were compared.
 
-    Of NaN they differ; no number of a certified program is NaN. `a == 0 ? 0 : a` is a.
+    Of NaN they differ; no number of a certified program is NaN.
     """
-    if condition.kind == ZERO and condition.compared:
-        if a.literal == 0.0 and equal(b.known, condition.compared[0].known):
-            return b
-        raise Unread("a comparison with zero that is not of its sign")
     if condition.compared:
         less, more = (part.known for part in condition.compared)
         for one, other, name in ((less, more, "minimum"), (more, less, "maximum")):

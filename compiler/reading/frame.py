@@ -132,7 +132,7 @@ HEAD = re.compile(r"(?!typedef|struct|layout)[^{}]*\)( -> [\w<> ]+)? {$")
 def allowed(target: str) -> list[tuple[re.Pattern[str], bool]]:
     """Return patterns of the items of a target's list, and whether there may be several of each."""
     images = IMAGES.get(target, "IMAGE")
-    vector = {"opencl": "vector", "cuda": "wamnet_vector", "metal": "float4"}.get(target, "vec4")
+    vector = {"opencl": "float4", "cuda": "wamnet_vector", "metal": "float4"}.get(target, "vec4")
     patterns = []
     for item in items(cleaned(FRAMES[target]), target == "wgsl"):
         words = [
@@ -145,7 +145,7 @@ def allowed(target: str) -> list[tuple[re.Pattern[str], bool]]:
     return patterns
 
 
-def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
+def check_frame(source: str, target: str, floats: bool) -> None:
     """Refuse a source, cleaned, that has outside its functions what is not in its target's list."""
     guard = GUARD.fullmatch(source) if target == "c" else None
     if target == "c" and not guard:
@@ -173,7 +173,7 @@ def check_frame(source: str, target: str, exact: bool, floats: bool) -> None:
         raise Unread("a source that does not begin with its version")
     _check_together(own, source)
     needs = NEEDS.get(target, {})
-    for words in needs.get("all", ()) + needs.get("floats", ()) * floats + needs.get("exact", ()) * exact:
+    for words in needs.get("all", ()) + needs.get("floats", ()) * floats:
         if not any(words in item for item in own):
             raise Unread(f"a source without {words!r}")
 

@@ -151,53 +151,26 @@ static inline int wamnet_clamp(int value, int low, int high) { }
 #undef WINDOW_SIZE
 #undef restrict
 
-== opencl-types ==
-typedef float4 vector;
-typedef int4 mask;
-#ifndef CONVERT
-#define vector float4
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-typedef float8 vector;
-typedef int8 mask;
-#ifndef CONVERT
-#define vector float8
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-typedef float16 vector;
-typedef int16 mask;
-#ifndef CONVERT
-#define vector float16
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
-
 == opencl-kernel ==
 void wamnet_denoise(
     IMAGES, __global const float *restrict weights, __global float *restrict result,
     int width, int height) { }
 
 == opencl ==
-#pragma OPENCL FP_CONTRACT OFF
-%window%%pixels%%tiles%%group%%opencl-types%
-#define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
-#define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
-#define LEAST(kind, a, b) ((kind)(b) < (kind)(a) ? (kind)(b) : (kind)(a))
-#define MOST(kind, a, b) ((kind)(b) > (kind)(a) ? (kind)(b) : (kind)(a))
+%window%%pixels%%tiles%%group%
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
 #endif
 #endif
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
 #endif
-#ifdef __has_builtin
-#if __has_builtin(__builtin_convertvector)
-#define CONVERT(a, kind) __builtin_convertvector(a, kind)
-#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
 #endif
 typedef int16 sums;
 typedef struct __attribute__((packed)) { uchar4 bytes; } fours;
@@ -212,19 +185,23 @@ typedef struct __attribute__((packed)) { uchar4 bytes; } fours;
     ((sum) + PRODUCT(weight, (four).s0, 24) + PRODUCT(weight, (four).s1, 16) \
         + PRODUCT(weight, (four).s2, 8) + PRODUCT(weight, (four).s3, 0))
 #endif
-void forward(const vector *from, int step, vector *to, int leap) {
+void forward(const float4 *from, int step, float4 *to, int leap) {
 #pragma unroll
 }
-void backward(const vector *from, int step, vector *to, int leap) { }
-vector ELEMENTWISE(VECTORS) { }
+void backward(const float4 *from, int step, float4 *to, int leap) { }
+void forward(const float8 *from, int step, float8 *to, int leap) { }
+void backward(const float8 *from, int step, float8 *to, int leap) { }
+void forward(const float16 *from, int step, float16 *to, int leap) { }
+void backward(const float16 *from, int step, float16 *to, int leap) { }
+float4 ELEMENTWISE(VECTORS) { }
 int wamnet_packed(float a, float b, float c, float d) { }
 int4 wamnet_dots(int4 sums, int4 weights, int word) {
 #ifdef __opencl_c_integer_dot_product_input_4x8bit_packed
 #else
 #endif
 }
-vector wamnet_floats(int4 sums) { }
-vector wamnet_numbers(int4 bits) { }
+float4 wamnet_floats(int4 sums) { }
+float4 wamnet_numbers(int4 bits) { }
 __kernel %opencl-kernel%
 __kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1))) %opencl-kernel%
 
@@ -394,15 +371,13 @@ NEEDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "c": {
         "all": ("FP_CONTRACT", "pop_options", "float .h", "math .h", "stdbool .h", "stdint .h"),
         "floats": ("__FAST_MATH__",),
-        "exact": ("fp-contract=off",),
     },
-    "opencl": {"exact": ("FP_CONTRACT OFF",)},
     "opengl": {"all": ("330 core", "extension", "define PRECISE"), "floats": ("error",)},
     "glsl-es": {"all": ("300 es", "highp float", "highp int", "highp sampler2D", "define PRECISE")},
     "glsl-vulkan": {"all": ("version 450", "define PRECISE precise", "local_size_x")},
     "metal": {"all": ("metal_stdlib", "using namespace metal")},
 }
-"""What some item must have: in all sources, in those with a bound that is not 0, and of profile exact."""
+"""What some item must have: in all sources, and in those with a bound that is not 0."""
 
 TRUE: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "c": (

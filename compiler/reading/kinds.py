@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import words
-from .field import ZERO, Number, expression, literal, wide
+from .field import Number, expression, literal, wide
 from .lanes import Lanes, Place, Raw, Unread, Wrong
 from .memory import Pointer
 from .tokens import Type
@@ -71,7 +71,7 @@ class Kinds:
 
     def _is_truth(self, value: Number, kind: str, width: int) -> bool:
         """Refuse a truth as a number, and a number as a truth; vectors of truths are vectors of integers."""
-        alike = (kind == "bool") == (value.kind in ("bool", ZERO))
+        alike = (kind == "bool") == (value.kind == "bool")
         if not alike and (width == 1 or kind != "int32"):
             raise Unread(f"{value.kind} as {kind}")
         return True

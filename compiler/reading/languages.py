@@ -181,14 +181,14 @@ LANGUAGES: Mapping[str, Language] = {
 }
 """By a manifest's target."""
 
-READ_PROFILES = ("ieee", "exact")
-"""The profiles whose sines are read, of every degree."""
+READ_PROFILE = "ieee"
+"""The profile whose sines are read, of every degree."""
 
 
 def is_read(manifest: Mapping[str, Any]) -> bool:
     """Return whether the text of a kernel is of a kind that is read, by its manifest (TXT-7)."""
     language, schedule = LANGUAGES.get(manifest["target"]), manifest["schedule"]["name"]
-    known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILES)
+    known_sines = not manifest["sine_arguments"] or manifest["profile"]["name"].startswith(READ_PROFILE)
     if language is None or not known_sines:
         return False
     begins = language.of_floats if any(manifest["bound"]["output"]) else language.of_integers

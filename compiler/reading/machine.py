@@ -16,14 +16,12 @@ from . import together, words
 from .builtins import bits, choose
 from .field import (
     FOLDED,
-    ZERO,
     Number,
     Span,
     blended,
     choice,
     difference,
     expression,
-    hashed,
     literal,
     part_of,
     product,
@@ -483,8 +481,6 @@ class Machine(Kinds):
             return difference(a, b)
         if op == "*":
             return product(a, b)
-        if op == "==" and b.literal == 0.0:
-            return Number(None, hashed("is zero", a.known), ZERO, compared=(a, b))
         if op in ("<", ">", "<=", ">="):
             a, b = (a, b) if op[0] == "<" else (b, a)
             found = expression("less_equal" if "=" in op else "less", a, b, kind="bool")

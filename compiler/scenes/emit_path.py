@@ -30,15 +30,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from ..core.ir import Image, Node, Program, Type, attributes
 from ..core.lines import Lines
 from ..core.loops import Loop, Part, Walk, is_walk, loops
 from ..core.weights import tables
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import ENCODE
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import ENCODE
-from ..schedules.emit import framed
+from ..languages.renderer import framed
 from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, Values, kinds, names
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
@@ -85,7 +85,7 @@ def planes(groups: Sequence[str]) -> list[str]:
     """Return the names of all planes of some groups, in the order in which a kernel writes them."""
     for group in groups:
         if group not in GROUPS:
-            raise CompileError(f"planes {group!r} do not exist; there are: {', '.join(GROUPS)}")
+            raise CompileError(f"planes {group!r}: unknown ({choice(group, GROUPS)})")
     return [plane for group in groups for plane in GROUPS[group]]
 
 
@@ -154,12 +154,12 @@ class _Kernel(Lines):
         if len(self.programs.inputs) > self.dialect.most_numbers:
             raise CompileError(
                 f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} numbers "
-                f"of the scene, and {len(self.programs.inputs)} move: compile fewer moments of it, or one"
+                f"of the scene, and {len(self.programs.inputs)} move: compile fewer times of it, or one"
             )
         if images and not self.dialect.painted:
             raise CompileError(
                 f"{self.dialect.language}: its path kernels write sums, not encoded images: compile the "
-                "encoding as a kernel of its own"
+                "encoding as a separate kernel"
             )
         self._sums()
         self._samples()

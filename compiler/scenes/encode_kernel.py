@@ -26,12 +26,13 @@ from ..core import ir, profiles
 from ..core.ir import Image, Program
 from ..core.lower import images_of
 from ..core.passes import pipeline
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import Interface
+from ..languages.renderer import framed
 from ..plan import sine_contract
 from ..proof import bounds
-from ..schedules.emit import framed
+from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
 from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
@@ -75,7 +76,7 @@ def compile_encode(
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
     images are those of a network of integers. `rays`: those of features [lower_encode].
     """
-    chosen, promised = target_named(target), profiles.unpinned(profile, "encodings of features")
+    chosen, promised = target_named(target), profiles.profile_named(profile)
     encoding = encoding_of(features, normalization, profile, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
@@ -92,7 +93,7 @@ def compile_encode(
     dialect = chosen.dialect
     if dialect:
         _check_images(images, dialect)
-    arguments = dialect.said[interface.ENCODE] if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[interface.ENCODE] if dialect else PRINTED
     arguments = arguments.format(planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
     header = _header(program, images, dialect.language if dialect else chosen.language, arguments)
     if dialect is None:

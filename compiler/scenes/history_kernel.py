@@ -20,11 +20,11 @@ from typing import Any
 from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
-from ..languages import interface
-from ..languages.interface import CAMERAS as CAMERAS_ARRAY
-from ..languages.interface import FIRST as FIRST_ARRAY
-from ..languages.interface import FOLLOW, MOTIONS, RESULT
-from ..languages.interface import PAST as PAST_ARRAY
+from ..kernel import interface
+from ..kernel.interface import CAMERAS as CAMERAS_ARRAY
+from ..kernel.interface import FIRST as FIRST_ARRAY
+from ..kernel.interface import FOLLOW, MOTIONS, RESULT
+from ..kernel.interface import PAST as PAST_ARRAY
 from . import plane_kernel
 from .encode_kernel import statements
 from .lower_history import (
@@ -65,7 +65,7 @@ LANES = 1
 @lru_cache
 def compile_history(target: str, profile: str = "ieee") -> PlaneArtifact:
     """Return the kernel that adds a picture to a history."""
-    promised = profiles.unpinned(profile, "histories")
+    promised = profiles.profile_named(profile)
     dialect = plane_kernel.dialect_of(target, LANES, *SAID)
     programs = _of_profile(lower_history(), promised.passes)
     integers = plane_kernel.integers_of(dialect, FOLLOW)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...refimpl.network.dataset import Normalization
+from ..kernel.interface import PATH, Interface
 from ..languages.dialect import Parts
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise
-from ..languages.interface import PATH, Interface
 from .emit_path import emit_path
 from .encode_kernel import encode_source
 from .lower_encode import layers_of

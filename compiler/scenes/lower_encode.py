@@ -45,7 +45,7 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
         rule = "a path kernel knows nothing of a pixel's neighbours"
         raise InputError("features", ", ".join(smoothed), rule, "denoise frames: wamnet render, then denoise")
     if before := [layer for layer in layers if layer in HISTORY]:
-        rule = "a path kernel makes layers of one picture, not of those before it"
+        rule = "a path kernel computes layers of one frame, not of earlier frames"
         way_out = "denoise frames that have them: wamnet animate makes them"
         raise InputError("features", ", ".join(before), rule, way_out)
     if SUN in layers:

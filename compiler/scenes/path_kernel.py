@@ -30,10 +30,11 @@ from ..core.ir import Image
 from ..core.loops import Forms
 from ..core.passes import pipeline
 from ..core.profiles import Profile
-from ..languages import interface
-from ..languages.interface import Interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.openings import IMAGES
 from ..plan import sine_contract
+from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
 from . import emit_path
 from .emit_path import Encoding
@@ -133,12 +134,12 @@ def compile_path(
 
     With an encoding of these planes it writes its images, at their places in the whole picture.
     """
-    chosen, promised = target_named(target), profiles.unpinned(profile, "paths")
+    chosen, promised = target_named(target), profiles.profile_named(profile)
     if not chosen.paths:
         raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
-        raise CompileError(f"target {target} does not follow {lanes} paths at once; it can do {known}")
+        raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
     emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))
@@ -147,7 +148,7 @@ def compile_path(
     if programs.rays:
         written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
     header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
-    arguments = dialect.said[interface.PATH] if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[interface.PATH] if dialect else PRINTED
     if images:
         arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
     arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))

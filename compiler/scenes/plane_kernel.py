@@ -16,10 +16,11 @@ from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..core import ir, profiles
 from ..core.ir import Program
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import Interface
 from ..languages.dialect import Dialect, Parts
-from ..languages.interface import Interface
-from ..schedules.emit import framed
+from ..languages.renderer import framed
+from ..schedules.schedules import PRINTED
 from ..targets import target_named
 
 
@@ -90,7 +91,7 @@ def put_together(draft: Draft, target: str, profile: str, lanes: int) -> PlaneAr
     """Return a kernel with its source and its manifest."""
     chosen, promised = target_named(target), profiles.profile_named(profile)
     dialect = chosen.planes[lanes]
-    arguments = dialect.said[draft.role] if dialect else chosen.schedules[0].arguments
+    arguments = dialect.said[draft.role] if dialect else PRINTED
     listed = {what: "\n".join(textwrap.wrap(", ".join(names), 98)) for what, names in draft.said.items()}
     arguments = arguments.format(**listed, lanes=lanes)
     header = _header(draft, dialect.language if dialect else chosen.language, arguments)

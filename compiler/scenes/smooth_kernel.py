@@ -25,9 +25,9 @@ from ...refimpl.network.dataset import Normalization
 from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
-from ..languages import interface
+from ..kernel import interface
+from ..kernel.interface import GUIDE, LIGHT, RESULT, SMOOTH
 from ..languages.dialect import Dialect
-from ..languages.interface import GUIDE, LIGHT, RESULT, SMOOTH
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
@@ -75,7 +75,7 @@ def compile_smoothing(
     normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    promised = profiles.unpinned(profile, "smoothed features")
+    promised = profiles.profile_named(profile)
     plane_kernel.dialect_of(target, lanes, *SAID)
     programs = _of_profile(lower_smooth(normalization), promised.passes)
     pair = [_compiled(programs, role, target, profile, lanes) for role in (GUIDE, SMOOTH)]

@@ -29,14 +29,13 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.network import dataset, factored
-from ..core.ir import LEAST, Gather, Image, Node, Program, Type, attributes
-from ..core.passes.pin import pin
+from ..core.ir import Gather, Image, Node, Program, Type, attributes
 from ..core.profiles import SineContract
 from ..core.trace import trace
 from ..core.verify import verify
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from .emit import kernel_gather
+from .common import kernel_gather
 
 Array = NDArray[np.float64]
 
@@ -84,13 +83,11 @@ def factor(program: Program, rank: int, widest: int | None = None) -> Cut:
     vertical, horizontal = (a.astype(np.float32) for a in (factors.vertical, factors.horizontal))
     row = replace(gather, axes=(1,))
     first = trace(lambda window: {HORIZONTAL: window @ horizontal.T}, {"window": _window(row)}, row)
-    first = pin(first) if program.exact else first
     images = between(rank, _range(first), widest)
     column = Gather(gather.window, images, axes=(0,), joined=len(images) > 1)
     nodes = tuple(_read_by(column, node) if node.op == "input" else node for node in program.nodes)
     parameters = {**program.parameters, name: vertical.reshape(len(vertical), -1)}
     second = replace(program, nodes=nodes, parameters=parameters, gather=column)
-    second = pin(second) if program.exact else second
     return Cut(program, verify(first, "horizontal pass"), verify(second, "vertical pass"), layer)
 
 
@@ -117,10 +114,7 @@ def enclose(cut: Cut, contract: SineContract, x: Any, columns: Columns, of_cut: 
     h = bounds.enclose(cut.horizontal, {"window": row_box}, contract)[output]
     read = cut.whole.nodes[cut.layer].args[0]
     until = replace(cut.vertical, nodes=cut.vertical.nodes[: cut.layer + 1], outputs=())
-    image = columns(h)
-    if cut.vertical.exact:
-        image = replace(image, error=image.error + LEAST)  # it reads small numbers as 0
-    second = bounds.enclose(until, {}, contract, known={read: image})[cut.layer]
+    second = bounds.enclose(until, {}, contract, known={read: columns(h)})[cut.layer]
     until = replace(cut.whole, nodes=cut.whole.nodes[: cut.layer + 1], outputs=())
     wanted = bounds.enclose(until, {"window": whole_box}, contract)[cut.layer]
     left_out = np.maximum(np.abs(whole_box[0]), np.abs(whole_box[1])) @ left(cut).T

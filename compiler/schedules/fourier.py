@@ -41,7 +41,7 @@ from ..core.ops import OPS
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..proof import bounds, scaled, spectra
 from ..proof.bounds import Enclosure
-from .emit import kernel_gather
+from .common import kernel_gather
 
 Array = NDArray[np.float64]
 

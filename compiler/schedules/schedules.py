@@ -12,7 +12,6 @@ The layout of the weights belongs to the schedule: kernels walk through them in 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,18 +19,55 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, choice
 from ...refimpl.network import dataset
 from ..core import ir, weights
 from ..core.ir import Gather, Program
 from ..core.profiles import SineContract
 from ..core.weights import Slot
+from ..kernel.interface import PLAIN as PLAIN
+from ..kernel.kernel import Kernel
+from ..kernel.sizes import integer, item_bytes, shared_bytes
+from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
-from ..languages.interface import PLAIN as PLAIN
+from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..proof.spectra import Spectra
-from .emit import emit, kernel_gather, private_bytes
+from . import fourier
+from .bytes import (
+    START,
+    bytes_stored,
+    group_of_bytes,
+    matrix_twice,
+    refused_by_bytes,
+    tile_of_bytes,
+    words_at_once,
+    words_stored,
+)
+from .common import kernel_gather, output_channels
+from .fft import Sizes, fft, sizes_of, spectra_stored
+from .group import (
+    LARGEST_NUMBERS,
+    MOST_CHANNELS,
+    beyond_tile,
+    group,
+    refused_by_group,
+    refused_by_statements,
+    rows_at_once,
+)
+from .inlined import LARGEST_WEIGHTS, inlined
+from .packed import WEIGHTS_A_TEXEL, packed, packed_weights
+from .plain import plain
+from .tile import (
+    LARGEST_PRIVATE,
+    all_stored,
+    placed,
+    readers_of_window,
+    refused_by_vectors,
+    shared_matrix,
+    tile,
+)
 
 Images = Mapping[str, NDArray[np.float32]]
 
@@ -48,20 +84,17 @@ def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.flo
     return found
 
 
-class Schedule(ABC):
-    """One way to order a kernel's work; `idea` is the sentence that sets this rung apart from the last.
+class Schedule:
+    """One way to order a kernel's work; `idea` is the sentence that sets it apart from the one before.
 
-    `arguments` says how to call the kernel, `pixels` how many neighbours of a row a work item computes,
-    `order` how a matrix is stored among the weights; `language` and `suffix` are set where they are its own;
-    `instead` names the schedule of programs that it refuses. `bytewise`: its array of weights holds bytes.
+    `instead` names the schedule of programs that it refuses; `order` says how a matrix is stored among the
+    weights. `bytewise`: its array of weights holds bytes. A schedule of kernels builds them as data, and
+    prints them in its language [`kernel`].
     """
 
     name: str
     idea: str
-    arguments: str
-    pixels: int = 1
-    language: str = ""
-    suffix: str = ""
+    dialect: Dialect
     instead: str = PLAIN
     bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
@@ -70,9 +103,41 @@ class Schedule(ABC):
         """Return why this schedule cannot hold the program, or nothing."""
         return ""
 
+    def impossible(self, program: Program) -> str:
+        """Return why there is no kernel of this program at all, or nothing."""
+        return ""
+
+    def kernel(self, program: Program) -> Kernel:
+        """Return the kernel of a program; that of the last one is kept, since many ask about it."""
+        known = getattr(self, "_built", None)
+        if known is None or known[0] is not program or known[1] != vars(self).get("group"):
+            known = self._built = (program, vars(self).get("group"), self.build(program))
+        return known[2]
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        raise NotImplementedError
+
+    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
+        """Return the kernel's source; `header` are the lines of the comment at its top.
+
+        `bounded`: an error bound is stated, and the language must keep the order of operations.
+        """
+        _check_channels(program, self.dialect)
+        return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program)).source(header)
+
     def extent(self, program: Program) -> tuple[int, int]:
         """Return the columns and rows of pixels that a work item computes."""
-        return self.pixels, 1
+        kernel = self.kernel(program)
+        across, down = (integer(kernel, each) for each in kernel.step)
+        return across, down
+
+    def arguments(self, program: Program) -> str:
+        """Return how the kernel is called."""
+        kernel, channels = self.kernel(program), output_channels(program)
+        columns, rows = self.extent(program)
+        numbers = {"stack": stack_bytes(item_bytes(kernel)), "bytes": 4 * kernel.weights.lanes}
+        return self.dialect.called(kernel).format(columns=columns, rows=rows, channels=channels, **numbers)
 
     def enclosures(
         self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
@@ -85,17 +150,9 @@ class Schedule(ABC):
         box = bounds.window_box(gather) if images is None else (windows(gather, images, rows),) * 2
         return bounds.enclose(program, {"window": box}, sine)
 
-    @abstractmethod
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the kernel's source; see emit.py."""
-
-    @abstractmethod
     def private_bytes(self, program: Program) -> int:
         """Return the bytes of the arrays that a work item declares."""
-
-    def called(self) -> Mapping[str, str]:
-        """Return the further numbers of the text about its arguments, by name."""
-        return {}
+        return item_bytes(self.kernel(program))
 
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return what else a caller must know, for the manifest."""
@@ -118,23 +175,366 @@ class Schedule(ABC):
         return None
 
 
+def _check_channels(program: Program, dialect: Dialect) -> None:
+    """Refuse an output that the language cannot write at once."""
+    kind = program.nodes[program.outputs[0][1]].type
+    if kind.dtype != "float32":
+        raise CompileError(f"the output has type {kind}: a kernel writes float32; convert it with astype")
+    channels = output_channels(program)
+    if channels > dialect.max_output_channels:
+        raise CompileError(
+            f"the output has {channels} channels: {dialect.language} writes at most "
+            f"{dialect.max_output_channels}; compile for another target"
+        )
+
+
 class Plain(Schedule):
-    """One pixel a work item, loops over taps and neurons [emit.py]."""
+    """One pixel a work item, loops over taps and neurons [plain.py]."""
 
     name = PLAIN
     idea = "one pixel after another, loops over taps and neurons"
 
     def __init__(self, dialect: Dialect) -> None:
         self.dialect = dialect
-        self.arguments = dialect.arguments
 
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the kernel's source."""
-        return emit(program, self.dialect, header, bounded)
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return plain(program)
 
-    def private_bytes(self, program: Program) -> int:
-        """Return the bytes of a pixel's arrays."""
-        return private_bytes(program)
+
+class Stored(Schedule):
+    """A schedule whose weights are stored in an order of its own: arrays one after another."""
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        raise NotImplementedError
+
+    def layout(self, program: Program) -> Mapping[str, Slot]:
+        """Return the slot of each weight."""
+        return placed(self.stored(program))
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them."""
+        return np.concatenate([np.zeros(0, np.float32), *(a.ravel() for a in self.stored(program).values())])
+
+
+class Tile(Stored):
+    """A tile of `pixels` x `vectors` vectors of `lanes` neurons [tile.py]."""
+
+    order = (
+        "vectors filled up with zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows "
+        "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
+    )
+
+    def __init__(
+        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int = 2
+    ) -> None:
+        self.name, self.idea, self.dialect = name, idea, dialect
+        self.lanes, self.pixels, self.vectors = lanes, pixels, vectors
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        if reason := refused_by_vectors(program, self.dialect.max_output_channels) or shared_matrix(program):
+            return reason
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        return ""
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return tile(program, self.lanes, self.pixels, self.vectors, self.dialect.wide)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return all_stored(program, self.lanes, self.vectors)
+
+
+class Grouped(Stored):
+    """A tile of the image for each group of items, `pixels` of a row for each item [group.py]."""
+
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads "
+        f"the window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, "
+        "then channel by channel"
+    )
+
+    def __init__(
+        self,
+        name: str,
+        idea: str,
+        dialect: Dialect,
+        pixels: int,
+        size: tuple[int, int] | None = None,
+        instead: str = PLAIN,
+    ) -> None:
+        self.name, self.idea, self.dialect, self.instead = name, idea, dialect, instead
+        size = size or dialect.group
+        assert size is not None, f"{dialect.language} has no work groups"
+        self.pixels, self.group = pixels, size
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        if reason := refused_by_vectors(program, self.dialect.max_output_channels) or shared_matrix(program):
+            return reason
+        if reason := beyond_tile(kernel_gather(program)) or refused_by_group(program, self.pixels):
+            return reason
+        if reason := refused_by_statements(program, self.pixels, rows_at_once(program)):
+            return reason
+        return self.beyond_memory(program)
+
+    def beyond_memory(self, program: Program) -> str:
+        """Return why a group's memory cannot hold the tile, or nothing."""
+        if (shared := shared_bytes(self.kernel(program))) > (most := self.dialect.largest_shared):
+            return f"its tile takes {shared} bytes that a group shares, of at most {most}"
+        return ""
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return group(program, self.pixels, self.group, self.dialect.wide)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return all_stored(program, 4, LARGEST_NUMBERS)
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return the size of a group and what it shares."""
+        return {"group": list(self.group), "shared_bytes": shared_bytes(self.kernel(program))}
+
+
+class Inline(Schedule):
+    """Everything unrolled, weights in the source [inlined.py]."""
+
+    name = "inlined"
+    idea = "all loops unrolled, every weight a constant of the source"
+    order = "every weight is a constant of the source"
+
+    def __init__(self, dialect: Dialect) -> None:
+        self.dialect = dialect
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        count = sum(array.size for array in weights.weights(program).values())
+        if count > LARGEST_WEIGHTS:
+            return (
+                f"it has {count} weights, of at most {LARGEST_WEIGHTS}: more take a driver minutes to compile"
+            )
+        return self.impossible(program)
+
+    def impossible(self, program: Program) -> str:
+        """Return why there is no kernel of this program at all, or nothing."""
+        return refused_by_vectors(program, self.dialect.max_output_channels)
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return inlined(program)
+
+    def layout(self, program: Program) -> Mapping[str, Slot]:
+        """Return nothing: no weight lies outside the source."""
+        return {}
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return no weights."""
+        return np.zeros(0, np.float32)
+
+
+class Packed(Stored):
+    """Loops, and four weights a read [packed.py]."""
+
+    name = "packed"
+    idea = "four weights a texel, four neurons a `vec4`"
+    order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
+
+    def __init__(self, dialect: Dialect) -> None:
+        self.dialect = dialect
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        return refused_by_vectors(program, self.dialect.max_output_channels)
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return packed(program)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return packed_weights(program)
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return the form of the texture."""
+        return {WEIGHTS_A_TEXEL: 4}
+
+
+class Dot(Tile):
+    """A tile whose products are of bytes [bytes.py]."""
+
+    order = (
+        "matrices block by block of neurons: blocks x fours of inputs x neurons x 4 bytes with a sign; "
+        "inputs that are the window go image by image, then row of taps by row, each filled up to fours; "
+        f"{START}: where a matrix' sums begin, integers of 32 bits"
+    )
+    bytewise = True
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        return refused_by_bytes(program) or matrix_twice(program) or super().refusal(program)
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return tile_of_bytes(program, self.lanes, self.pixels, self.dialect.wide)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return bytes_stored(program, self.lanes, self.vectors)
+
+
+class GroupDot(Grouped):
+    """A tile of words for each group of items [bytes.py]."""
+
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices words x neurons, a word being four inputs "
+        "as bytes with a sign, the first one the lowest; of a matrix that reads the window the channels of "
+        f"all images make words that are filled up with zeros, at most {MOST_CHANNELS} of them at a time tap "
+        "by tap in rows, then word by word"
+    )
+    bytewise = True
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        most = self.dialect.max_output_channels
+        return (
+            refused_by_bytes(program)
+            or refused_by_vectors(program, most)
+            or shared_matrix(program)
+            or refused_by_group(program, self.pixels)
+            or refused_by_statements(program, self.pixels, words_at_once(program))
+            or self.beyond_memory(program)
+        )
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return group_of_bytes(program, self.pixels, self.group, self.dialect.wide)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return words_stored(program)
+
+
+COST = 3.0
+"""Times that an operation of a transform takes of one of the direct sum: 2.6, as measured on an AMD EPYC with
+tiles of 32; most of its operands are loaded and stored."""
+
+
+class Fourier(Stored):
+    """Tiles of `points` x `points` pixels, `tiles` side by side [fft.py]."""
+
+    order = (
+        "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
+        "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
+        "(real, imaginary) of the first and of the second channel, two vectors of neurons; other "
+        "matrices block by block of neurons: blocks x D_in x neurons"
+    )
+
+    def __init__(
+        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, points: int, tiles: int
+    ) -> None:
+        self.name, self.idea, self.dialect = name, idea, dialect
+        self.lanes, self.pixels, self.points, self.tiles = lanes, pixels, points, tiles
+        self.instead = f"tile{lanes}"
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return fft(program, self.lanes, self.pixels, self.points, self.tiles, self.dialect.wide)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return spectra_stored(program, self.lanes, self.points, self.tiles)
+
+    def held(self, program: Program) -> Program:
+        """Return the program whose parameters are what the kernel holds, before transforms."""
+        found = fourier.arrangement(program, self.lanes)
+        return found.centred(found.moved(program))
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them, the neurons of the first layer in order."""
+        return super().pack(self.held(program))
+
+    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return other numbers in the places of the weights; 0 for those that the kernel does not hold."""
+        found = fourier.arrangement(program, self.lanes)
+        own = [found.weight, *([found.bias] if found.bias and any(found.centres) else [])]
+        lost = {name: np.zeros_like(parameters[name]) for name in own}
+        return super().pack(found.moved(replace(program, parameters={**parameters, **lost})))
+
+    def spectra(self, program: Program) -> Spectra:
+        """Return how the sums over the window are computed, for their bound."""
+        (layer,), found = readers_of_window(program), fourier.arrangement(program, self.lanes)
+        gather, count = kernel_gather(program), layer.type.shape[0]
+        held = found.centred(found.moved(program))
+        # Columns, groups, rows, pairs, halves, parts and places of neurons.
+        stored = self.stored(held)[found.weight].astype(np.float64)
+        placed = stored[..., 0, :] + 1j * stored[..., 1, :]
+        placed = placed.transpose(1, 5, 2, 0, 4, 3).reshape(
+            -1, self.points, self.points // 2 + 1, *placed.shape[3:5]
+        )
+        placed = placed.reshape(*placed.shape[:3], -1)[:count, ..., : gather.channels]
+        table, bias = np.empty_like(placed), np.zeros(count)
+        table[found.order] = 2 * self.points * placed
+        if found.bias is not None:
+            bias[found.order] = held.parameters[found.bias]
+        block, centres = self.sizes(program).block, np.array(found.centres)
+        return Spectra(self.points, gather.rows, found.order, self.lanes, block, centres, table, bias)
+
+    def sizes(self, program: Program) -> Sizes:
+        """Return the sizes of a program's kernel."""
+        return sizes_of(program, self.lanes, self.points, self.tiles)
+
+    def enclosures(
+        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node: the sums over the window are those of spectra."""
+        gather, of = kernel_gather(program), self.spectra(program)
+        if images is None:
+            norm = np.array(self.points * np.linalg.norm(fourier.radius(gather, of.centres)))
+            return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
+        found = windows(gather, images, rows)
+        joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
+        norms = fourier.tile_norms(joined, gather.window, self.points, of.centres)[rows]
+        return fourier.enclose(program, sine, (found, found), norms, of)
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        gather, readers = kernel_gather(program), readers_of_window(program)
+        if gather.whole:
+            return "sums from spectra are rounded, those of integers are not"
+        if reason := refused_by_vectors(program, self.dialect.max_output_channels):
+            return reason
+        if len(readers) != 1:
+            return f"{len(readers)} affine maps read the window, not one"
+        if gather.axes != (0, 1) or gather.rows >= self.points:
+            return f"a window of {gather.rows} x {gather.columns} pixels in a tile of {self.points}"
+        names = [node["weight"] for node in program.nodes if node.op == "affine"]
+        if names.count(readers[0]["weight"]) != 1:
+            return "a matrix is applied to the window and to a layer"
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        direct, spectra = self.operations(program)
+        if COST * spectra > direct:
+            return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"
+        return ""
+
+    def operations(self, program: Program) -> tuple[float, float]:
+        """Return the operations on vectors, per pixel, of the direct sum over the window and of this one."""
+        (layer,), s, n = readers_of_window(program), self.sizes(program), self.points
+        direct = kernel_gather(program).n_inputs * -(-layer.type.shape[0] // self.lanes)
+        products = (n // 2 + 1) * n * s.pairs * 16 * self.tiles * s.neurons
+        # The split-radix algorithm takes 4 n log2(n) - 6 n + 8 operations.
+        one = 4 * n * (n.bit_length() - 1) - 6 * n + 8
+        transforms = s.inputs * (2 * n + 2) + self.tiles * s.neurons * (n + s.out)
+        return direct, (products + one * transforms) / (self.tiles * s.out**2)
+
+
+PRINTED = "the program's inputs and parameters, by name"
+"""How a program is called that is not compiled."""
 
 
 class Printed(Schedule):
@@ -142,15 +542,18 @@ class Printed(Schedule):
 
     name = PLAIN
     idea = "one operation after another, all pixels at once"
-    arguments = "the program's inputs and parameters, by name"
+
+    def arguments(self, program: Program) -> str:
+        """Return how it is called."""
+        return PRINTED
 
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
         """Return the text, under the header as comments."""
         return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
 
-    def private_bytes(self, program: Program) -> int:
-        """Return what a kernel for one pixel would take."""
-        return private_bytes(program)
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel that a language would have."""
+        return plain(program)
 
 
 @dataclass(frozen=True)
@@ -176,9 +579,13 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
-        raise CompileError(f"schedule {name!r} does not exist for this target; there are: {', '.join(known)}")
+        raise CompileError(f"schedule {name!r}: unknown to this target ({choice(name, known)})")
     chosen, first = known[name], ""
     while chosen is not schedules[0] and (reason := chosen.refusal(program)):
         first = first or reason
         chosen = known[chosen.instead]
+    if chosen is schedules[0] and (reason := chosen.impossible(program)):
+        raise CompileError(
+            f"no schedule of this target holds the program: {reason}; compile for another target"
+        )
     return Pick(chosen, name, chosen.extent(program), first, chosen.details(program))

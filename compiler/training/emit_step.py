@@ -24,7 +24,7 @@ from ..core.ir import Node, Program, users
 from ..core.lines import Lines
 from ..core.ops import OPS
 from ..languages.dialect import Dialect
-from ..schedules.emit import schedule
+from ..schedules.common import groups_of as schedule
 from .emit_factors import factor_defines
 from .step import SQUARES, TARGET, TRANSPOSED, WINDOW, Step, Sum
 from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for

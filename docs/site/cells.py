@@ -81,7 +81,7 @@ def _run(code: str, place: str, namespace: dict[str, Any]) -> str:
         ]
         at = f"line {lines[-1]} of the cell" if lines else "the cell"
         raise PluginError(f"{place}: {at} raises {type(error).__name__}: {error}") from error
-    texts = [f"<pre>{escape(printed.getvalue())}</pre>"] if printed.getvalue() else []
+    texts = [f'<pre tabindex="0">{escape(printed.getvalue())}</pre>'] if printed.getvalue() else []
     return "\n".join(texts + output.pieces)
 
 

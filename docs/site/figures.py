@@ -28,9 +28,6 @@ ALONE = re.compile(r"<p>(<img [^>]*?alt=\"([^\"]*)\"[^>]*>)</p>")
 SHOWN = re.compile(r"(<img class=\"shown[^\"]*\" alt=\"([^\"]*)\"[^>]*>)")
 """A picture that a cell shows."""
 
-PLAIN = "Pictures of "
-"""Beginning of texts that say no more than a heading above them does."""
-
 FRAME = f"""<div class="live" data-live="{LIVE}">
 <button type="button" class="md-button md-button--primary" hidden>Run it here</button>
 <a class="md-button" href="{LIVE}">Open it in a page of its own</a>
@@ -42,9 +39,7 @@ def captioned(html: str) -> str:
     """Return a page's HTML with pictures as figures with captions."""
 
     def figure(match: re.Match[str]) -> str:
-        image, text = match[1], match[2]
-        caption = "" if text.startswith(PLAIN) else f'<figcaption aria-hidden="true">{text}</figcaption>'
-        return f"<figure>{image}{caption}</figure>"
+        return f'<figure>{match[1]}<figcaption aria-hidden="true">{match[2]}</figcaption></figure>'
 
     return SHOWN.sub(figure, ALONE.sub(figure, html))
 

@@ -48,6 +48,15 @@ SECTION = re.compile(r"^## (.+)$|^\* \[.*?\]\((\w+\.md)\)", re.MULTILINE)
 GUIDE = re.compile(r"^\| \[.*?\]\(([\w-]+\.md)\)", re.MULTILINE)
 """A row of the guide's table of pages."""
 
+START = ("index.md", "guide/install.md", "first-kernel.md", "support.md", "limits.md")
+"""The first pages."""
+
+RESULTS = ("quality.md", "hard-light.md", "paper.md")
+"""Pages of results/, in their order."""
+
+SPEED = ("frames.md", "path-tracer.md", "rows.md")
+"""Pages of speed/, in their order."""
+
 LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs)/[\w./-]+)")
 """A link from docs/ to spec/, or back, as it works in the repository."""
 
@@ -73,17 +82,20 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     parts = [part for part in parts if isinstance(part, str) or any(part.values())]
     parts.append({"Vectors' formats": "spec/vectors/README.md"})
     config.nav = [
-        "index.md",
-        {"Tutorial": pages("tutorial")},
-        {"Course": course(docs)},
-        {"Guide": ["guide/index.md", "first-kernel.md", *(f"guide/{name}" for name in in_order(docs))]},
-        {"Results": ["results.md", "speed.md", "listing.md"]},
-        {"Spec": parts},
+        {"Start": [*START]},
+        {"Learn": [{"Tutorial": pages("tutorial")}, {"Course": course(docs)}, "listing.md"]},
+        {"Guide": ["guide/index.md", *(page for page in in_order(docs) if page not in START)]},
         {"API": ["reference.md"]},
-        {"Limits": ["limits.md"]},
-        "recipes.md",
+        {"Spec": parts},
+        {"Results": [*measured("results", RESULTS), *measured("speed", SPEED)]},
+        {"Contribute": ["recipes.md"]},
     ]
     return config
+
+
+def measured(page: str, names: Iterable[str]) -> list[str]:
+    """Return a page of measurements, and those that it leads to."""
+    return [f"{page}.md", *(f"{page}/{name}" for name in names)]
 
 
 def course(docs: Path) -> list[str]:
@@ -106,7 +118,7 @@ def by_number(names: Iterable[str]) -> list[str]:
 
 def in_order(docs: Path) -> list[str]:
     """Return the guide's pages in the order of its table."""
-    return GUIDE.findall((docs / "guide/index.md").read_text())
+    return [f"guide/{name}" for name in GUIDE.findall((docs / "guide/index.md").read_text())]
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
-SKELETONS = Path(__file__).resolve().parents[2] / "cli/course/skeletons"
+SKELETONS = Path(__file__).resolve().parents[2] / "course/skeletons"
 """The files that `wamnet course start` writes."""
 
 WIDTH = 88

@@ -353,7 +353,7 @@ def _one(method: Method, recipe: Recipe, data: Examples, step: int, share: float
         loss = method.step(noisy, clean, generator_of(recipe.seed, step), share)
     if not np.isfinite(loss):
         raise TrainingError(
-            f"loss of {recipe.method} at step {step} is {loss}: it must stay finite; lower the learning rate "
+            f"loss of {recipe.method} at step {step} {loss}: must stay finite; lower the learning rate "
             f"({recipe.learning_rate}) or check the frames"
         )
     return loss
@@ -404,7 +404,7 @@ def _load(method: Method, path: Path) -> Progress:
     try:
         state = torch.load(path, weights_only=True)
     except Exception as error:  # noqa: BLE001 - the package's errors for damaged files vary
-        rule = f"it cannot be read ({type(error).__name__})"
+        rule = f"cannot be read: {type(error).__name__}"
         raise InputError("checkpoint", str(path), rule, "remove it: training starts again") from None
     _put(method, state.pop("networks"))
     for name, found in state.pop("optimizers").items():

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from lamps import COLORS, LEAK, STOPS
 from numpy.typing import NDArray
 
 from wamnet.refimpl.light.scenes import canonical
@@ -41,6 +40,13 @@ Tensor = torch.Tensor
 
 PLANES = ("surfaces", "noisy", "clean")
 """What is known of a frame: features, lights of one path a pixel, those of the reference."""
+
+STOPS = -1.0
+"""Exposure of the T_k that the network sees: white lamps are brighter than tinted ones."""
+
+LEAK = 0.05
+"""Slope of the loss's picture beyond white: there the target is 1, whatever is brighter is right, and a
+derivative of 0 would keep what is wrong."""
 
 
 class Lit(torch.nn.Module):
@@ -72,7 +78,7 @@ def under(lights: Tensor, colors: Tensor) -> Tensor:
     return lights[..., :3] * colors[..., 0, :] + lights[..., 3:] * colors[..., 1, :]
 
 
-def drawn_colors(count: int, generator: torch.Generator, ranges: Ranges = COLORS) -> Tensor:
+def drawn_colors(count: int, generator: torch.Generator, ranges: Ranges) -> Tensor:
     """Return colours (count, 2, 3) of any hue, and of saturations and powers in the ranges."""
     assert ranges.saturation is not None
     low, high = ranges.saturation

@@ -30,9 +30,9 @@ from wamnet.cli.common.packages import need
 from wamnet.cli.files import exr
 from wamnet.kernels import denoise_on
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.run import draws, geometry
 from wamnet.kernels.run.denoise_on import images_of
-from wamnet.kernels.run.geometry import Shown
+from wamnet.models.data import draws, geometry
+from wamnet.models.data.geometry import Shown
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.frame import Floats, Frame
@@ -373,7 +373,7 @@ def open_image_denoise(
 
     Clean ones are those of the reference, whose camera rays are counted as its cost.
     """
-    from wamnet.kernels.bench.peers.peer_oidn import filtered, prefiltered
+    from wamnet_peers.peer_oidn import filtered, prefiltered
 
     guides: Mapping[str, Callable[[Case], Frame | None]] = {
         "none": lambda _: None,

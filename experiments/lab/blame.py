@@ -23,7 +23,7 @@ CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 Place = tuple[str, str]
 """A module and a name in it."""
 
-CODE = re.compile(r"`((?:refimpl|compiler)/[\w/]+\.py): *([\w., ]+)`")
+CODE = re.compile(r"`((?:refimpl|models|compiler)/[\w/]+\.py): *([\w., ]+)`")
 """How it names code."""
 
 

@@ -22,10 +22,10 @@ from typing import Any
 from wamnet.cli.common.terminal import hint_on_interrupt, progress
 from wamnet.cli.files import exr
 from wamnet.cli.files.dataset_files import sum_of
-from wamnet.kernels.run.draws import times
-from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
+from wamnet.models.data.draws import times
+from wamnet.models.data.frame_plan import version
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, SUN, Frame
 from wamnet.refimpl.light.environment import sun_of

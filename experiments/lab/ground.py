@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from wamnet.cli.files.outputs import write_text
-from wamnet.kernels.run.draws import Draw, drawn
+from wamnet.models.data.draws import Draw, drawn
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats
 from wamnet.refimpl.light.scenes import canonical

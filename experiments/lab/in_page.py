@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.kernels.verify import renderers, write_gltf
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.judgement import FAILED, UNTESTED, Missing, Picture
-from wamnet.kernels.verify.parts import NotExpressed
 from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet_verify import renderers, write_gltf
+from wamnet_verify.case import Shot
+from wamnet_verify.judgement import FAILED, UNTESTED, Missing, Picture
+from wamnet_verify.parts import NotExpressed
 
 from .browsers import WAIT_MS, chromium
 

@@ -1,6 +1,6 @@
 """Plots in git: SVG drawn from records, the same bytes wherever the same versions draw them.
 
-1. A plot is a function of the records that returns a figure of matplotlib [`shown.PLOTS`]; its file is
+1. A plot is a function of the records that returns a figure of matplotlib [`gallery.PLOTS`]; its file is
    docs/images/<name>.svg.
 2. Its last line has a digest of the records behind it and of the text of these functions [`digest`]: a plot
    of other records or by other code is seen without drawing it again, whatever version of matplotlib drew it
@@ -33,11 +33,10 @@ Line = Sequence[tuple[float, float, float, float]]
 
 @dataclass(frozen=True)
 class Plot:
-    """What draws a plot, the records that it shows, and the text under it."""
+    """What draws a plot, and the records that it shows."""
 
     draw: Callable[[Records], Any]
     records: Sequence[str]
-    caption: str
 
 
 def digest(plot: Plot, records: Records) -> str:
@@ -45,7 +44,7 @@ def digest(plot: Plot, records: Records) -> str:
     made = hashlib.sha256()
     for path in (records.folder / f"{name}.json" for name in plot.records):
         made.update(path.read_bytes())
-    for path in (Path(__file__), *map(Path(__file__).with_name, ("shown.py", "speeds.py"))):
+    for path in (Path(__file__), *map(Path(__file__).with_name, ("gallery.py", "speeds.py"))):
         made.update(path.read_bytes())
     return made.hexdigest()
 
@@ -102,8 +101,8 @@ def points(found: Results, names: Mapping[float, str], value: str) -> Line:
     return made
 
 
-def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], log: bool = False) -> None:
-    """Draw lines of means with bands of their intervals."""
+def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], ticks: Sequence[float] = ()) -> None:
+    """Draw lines of means with bands of their intervals; `ticks`: those of a logarithmic axis."""
     for number, (name, points) in enumerate(found.items()):
         if not points:
             continue
@@ -114,18 +113,24 @@ def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], log: bo
     axis.set_xlabel(labels[0])
     axis.set_ylabel(labels[1])
     axis.grid(visible=True, alpha=0.2, linewidth=0.6)
-    if log:
+    if ticks:
+        from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
+
         axis.set_xscale("log")
+        axis.xaxis.set_major_locator(FixedLocator(ticks))
+        axis.xaxis.set_major_formatter(ScalarFormatter())
+        axis.xaxis.set_minor_locator(NullLocator())
     if len(found) > 1:
         axis.legend(frameon=False, fontsize=8)
 
 
 def bars(axis: Any, found: Mapping[str, tuple[float, float, float]], label: str) -> None:
-    """Draw a mean (mean, low, high) for each name, with its interval, the first on top."""
+    """Draw a mean (mean, low, high) for each name, with its interval, the first on top; ours are round."""
     names = list(found)[::-1]
     for at, name in enumerate(names):
         mean, low, high = found[name]
-        axis.errorbar(mean, at, xerr=[[mean - low], [high - mean]], fmt="o", capsize=3, color="#b4530a")
-    axis.set_yticks(range(len(names)), names)
+        form, color = ("o", "#0072B2") if name.startswith("wamnet") else ("s", "#D55E00")
+        axis.errorbar(mean, at, xerr=[[mean - low], [high - mean]], fmt=form, capsize=3, color=color)
+    axis.set_yticks(range(len(names)), [name.replace("`", "") for name in names])
     axis.set_xlabel(label)
     axis.grid(visible=True, alpha=0.2, linewidth=0.6)

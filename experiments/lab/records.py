@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wamnet.refimpl.errors import InputError
+from wamnet.refimpl.errors import NO_VALUE, InputError
 
 from .command import HIDDEN_SCALE
 from .results import SCHEMA, Results
@@ -62,7 +62,7 @@ class Records:
         """Return a record's results, or say which one is missing."""
         path = self.folder / f"{name}.json"
         if not path.exists():
-            raise Missing("record", name, "it is not there", "make it, and run experiments/publish.py")
+            raise Missing("record", name, "not found", "make it, and run experiments/publish.py")
         return Results.read(path)
 
     def __contains__(self, name: str) -> bool:
@@ -77,11 +77,11 @@ def checked(data: Mapping[str, Any], partial: bool = False) -> dict[str, Any]:
     """Return results as a record holds them; refuse what would not be one. `partial`: seeds may differ."""
     what, records = f"results of {data.get('experiment')}", data["records"]
     if not records:
-        raise InputError(what, "no records", "a record needs at least one", "run the experiment")
+        raise InputError(what, NO_VALUE, "have no records", "run the experiment")
     if not data.get("commands"):
-        raise InputError(what, "no command", "a record says what made it", "give it with --command")
+        raise InputError(what, NO_VALUE, "do not state their command", "give it with --command")
     if data["settings"].get("scale") == HIDDEN_SCALE or f"--scale {HIDDEN_SCALE}" in str(data["commands"]):
-        raise InputError(what, "scale toy", "its numbers mean nothing", "run it with --scale small")
+        raise InputError(what, NO_VALUE, "are of scale toy and mean nothing", "run it with --scale small")
     if strange := [where for where, number in numbers(records) if not math.isfinite(number)]:
         raise InputError(what, strange[0], "every number must be finite", "measure it again, or leave it out")
     if not partial and (fewer := incomplete(records)):

@@ -76,7 +76,7 @@ def _data(path: Path) -> dict[str, Any]:
             raise KeyError("schema")
         _ = data["experiment"], data["settings"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        rule = f"it is not a file of results ({type(error).__name__})"
+        rule = f"is not a file of results ({type(error).__name__})"
         raise InputError("file of results", str(path), rule, WAY_OUT) from None
     return data
 
@@ -87,7 +87,7 @@ def number(value: Any) -> float:
         return float(value)
     if found := re.match(r"[-+]?[\d,]*\.?\d+(?:e[-+]?\d+)?", value.strip("* ")):
         return float(found[0].replace(",", ""))
-    raise InputError("value", value, "it does not begin with a number", "show another value")
+    raise InputError("value", value, "does not begin with a number", "show another value")
 
 
 def written(data: Mapping[str, Any]) -> str:
@@ -147,13 +147,16 @@ class Results:
 
     def put(self, configuration: str, seed: int, values: Values) -> None:
         """Add a record, in place of an older one of this configuration and seed."""
+        self.put_all({configuration: values}, seed)
+
+    def put_all(self, rows: Mapping[str, Values], seed: int = 0) -> None:
+        """Add a record for each configuration in one step."""
         with self._locked():
-            key = (configuration, seed)
             found = self._checked()
-            kept = [r for r in found["records"] if (r["configuration"], r["seed"]) != key]
-            record = {"configuration": configuration, "seed": seed, "values": dict(values)}
+            kept = [r for r in found["records"] if r["configuration"] not in rows or r["seed"] != seed]
+            kept += [{"configuration": n, "seed": seed, "values": dict(v)} for n, v in rows.items()]
             commands = dict.fromkeys([*found["commands"], *([self.command] if self.command else [])])
-            self._write([*kept, record], list(commands))
+            self._write(kept, list(commands))
 
     def configurations(self) -> list[str]:
         """Return the configurations that have a record, in the order of their first ones."""
@@ -195,7 +198,7 @@ class Results:
         """Return what the file says, or refuse it as that of something else."""
         data = _data(self.path)
         if (data["experiment"], data["settings"]) != (self.experiment, self.settings):
-            rule = f"it belongs to {data['experiment']} with settings {json.dumps(data['settings'])}"
+            rule = f"belongs to {data['experiment']} with settings {json.dumps(data['settings'])}"
             raise InputError("file of results", str(self.path), rule, WAY_OUT)
         return data
 

@@ -135,6 +135,6 @@ def ladder(renders: Mapping[int, Sequence[tuple[Floats, Floats]]], exposure_stop
         rungs[spp] = float(np.mean(errors))
     values = tuple(rungs.values())
     if any(not a > b for a, b in pairwise(values)):
-        rule = "they must fall as the samples rise"
+        rule = "must fall as the samples rise"
         raise InputError("errors of renders", values, rule, "use more frames, or rungs farther apart")
     return Ladder(tuple(rungs), values)

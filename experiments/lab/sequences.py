@@ -22,9 +22,9 @@ import numpy as np
 
 from wamnet.cli.common.terminal import progress
 from wamnet.cli.files.outputs import replacing
-from wamnet.kernels.run.frame_plan import version
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
+from wamnet.models.data.frame_plan import version
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.light import history
 from wamnet.refimpl.light.history import Limits

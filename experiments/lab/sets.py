@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from wamnet.kernels.run.draws import Draw
-from wamnet.kernels.run.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
-from wamnet.kernels.run.geometry import Comparison, Shown, compare
+from wamnet.models.data.draws import Draw
+from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN, Request, frame_draws
+from wamnet.models.data.geometry import Comparison, Shown, compare
 from wamnet.refimpl.light.variation import Ranges
 
 from .frames import Shot

@@ -3,7 +3,7 @@
 1. A table is a function of the records in `TABLES` [`lab/texts.py`]; most are made by [`study`], from the
    columns that the experiment itself prints, or by [`as_printed`], from what a program has printed.
 2. A figure that is computed from several values is a function in `FIGURES`; one that is a value needs none.
-3. A plot is a [`plots.Plot`] in `PLOTS`.
+3. Plots are in lab/gallery.py.
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ from typing import Any
 
 from wamnet.refimpl.errors import InputError
 
-from . import plots, printed, same, tables
+from . import printed, same, support, tables
 from .intervals import paired
-from .plots import Plot
 from .records import Records
 from .results import PER_FRAME, Results, number
-from .speeds import TableOf, draw_speed, draw_speed_short, speed_against_error, speed_readme, speed_short
+from .speeds import TableOf, speed_against_error, speed_short
 from .tables import Column
 
 
@@ -73,13 +72,13 @@ QUALITY = (
     Column("psnr", "PSNR, dB", 2),
     Column("ssim", "SSIM", 3),
     Column("flip", "FLIP", 3),
-    Column("spp", "worth, spp", 0),
+    Column("spp", "equivalent spp", 0),
 )
 """Columns of the scores of pictures."""
 
 
 def quality(name: str, split: str = "test", only: Sequence[str] = (), record: str = "quality") -> TableOf:
-    """Return the rows of a set's frames, inside of its ranges or outside; all rows unless some are named."""
+    """Return the rows of a set's frames, inside its ranges or outside; all rows unless some are named."""
 
     def made(records: Records) -> str:
         module, found = importlib.import_module("quality"), records[record]
@@ -87,7 +86,7 @@ def quality(name: str, split: str = "test", only: Sequence[str] = (), record: st
         shown = {key: text for key, text in texts.items() if found.summary(key, "psnr")}
         if not shown:
             raise InputError(
-                f"record {record}", f"{name}, {split}", "it has no rows of these frames", "make them"
+                f"record {record}", f"{name}, {split}", "has no rows of these frames", "make them"
             )
         columns = [column for column in QUALITY if any(found.summary(key, column.value) for key in shown)]
         return tables.table(found, intervals(found, columns), shown)
@@ -126,14 +125,14 @@ README_ROWS = ("input", "oidn-color", "oidn-prefiltered1", "oidn-clean16", "best
 """Rows of `quality` that the README shows."""
 
 AHEAD = (
-    ("minicubes", "best-16", "camera moves"),
-    ("minicubes", "page-16", "the same, the page's inputs and steps"),
-    ("minicubes", "page48-16", "the same, 48 neurons a layer"),
-    ("minicubes-page", "shipped", "camera all around the front, lamps of any hue: the network that ships"),
-    ("minicubes-page", "smooth-page-16", "the same cameras and lamps, colour smoothed"),
-    ("cornell", "best-16", "`cornell`, camera moves"),
-    ("glossy", "lit-16", "`glossy`, camera moves, features past mirrors and glass for both"),
-    ("daylight", "sun-16", "`daylight`, the same; ours sees where the sun is"),
+    ("minicubes", "best-16", "`minicubes`, preset `best`"),
+    ("minicubes", "page-16", "`minicubes`, inputs and steps of the web page"),
+    ("minicubes", "page48-16", "the same, 48 neurons per layer"),
+    ("minicubes-page", "shipped", "`minicubes`, any front camera, any light hue: the bundled network"),
+    ("minicubes-page", "smooth-page-16", "the same cameras and lights, filtered colour"),
+    ("cornell", "best-16", "`cornell`, preset `best`"),
+    ("glossy", "lit-16", "`glossy`, preset `mirrors`; both get specular features"),
+    ("daylight", "sun-16", "`daylight`, preset `sky`; both get specular features"),
 )
 """Sets and rows that docs/results.md compares with Open Image Denoise, given the same features."""
 
@@ -203,11 +202,11 @@ PAPER_ROWS = (
     *("input", "dncnn", "dncnn-shrunk", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own"),
     *("wamnet-short", "wamnet-best", "pix2pix", "svgf", "nlm", "oidn", "render30"),
 )
-"""Rows of Table 1 that docs/results.md shows."""
+"""Rows of Table 1 that docs/results/paper.md shows."""
 
 
 def table1_readme(records: Records) -> str:
-    """Return the rows of Table 1 of docs/results.md, beside what the paper prints."""
+    """Return the rows of Table 1 of docs/results/paper.md, beside what the paper prints."""
     found, rows = records["table1"], importlib.import_module("baselines.rows").ROWS
     cells = []
     for row in (row for row in PAPER_ROWS if row in found.configurations()):
@@ -230,7 +229,7 @@ def table1_readme(records: Records) -> str:
         "MSE modulo 256; the paper",
         "SSIM; the paper",
         "FLIP",
-        "worth",
+        "equivalent spp",
     ]
     return tables.markdown(heads, cells)
 
@@ -288,17 +287,17 @@ def generalisation(records: Records) -> str:
 
 
 BENCH = {
-    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer from spectra",
+    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer by FFT",
     "opencl:tile16": "OpenCL, PoCL, `tile16`: register tiles",
-    "opencl:plain": "OpenCL, PoCL, `plain`: the kernel to be read",
+    "opencl:plain": "OpenCL, PoCL, `plain`: the human-readable kernel",
     "opengl:inlined": "OpenGL, llvmpipe, `inlined`",
     "torch.compile": "`torch.compile`",
     "torch": "PyTorch, eager",
     "onnxruntime": "ONNX Runtime",
-    "oidn:fast": "Open Image Denoise, fast; another denoiser",
+    "oidn:fast": "Open Image Denoise, fast (another network)",
     "oidn:high": "Open Image Denoise, high",
     "c:tile16": "C, GCC, `tile16`",
-    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: products of bytes",
+    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: byte products",
     "c:dot16:whole8": "C, GCC, integers, `dot16`",
     "onnxruntime:int8": "ONNX Runtime, 8 bits",
     "openvino:int8": "OpenVINO, 8 bits",
@@ -338,7 +337,7 @@ def train_speed(records: Records) -> str:
     for at, preset in ((1, "paper"), (2, "short")):
         mine = [r["values"] for r in found.records() if r["values"]["table"] == at]
         steps = list(mine[0])[-1]
-        heads += [f"`{preset}`, ms a step", f"all {steps}"]
+        heads += [f"`{preset}`, ms per step", f"all {steps}"]
         for row in mine:
             rows.setdefault(names[row["by"]], []).extend([row["ms a step"], row[steps]])
     return tables.markdown(heads, [[name, *row] for name, row in rows.items()])
@@ -416,106 +415,6 @@ def demo_runs(records: Records) -> str:
     return tables.table(found, columns, names, "executor")
 
 
-# ---- plots ----------------------------------------------------------------------------------------------
-
-
-def draw_quality(records: Records) -> Any:
-    """Draw the PSNR of each denoiser on the mini cubes, inside of the ranges and outside, on one scale.
-
-    The noisy input is left out: it is so far off that no interval could be seen beside it.
-    """
-    module, found = importlib.import_module("quality"), records["quality"]
-    figure, axes = plots.axes(2, (11.0, 3.6))
-    for axis, (split, text) in zip(axes, module.SPLITS.items(), strict=True):
-        shown = {}
-        for row, kind in module.ROWS.items():
-            at = found.interval(module.configuration("minicubes", split, row), "psnr")
-            if at is not None and (kind.quality or kind.recipe):
-                shown[kind.text] = (at.mean, at.low, at.high)
-        plots.bars(axis, shown, f"PSNR {text}, dB")
-    axes[1].sharex(axes[0])
-    axes[1].sharey(axes[0])
-    axes[1].tick_params(labelleft=False)
-    axes[0].autoscale(axis="x")
-    return figure
-
-
-def draw_ablations(records: Records) -> Any:
-    """Draw the PSNR against window, width, depth and training frames."""
-    factors = ("window", "width", "depth", "frames")
-    found = records["ablations"]
-    figure, axes = plots.axes(len(factors), (10.0, 2.8))
-    for axis, factor in zip(axes, factors, strict=True):
-        names = {
-            float(name.partition(" = ")[2]): name
-            for name in found.configurations()
-            if name.startswith(f"{factor} = ")
-        }
-        line = plots.points(found, dict(sorted(names.items())), "psnr")
-        plots.lines(axis, {factor: line}, (factor, "PSNR, dB"), log=True)
-    return figure
-
-
-def draw_learning_curve(records: Records) -> Any:
-    """Draw the PSNR against the seconds of training."""
-    found, shown = records["learning_curve"], {}
-    for name in found.configurations():
-        curves = zip(*found.of(name, "curve"), strict=False)
-        shown[name] = [
-            (
-                sum(p["seconds"] for p in at) / len(at),
-                sum(p["psnr"] for p in at) / len(at),
-                min(p["psnr"] for p in at),
-                max(p["psnr"] for p in at),
-            )
-            for at in curves
-        ]
-    figure, (axis,) = plots.axes(1, (6.0, 3.5))
-    plots.lines(axis, shown, ("seconds of training", "PSNR on unseen times, dB"), log=True)
-    return figure
-
-
-def pictures(records: Records) -> str:
-    """Return all plots, and pictures of frames, that are there, as the page of the results shows them."""
-    made = []
-    for name, plot in PLOTS.items():
-        if plots.ready(plot, records):
-            made.append(f"![{plot.caption}](images/{name}.svg)\n\n*{plot.caption}*\n")
-    for name in records.names():
-        for path in records[name].data().get("pictures", {}):
-            # The file says all commands that made the records; their program is what drew the picture.
-            program = " ".join(records[name].data()["commands"][0].split()[:2])
-            made.append(f"![Pictures of `{name}`]({path.removeprefix('docs/')})\n\n*`{program}`*\n")
-    return "\n".join(made) or "None of the records in git has a picture yet.\n"
-
-
-PLOTS: Mapping[str, Plot] = {
-    "quality": Plot(
-        draw_quality,
-        ("quality",),
-        "The mini cubes, camera and time moving: means over poses and seeds, and 95 % intervals.",
-    ),
-    "ablations": Plot(
-        draw_ablations,
-        ("ablations",),
-        "What quality depends on: means over poses and seeds, and 95 % intervals.",
-    ),
-    "learning-curve": Plot(
-        draw_learning_curve, ("learning_curve",), "Learning curves: means of three seeds, least and largest."
-    ),
-    "speed-against-error": Plot(
-        draw_speed("bench-minicubes"),
-        ("bench-minicubes",),
-        "Milliseconds a frame against PSNR lost and against the bound of the error: the mini cubes.",
-    ),
-    "speed-short": Plot(
-        draw_speed_short("bench-minicubes"),
-        ("bench-minicubes",),
-        "Milliseconds per frame, with PSNR and the bound on the rounding error of every frame.",
-    ),
-}
-"""The plots by the names of their files."""
-
 FIGURES: Mapping[str, Callable[[Records], str]] = {
     "ahead-of-oidn": ahead("minicubes", ours="page-16"),
     "ahead-of-oidn-lamps": ahead("minicubes-page", ours="shipped"),
@@ -540,6 +439,8 @@ AS_PRINTED = (
     "course", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
+SHOWN_BY_MODULE = ("blender", "domain", "house3")
+"""Records whose module has a function `rows` that makes the table."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
     "bench-pipeline": whole_pictures,
@@ -551,7 +452,7 @@ TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
-    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in ("blender", "domain")},
+    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in SHOWN_BY_MODULE},
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,
@@ -563,7 +464,6 @@ TABLES: Mapping[str, TableOf] = {
     "lamps": study("lamps", "`minicubes`, camera at rest"),
     "learning-curve": learning_curve,
     "losses": study("losses", "loss"),
-    "pictures": pictures,
     "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-lamps": quality("minicubes-page"),
@@ -586,8 +486,8 @@ TABLES: Mapping[str, TableOf] = {
     "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
     "speed-against-error": speed_against_error("bench-minicubes"),
-    "speed-readme": speed_readme("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),
+    "support": support.matrix,
     "table1": table1,
     "table1-readme": table1_readme,
     "train-speed": train_speed,

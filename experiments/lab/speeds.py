@@ -1,4 +1,4 @@
-"""Tables of speed against error, from a record of `wamnet bench`: all rows, and those for first readers."""
+"""Tables of speed against error, from a record of `wamnet bench`: all rows, and a few for first readers."""
 
 from __future__ import annotations
 
@@ -22,30 +22,13 @@ def speed_against_error(record: str) -> TableOf:
     return lambda records: bench_report.table(bench_of(records[record]))
 
 
-def speed_readme(record: str) -> TableOf:
-    """Return the rows of [`speed_against_error`] for a first reader: front, whole networks, peers."""
-    whole, slow = {"whole", "exact", "native"}, ("opengl", "numpy", "group", "tile4", "tile8", "vector")
-
-    def table(records: Records) -> str:
-        heads, line, *rows = speed_against_error(record)(records).splitlines()
-        cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
-        kept = [
-            row
-            for row, (form, way, *_) in zip(rows, cells, strict=True)
-            if form.endswith("*") or way == "–" or (form in whole and not any(name in way for name in slow))
-        ]
-        return "\n".join([heads, line, *kept])
-
-    return table
-
-
 SPEED_SHORT = {
     ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
     ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
     ("whole", "opencl fft32"): "wamnet, FFT (`fft32`)",
     ("whole", "c fft32"): "wamnet, FFT (`fft32`) in C, by GCC",
     ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
-    ("exact", "opencl tile16"): "wamnet, bit-identical everywhere (profile `exact`)",
+    ("whole8", "opencl dot16"): "wamnet, bit-identical everywhere (`whole8`)",
     ("whole", "opencl plain"): "wamnet, the human-readable kernel (`plain`)",
     ("torch.compile", "–"): "the same network in `torch.compile`",
     ("onnxruntime", "–"): "the same network in ONNX Runtime",
@@ -58,14 +41,15 @@ SPEED_COLUMNS = ("ms", "PSNR, dB", "largest error", "bound, this frame", "bound,
 """Columns of [`speed_against_error`] that the README shows."""
 
 
-def text_checked(form: str, way: str, bound: str) -> str:
-    """Return whether `wamnet certify` reads a row's text too: of kernels that have a certificate."""
+def source_verified(form: str, way: str, bound: str) -> str:
+    """Return whether `wamnet certify` verifies a row's source too: of kernels that have a certificate."""
     if way == "–":
         return way
     target, schedule = way.split()
     profile = form if form in PROFILES else "ieee"
     kind = {"target": target, "schedule": {"name": schedule}, "profile": {"name": profile}}
-    read = is_read({**kind, "sine_arguments": [None], "bound": {"output": [1.0]}})
+    rounds = float(not bound.startswith("0.0"))
+    read = is_read({**kind, "sine_arguments": [None], "bound": {"output": [rounds]}})
     return "yes" if bound.endswith("†") and read else "no"
 
 
@@ -79,14 +63,14 @@ def short_rows(records: Records, record: str) -> list[list[str]]:
         form, way = cells["form"].removesuffix(" *"), cells["executor, schedule"]
         name = SPEED_SHORT.get((form, way))
         if name and all(name != other for other, *_ in shown):
-            checked = text_checked(form, way, cells[SPEED_COLUMNS[-1]])
+            checked = source_verified(form, way, cells[SPEED_COLUMNS[-1]])
             shown.append([name, way, *(cells[column] for column in SPEED_COLUMNS), checked])
     return shown
 
 
 def speed_short(record: str) -> TableOf:
     """Return these rows as a table."""
-    heads = ["by", "schedule", *SPEED_COLUMNS, "text checked"]
+    heads = ["by", "schedule", *SPEED_COLUMNS, "source verified"]
     return lambda records: tables.markdown(heads, short_rows(records, record))
 
 

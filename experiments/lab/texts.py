@@ -11,7 +11,9 @@
    value, after it how Python writes a number; `low` or `high` before the value is an end of its interval
    [`figure`]. `losses@machine` is what the record was measured on, `losses@numpy` a version
    [`fact`]. One word in place of the three is a function of the records [`shown.FIGURES`].
-3. What needs a record that is still to be made stays as it was typed [`Filler.text`], as long as
+3. No line begins with the mark of a figure, where Markdown would tear the paragraph apart: the figure goes
+   to the end of the line before it [`joined`].
+4. What needs a record that is still to be made stays as it was typed [`Filler.text`], as long as
    `pending.txt` names the record.
 """
 
@@ -34,6 +36,14 @@ TABLE = re.compile(
 
 FIGURE = re.compile(r"<!--= (?P<name>[^<>]+?) -->(?P<old>[^<>]*)<!--/-->")
 """A figure in a sentence; its text may continue on the next line."""
+
+LEADING = re.compile(
+    r"(?<=\S)[ ]*\n(?P<indent>(?:> )?[ ]*)(?P<figure><!--= [^<>]+? -->[^<>]*<!--/-->[^\s<]*)(?P<gap>[ ]*)"
+)
+"""A figure at the start of a line of a paragraph, and the punctuation behind it."""
+
+TORN = re.compile(r"^(?:> )?[ ]*(?:[*-] |\d+\. )?<!--[=/].*", re.MULTILINE)
+"""A line that begins with a mark: Markdown takes it for a block of HTML, and ends the paragraph before it."""
 
 MARK = re.compile(r"<!-- table:|<!--=|<!--/-->")
 """What may only be there as a part of the two above."""
@@ -59,7 +69,7 @@ def figure(records: Records, name: str, figures: Mapping[str, Callable[[Records]
     path, _, form = name.rpartition(":")
     parts = path.split("/")
     if len(parts) != 3:
-        rule = "it must be record/configuration/value:format, or the name of a function in lab/shown.py"
+        rule = "must be record/configuration/value:format, or the name of a function in lab/shown.py"
         raise InputError("figure", name, rule, "correct it")
     record, configuration, value = parts
     end, _, rest = value.partition(" ")
@@ -80,6 +90,17 @@ def fact(records: Records, record: str, key: str) -> str:
     return str(data["versions"][key])
 
 
+def joined(text: str) -> str:
+    """Return a text whose figures at the start of a line are at the end of the line before it."""
+
+    def moved(match: re.Match[str]) -> str:
+        return f" {match['figure']}" + (f"\n{match['indent']}" if match["gap"] else "")
+
+    while (made := LEADING.sub(moved, text)) != text:
+        text = made
+    return text
+
+
 @dataclass
 class Filler:
     """Writes texts from records, and remembers what was shown and what was missing."""
@@ -98,7 +119,11 @@ class Filler:
             raise InputError(
                 "mark in a text", rest, "a table or figure has a beginning and an end", "close it"
             )
-        return FIGURE.sub(self._figure, TABLE.sub(self._table, text))
+        made = joined(FIGURE.sub(self._figure, TABLE.sub(self._table, text)))
+        if torn := TORN.search(made):
+            rule = "a line that begins with a mark ends its paragraph"
+            raise InputError("mark in a text", torn[0][:40], rule, "begin with a word")
+        return made
 
     def _table(self, match: re.Match[str]) -> str:
         """Return a block, each of its lines in the quotation that it is a part of."""

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from wamnet.cli.commands.train import checkpoint_path, fit
 from wamnet.cli.files.outputs import write_text
-from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import denoise_on, open_executor, train_on
 from wamnet.kernels.devices.executor import Executor
+from wamnet.models.model_file import load_checkpoint, load_model
 from wamnet.refimpl.frame import Floats, Frame
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise

@@ -72,7 +72,7 @@ def paths() -> list[str]:
     """Return the modules of the reference: what requests go through, without the words of errors."""
     found = sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "refimpl").rglob("*.py"))
     named = [p for p in found if not p.endswith("__init__.py") and p != "refimpl/errors.py"]
-    return [*named, "compiler/model_file.py"]
+    return [*named, "models/model_file.py"]
 
 
 def dotted(path: str) -> str:

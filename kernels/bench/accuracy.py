@@ -22,7 +22,7 @@ from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
 from ...compiler.plan import Plan, plan_program
 from ...compiler.proof import bounds
-from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN, windows
 from ...refimpl import metrics
 from ...refimpl.frame import Frame

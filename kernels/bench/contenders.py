@@ -3,7 +3,7 @@
 1. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
 2. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
-3. Each peer has a file of its own, `peer_*.py`; a new one is a file and a line in `PEERS`.
+3. Peers come from another distribution, where it is installed [`peers.py`].
 """
 
 from __future__ import annotations
@@ -15,27 +15,22 @@ from functools import partial
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
-from ...compiler.schedules.emit import kernel_gather
-from ...compiler.schedules.emit_dot import Dot
-from ...compiler.schedules.schedules import PLAIN
+from ...compiler.schedules.common import kernel_gather
+from ...compiler.schedules.schedules import PLAIN, Dot
 from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
+from . import peers
 from .contender import FULL, IEEE, NO_CACHE, Contender, Opened, Tools, Variant
 from .cost import fused, sines_of
-from .peers import peer_halide, peer_oidn, peer_onnxruntime, peer_openvino, peer_tinygrad, peer_torch
 from .workload import Given
-
-EXACT = "exact"
-"""Profile whose sums have one order: spectra cannot have it."""
 
 VARIANTS: tuple[Variant, ...] = (
     Variant("sine7", "sines of degree 7", profile="ieee-sine7"),
     Variant("sine9", "sines of degree 9", profile="ieee-sine9"),
     Variant("sine5", "sines of degree 5", profile="ieee-sine5"),
     Variant("native", "the target's own sine", profile="native"),
-    Variant("exact", "the same bits on every executor", profile="exact"),
 )
 """Forms of the network that need no training; what is cut away is trained first [`of_machine`]."""
 
@@ -48,16 +43,6 @@ CACHES = {
     "opengl": "Mesa keeps shaders on disk, ~/.cache/mesa_shader_cache",
 }
 """What the drivers of an executor keep of what they have compiled."""
-
-PEERS: tuple[Contender, ...] = (
-    *peer_torch.CONTENDERS,
-    *peer_onnxruntime.CONTENDERS,
-    *peer_openvino.CONTENDERS,
-    *peer_tinygrad.CONTENDERS,
-    *peer_halide.CONTENDERS,
-    *peer_oidn.CONTENDERS,
-)
-"""What others make."""
 
 QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
@@ -129,7 +114,7 @@ def of_machine(
             found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
         if name != "numpy" and not quick:
             found += _of_integers(name, suits)
-    return [*found, *(peer for peer in PEERS if not quick or peer.name in QUICK)]
+    return [*found, *(peer for peer in peers.contenders() if not quick or peer.name in QUICK)]
 
 
 def _of_integers(executor: str, suits: str) -> list[Contender]:
@@ -142,12 +127,12 @@ def _of_integers(executor: str, suits: str) -> list[Contender]:
 def _varied(executor: str, suits: str, variants: Sequence[Variant]) -> list[Contender]:
     """Return the kernels of variants: with the schedule that suits, and the direct one where that is another.
 
-    A first layer in two passes, and sums in one order, have the direct one only.
+    A first layer in two passes has the direct one only.
     """
     direct, found = _of_two_passes(executor, suits), []
     for variant in variants:
-        both = not variant.rank and variant.profile != EXACT
-        found += [kernel(executor, each, variant) for each in dict.fromkeys([suits] * both + [direct])]
+        both = [] if variant.rank else [suits]
+        found += [kernel(executor, each, variant) for each in dict.fromkeys([*both, direct])]
     return found
 
 
@@ -165,8 +150,6 @@ def chosen(contenders: Sequence[Contender], only: Sequence[str], executors: Sequ
     for pattern in only:
         if not any(fnmatchcase(each.name, pattern) for each in contenders):
             names = ", ".join(each.name for each in contenders)
-            raise InputError(
-                "name of a contender", pattern, f"it matches none of {names}", "use one of these"
-            )
+            raise InputError("name of a contender", pattern, "matches none", f"choose one of {names}")
     named = [each for each in contenders if not only or any(fnmatchcase(each.name, p) for p in only)]
     return [each for each in named if not executors or each.executor in (None, *executors)]

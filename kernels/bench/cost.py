@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Program
-from ...compiler.schedules.emit import kernel_gather, output_channels
+from ...compiler.schedules.common import kernel_gather, output_channels
 from ...refimpl.network.activation import SINE
 from ...refimpl.network.dataset import channels_of
 from ...refimpl.network.denoise import Model

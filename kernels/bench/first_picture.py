@@ -16,12 +16,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...compiler.model_file import load_model, save_model
+from ...models.data.scene_source import scene_source
+from ...models.model_file import load_model, save_model
 from ...refimpl.network.denoise import Model
 from ..cache import FOLDER_VARIABLE
 from ..devices.registry import open_executor
 from ..run.pipeline import Pipeline
-from ..run.scene_source import scene_source
 from . import first_run
 
 CACHES = (*first_run.CACHES, FOLDER_VARIABLE)

@@ -19,7 +19,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...compiler.model_file import load_model, save_model
+from ...models.model_file import load_model, save_model
 from ...refimpl.network.denoise import Model
 from .contender import Tools
 from .contenders import chosen, of_machine

@@ -21,12 +21,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ...compiler.compile import compile_plan
 from ...compiler.variants import plan_model
+from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ...refimpl.network import dataset, siren
@@ -37,10 +38,7 @@ from ..measure import in_turns
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
-from ..run.scene_source import scene_source
 from ..run.tune import choose
-from .peers.moving import Maker, MitsubaOidn
-from .peers.peer_cycles import Cycles
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -58,8 +56,24 @@ PAUSE_S = 0.1
 MOVING = "one pipeline, moving"
 """What others are compared with."""
 
-PEERS: Mapping[str, Callable[[Scene, int], Maker]] = {"mitsuba": MitsubaOidn, "cycles": Cycles}
-"""Other makers of whole pictures, which are opened for a scene and a size."""
+PEERS = ("mitsuba", "cycles")
+"""Other makers of whole pictures [`peers.Table.makers`]."""
+
+Ways = Mapping[str, Callable[[], float | None]]
+
+
+class Maker(Protocol):
+    """What makes pictures of a scene that moves."""
+
+    @property
+    def about(self) -> str:
+        """Return in words what it is, with versions."""
+
+    def ways(self, shots: Sequence[Scene]) -> Ways:
+        """Return what is measured, by name; pictures show the scenes one after another."""
+
+    def close(self) -> None:
+        """Give back what it holds."""
 
 
 def moments(name: str) -> list[Scene]:

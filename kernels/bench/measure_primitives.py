@@ -37,9 +37,10 @@ from ...refimpl.light.scene import (
     primitives,
 )
 from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
+from . import peers
 from .measure_render import BY_HAND, VARIANT
-from .peers import peer_mitsuba
 
 FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
 """What primitives become, by the name of the form; a tree is there where it seems to pay."""
@@ -91,21 +92,12 @@ def compare(executor: Executor, scene: Scene, part: Part, repeats: int) -> list[
 def peer(name: str, scene: Scene, part: Part, repeats: int) -> list[Kernel]:
     """Return a peer on a scene; what it builds is built by the first picture."""
     start = time.perf_counter()
-    form, follow = _mitsuba(scene, part) if name == "mitsuba" else _by_hand(name, scene, part)
+    render = peers.table().renderers[name](scene, part.width, part.rows, Settings())
+    form, follow = VARIANT if name == "mitsuba" else "by hand", partial(render, part.samples, 0)
     traced = time.perf_counter()
     follow()
     made = Kernel(scene.name, form, "", follow, traced - start, time.perf_counter() - traced)
     return timed([made], part, repeats)
-
-
-def _mitsuba(scene: Scene, part: Part) -> tuple[str, Callable[[], Any]]:
-    mi = peer_mitsuba.open_mitsuba(VARIANT)
-    loaded = mi.load_dict(peer_mitsuba.export(mi, scene, part.width, part.rows, Settings()))
-    return VARIANT, partial(peer_mitsuba.render, mi, loaded, part.samples, 0)
-
-
-def _by_hand(name: str, scene: Scene, part: Part) -> tuple[str, Callable[[], Any]]:
-    return "by hand", partial(BY_HAND[name](scene, part.width, part.rows).render, part.samples, 0)
 
 
 def timed(kernels: list[Kernel], part: Part, repeats: int) -> list[Kernel]:

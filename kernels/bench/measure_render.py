@@ -17,7 +17,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,14 +26,14 @@ from typing import Any
 
 import numpy as np
 
+from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ..devices.registry import open_executor
 from ..measure import environment
 from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
-from ..run.scene_source import scene_source
-from .peers import peer_embree, peer_mitsuba, peer_numba
+from . import peers
 
 Frames = Callable[[int], Any]
 """From a seed to the colours (H, W, 3) of a frame."""
@@ -44,10 +44,7 @@ CACHES = {"POCL_CACHE_DIR": "pocl", "MESA_SHADER_CACHE_DIR": "mesa", "HOME": "ho
 BY = ("numpy", "opencl", "opengl", "c", "mitsuba", "embree", "numba")
 """What can render."""
 
-BY_HAND: Mapping[str, type[peer_embree.Embree | peer_numba.Numba]] = {
-    "embree": peer_embree.Embree,
-    "numba": peer_numba.Numba,
-}
+BY_HAND = ("embree", "numba")
 """Path tracers that were written as peers, for scenes of matte surfaces."""
 
 VARIANT = "llvm_ad_rgb"
@@ -91,9 +88,9 @@ def ways_of(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> l
                 text = f"numpy, {count} process{'es' if count > 1 else ''}"
                 ways.append(Way(name, text, partial(_reference, scene, job, count)))
         elif kind == "mitsuba":
-            ways.append(Way(name, f"mitsuba, {VARIANT}", partial(_peer, scene, job)))
+            ways.append(Way(name, f"mitsuba, {VARIANT}", partial(_peer, kind, scene, job)))
         elif kind in BY_HAND:
-            ways.append(Way(name, f"{kind}, by hand", partial(_by_hand, kind, scene, job)))
+            ways.append(Way(name, f"{kind}, by hand", partial(_peer, kind, scene, job)))
         else:
             ways.append(Way(name, kind, partial(_kernel, kind, scene, job)))
     return ways
@@ -151,14 +148,7 @@ def _kernel(name: str, scene: Scene, job: Job) -> Frames:
     return lambda seed: render_on(executor, scene, replace(job, seed=seed)).frame["color"]
 
 
-def _peer(scene: Scene, job: Job) -> Frames:
-    """Return how Mitsuba makes frames."""
-    mi = peer_mitsuba.open_mitsuba(VARIANT)
-    loaded = mi.load_dict(peer_mitsuba.export(mi, scene, job.width, job.height, job.settings))
-    return lambda seed: peer_mitsuba.render(mi, loaded, job.spp, seed)
-
-
-def _by_hand(kind: str, scene: Scene, job: Job) -> Frames:
-    """Return how a path tracer by hand makes frames."""
-    peer = BY_HAND[kind](scene, job.width, job.height, job.settings)
-    return lambda seed: peer.render(job.spp, seed)
+def _peer(kind: str, scene: Scene, job: Job) -> Frames:
+    """Return how another renderer makes frames."""
+    render = peers.table().renderers[kind](scene, job.width, job.height, job.settings)
+    return lambda seed: render(job.spp, seed)

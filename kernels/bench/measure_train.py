@@ -23,8 +23,7 @@ from ...refimpl.frame import Frame
 from ...refimpl.network import dataset, train
 from ...refimpl.network.train import Recipe
 from ..devices.registry import open_executor
-from . import workload
-from .peers import peer_torch
+from . import peers, workload
 
 SGEMM_SIZE = 2048
 """Rows and columns of the two matrices whose product is the measure: large enough for BLAS's full rate."""
@@ -131,11 +130,12 @@ def _opencl(recipe: Recipe, pairs: Sequence[Pair]) -> Way:
 
 def _torch(recipe: Recipe, pairs: Sequence[Pair]) -> Way:
     """Return PyTorch's steps, on windows gathered by the reference or from a pool."""
+    trainer = peers.table().trainer
     data, state, pool = _begun(recipe, pairs)
     if pool is not None:
         gathered = dataset.examples_at(data, *pool)
-        return peer_torch.trainer(recipe, state.siren, partial(train.draw_picks, recipe), gathered)
-    return peer_torch.trainer(
+        return trainer(recipe, state.siren, partial(train.draw_picks, recipe), gathered)
+    return trainer(
         recipe,
         state.siren,
         lambda step: dataset.examples_at(data, *train.draw_batch(recipe, step, data, None)),

@@ -98,5 +98,5 @@ def filled(frame: Frame, size: int) -> Frame:
 def check_size(size: int) -> None:
     """Refuse a size of which no picture is made."""
     if not 1 <= size <= LARGEST_PX:
-        rule = f"it must be from 1 to {LARGEST_PX} pixels"
-        raise InputError("size of the picture", size, rule, "for example --size 1024")
+        rule = f"must be from 1 to {LARGEST_PX} pixels"
+        raise InputError("size of the image", size, rule, "for example --size 1024")

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import (
+from ...compiler.kernel.interface import (
     DENOISE,
     ENCODE,
     FOLLOW,
@@ -43,8 +43,9 @@ from ...compiler.languages.interface import (
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .. import cache
 from ..folders import discard, new_temporary
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Denoiser, Executor, Kernel, Memory, is_denoiser, words
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
 from .images import widest
+from .kernel import Denoiser, Kernel, Memory, is_denoiser, words
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
@@ -294,7 +295,7 @@ class CExecutor(Executor):
         """Refuse a kernel whose arrays take so many bytes a pixel."""
         if used > PRIVATE_BYTES:
             raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes a pixel: at most {PRIVATE_BYTES} fit "
+                f"{self.device}: arrays take {used} bytes per pixel; at most {PRIVATE_BYTES} fit "
                 "a thread's stack; use narrower layers, or executor numpy"
             )
 
@@ -339,10 +340,10 @@ class CExecutor(Executor):
         most = widest(artifact)
         if size[0] * size[1] * most >= INDEX_LIMIT:
             raise InputError(
-                "size of the picture for C",
+                "size of the image for C",
                 f"{size[1]} x {size[0]} with {most} channels",
                 f"one image must hold fewer than {INDEX_LIMIT} numbers",
-                "split the picture, or use executor numpy",
+                "split the image, or use executor numpy",
             )
 
     def _start(

@@ -7,9 +7,10 @@
     smooth   layers -> edge-avoiding filter -> image [planes.py]
     follow   first hits, last picture, colour -> history -> this picture [planes.py]
 
-These are written once, here. A device makes a kernel ready [`Executor._prepare`] and starts it [`_start`].
-One with memory of its own also makes memory, with a content or without one [`_store`, `_memory`], copies from
-it [`_fetch`], and gives it back [`_release`]; others work on the host's.
+The first three are written once, here; the others are functions of an executor. A device makes a kernel ready
+[`Executor._prepare`] and starts it [`_start`]. One with separate memory also makes memory, with a content or
+without one [`_store`, `_memory`], copies from it [`_fetch`], and gives it back [`_release`]; others work on
+the host's.
 
 `build` is idempotent and does all that can be done before the pixels are known, the driver's own delayed
 compilation included: it runs the kernel once on a few pixels. `run` copies the images to the device, runs,
@@ -23,38 +24,34 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, TypeGuard, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import (
+from ...compiler.kernel.interface import (
     DENOISE,
     ENCODE,
     IMAGE,
+    LIGHT,
     PATH,
     PLAIN,
+    PRIMITIVES,
+    READ,
     RESULT,
     SCENE_NUMBERS,
     SUMS,
-    UNSIGNED,
-    Interface,
 )
 from ...refimpl.errors import InputError
-from ...refimpl.network.dataset import known
 from .images import Images, black, checked
+from .kernel import Denoiser, Kernel, Memory, Part, Size, numbers_for, plane_integers, plane_shape, shapes
 
 if TYPE_CHECKING:
     from ...compiler.scenes.encode_kernel import EncodeArtifact
     from ...compiler.scenes.path_kernel import PathArtifact
     from ...compiler.scenes.plane_kernel import PlaneArtifact
-    from ...compiler.scenes.smooth_kernel import SmoothKernels
     from ...compiler.training.step_kernel import StepKernel
-    from .passes import Passes
-
-Size = tuple[int, int]
-"""Height and width."""
 
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
@@ -67,105 +64,12 @@ INDEX_LIMIT = 2**31
 """Numbers of an image must be fewer where a kernel's indices are `int`."""
 
 
-class Kernel(Protocol):
-    """A kernel of any role, as a device sees it."""
-
-    @property
-    def target(self) -> str:
-        """Return the name of the target."""
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names the kernel."""
-
-    @property
-    def source(self) -> str:
-        """Return the source."""
-
-    @property
-    def entry_point(self) -> str:
-        """Return the name of the kernel's function."""
-
-    @property
-    def interface(self) -> Interface:
-        """Return the arrays and integers that the kernel takes."""
-
-    @property
-    def manifest(self) -> Mapping[str, Any]:
-        """Return the manifest, as JSON's types."""
-
-    @property
-    def kernels(self) -> tuple[Kernel, ...]:
-        """Return the kernels in the order in which they run: this one, or two passes."""
-
-
-class Denoiser(Kernel, Protocol):
-    """The kernel of a network: it fills windows from images, and writes so many channels."""
-
-    @property
-    def weights(self) -> NDArray[np.float32]:
-        """Return the weights in the kernel's order."""
-
-    @property
-    def images(self) -> tuple[Image, ...]:
-        """Return the images that the window is filled from, in order."""
-
-    @property
-    def channels(self) -> int:
-        """Return the number of channels of the result."""
-
-    @property
-    def kernels(self) -> tuple[Denoiser, ...]:
-        """Return the kernels in the order in which they run: this one, or two passes."""
-
-
-def is_denoiser(kernel: Kernel) -> TypeGuard[Denoiser]:
-    """Tell whether a kernel is that of a network."""
-    return kernel.interface.role == DENOISE
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part of a render: rows [first_row, first_row + rows) of an image, samples from first_sample on."""
-
-    width: int
-    height: int
-    first_row: int
-    rows: int
-    first_sample: int
-    samples: int
-    seed: int
-
-    @property
-    def integers(self) -> dict[str, int]:
-        """Return what a path kernel is given, by the names of its interface."""
-        return {"seed_number" if name == "seed" else name: value for name, value in vars(self).items()}
-
-
-@dataclass(frozen=True)
-class Memory:
-    """An array on a device: an image (H, W, C), or sums (planes, rows, columns); `held` is what holds it."""
-
-    shape: tuple[int, ...]
-    held: Any
-
-
 @dataclass(frozen=True)
 class Built:
     """A kernel that is ready: what the device made of it, and the sizes at which it has run."""
 
     prepared: Any
     run_at: set[Size] = field(default_factory=set)
-
-
-def in_order(kernel: Interface, given: Mapping[str, int]) -> list[np.integer[Any]]:
-    """Return a kernel's integers in the order and of the types in which it takes them."""
-    return [(np.uint32 if name in UNSIGNED else np.int32)(given[name]) for name in kernel.integers]
-
-
-def words(kernel: Interface, given: Mapping[str, int]) -> NDArray[np.uint32]:
-    """Return a kernel's integers in its order, as words of 32 bits."""
-    return np.array([int(n) % 2**32 for n in in_order(kernel, given)], np.uint32)
 
 
 class Executor(ABC):
@@ -177,7 +81,7 @@ class Executor(ABC):
     `byte_schedule`: that of networks of integers, where the device multiplies bytes. `driver` is the driver's
     version, where `device` does not name it. `trains` says whether it has a compiled trainer. `homes` are the
     homes of weights, apart from the target's usual one, whose kernels it runs
-    [compiler/languages/interface.py]. `paints`: it runs path kernels that write encoded images;
+    [compiler/kernel/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
     `interprets`: it runs programs as they are, without kernels. `software`: a graphics library's own renderer
     on the processor, slower than the reference.
@@ -266,7 +170,7 @@ class Executor(ABC):
 
     def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
-        rule = "it has no compiled trainer"
+        rule = "has no compiled trainer"
         raise InputError(
             "executor that trains", self.name, rule, "use executor opencl, or refimpl.network.train"
         )
@@ -315,9 +219,23 @@ class Executor(ABC):
         elif role == DENOISE:
             self._run(one, black(one, size))
         else:
-            from .planes import run_once
+            self._run_planes(one, size)
 
-            run_once(self, one, size)
+    def _run_planes(self, kernel: PlaneArtifact, size: Size) -> None:
+        """Run a kernel on planes once on zeros."""
+        with self._session(size), ExitStack() as made:
+            integers = {**plane_integers(kernel, size), "gap": 1, PRIMITIVES: 1}
+            arrays = {}
+            for array in kernel.interface.arrays:
+                shape = plane_shape(array.shape, integers)
+                if array.access == READ:
+                    arrays[array.name] = self._stored(array.name, np.zeros(shape, np.float32), made)
+                else:
+                    arrays[array.name] = self._made(
+                        LIGHT if array.name == RESULT else array.name, shape, made
+                    )
+            self._start(kernel, self._built[kernel.digest].prepared, arrays, integers)
+            self._finish()
 
     def forget(self) -> None:
         """Drop the kernels that were built: the next build is the driver's."""
@@ -387,8 +305,7 @@ class Executor(ABC):
     ) -> NDArray[np.float32]:
         """Run a built kernel."""
         with self._session((part.rows, part.width)), ExitStack() as made:
-            sums = self._memory(SUMS, self.sums_shape(kernel, part))
-            made.callback(self._release, sums)
+            sums = self._made(SUMS, self.sums_shape(kernel, part), made)
             self._follow(kernel, part, {SUMS: sums, **self._moving(kernel, numbers, made)})
             return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
 
@@ -397,8 +314,8 @@ class Executor(ABC):
         self._check_target(kernel)
         if (part.first_row, part.rows) != (0, part.height):
             rows = f"{part.first_row} to {part.first_row + part.rows} of {part.height}"
-            rule = "a kernel that writes encoded images does the whole picture"
-            raise InputError("rows of the picture", rows, rule, "trace the part by a kernel of sums")
+            rule = "a kernel that writes encoded images computes the full image"
+            raise InputError("rows of the image", rows, rule, "trace the part by a kernel of sums")
         self.build(kernel)
         return self._paint(kernel, part, numbers)
 
@@ -419,12 +336,17 @@ class Executor(ABC):
             return {}
         return {SCENE_NUMBERS: self._stored(SCENE_NUMBERS, numbers_for(kernel, numbers), made)}
 
+    def _made(self, name: str, shape: tuple[int, ...], made: ExitStack) -> Memory:
+        """Return memory that a kernel will write, which `made` gives back."""
+        memory = self._memory(name, shape)
+        made.callback(self._release, memory)
+        return memory
+
     def _images(self, images: Sequence[Image], size: Size, made: ExitStack) -> dict[str, Memory]:
         """Return memory for images by name, which `made` gives back."""
         written = {}
         for image in images:
-            written[image.name] = self._memory(f"{IMAGE}{image.name}", (*size, image.channels))
-            made.callback(self._release, written[image.name])
+            written[image.name] = self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
         return written
 
     def _follow(self, kernel: PathArtifact, part: Part, arrays: Mapping[str, Memory]) -> None:
@@ -465,36 +387,6 @@ class Executor(ABC):
         built = self._built[kernel.digest]
         self._start(kernel, built.prepared, arrays, {**integers, "sample_count": samples})
 
-    def smooth(self, kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-        """Return the feature image (H, W, 3) of the filter, at layers (H, W, C) by what they are to it.
-
-        They are color, normal, albedo, position and depth; NaN counts as 0.
-        """
-        from .planes import smoothed
-
-        with np.errstate(over="ignore"):
-            given = {name: known(values.astype(np.float32)) for name, values in layers.items()}
-        return smoothed(self, kernels, given)
-
-    def follow(self, kernel: PlaneArtifact, arrays: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-        """Return the planes (P, H, W) that a picture leaves for the next one (refimpl/light/history.py).
-
-        `arrays` are those of the kernel by name: planes of first hits and of the last picture, the colour
-        (H, W, 3), rows of motions, numbers of cameras.
-        """
-        from .planes import followed
-
-        return followed(self, kernel, arrays)
-
-    def passes(self, encode: EncodeArtifact, denoise: Denoiser, size: Size) -> Passes:
-        """Return passes over a picture of `size` (height, width), whose images stay on the device."""
-        from .passes import Passes
-
-        for artifact in (encode, denoise):
-            self._check_target(artifact)
-        self.check_size(denoise, size)
-        return Passes(self, encode, denoise, size)
-
     def _check_target(self, artifact: Kernel) -> None:
         """Refuse a kernel in another language."""
         if artifact.target not in (self.name, *(f"{self.name}:{home}" for home in self.homes)):
@@ -512,23 +404,3 @@ class Executor(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> NDArray[np.float32]:
-    """Return the numbers (n,) of a scene for a path kernel, those of its own scene by default."""
-    if numbers is None:
-        return kernel.scene_numbers
-    wanted = len(kernel.programs.inputs)
-    if numbers.dtype != np.float32 or numbers.shape != (wanted,):
-        raise InputError(
-            "numbers of the scene",
-            f"{numbers.dtype} of shape {numbers.shape}",
-            f"must be float32 of shape ({wanted},)",
-            "read them by the inputs that the kernel was compiled with",
-        )
-    return numbers.copy()
-
-
-def shapes(artifact: Denoiser, size: Size) -> list[tuple[int, ...]]:
-    """Return the shapes (H, W, C) of what an artifact's kernels write."""
-    return [(*size, kernel.channels) for kernel in artifact.kernels]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
 from ...refimpl.errors import InputError
-
-if TYPE_CHECKING:
-    from .executor import Denoiser
+from .kernel import Denoiser
 
 Images = Mapping[str, NDArray[np.float32]]
 """Images (H, W, C) by name."""
@@ -29,7 +26,7 @@ def checked(artifact: Denoiser, inputs: Images) -> Images:
     if sorted(inputs) != sorted(image.name for image in wanted):
         raise InputError(
             "images for the kernel",
-            ", ".join(inputs) or "none",
+            ", ".join(inputs),
             f"must be {', '.join(image.name for image in wanted)}",
             "give each encoded feature once, by name",
         )

@@ -14,17 +14,18 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS
-from ...compiler.languages.interface import SUMS as PATH_SUMS
+from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS
+from ...compiler.kernel.interface import SUMS as PATH_SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
-from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
-from .executor import Executor, Kernel, Memory
+from .executor import Executor
 from .images import Images
+from .kernel import Kernel, Memory
 from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22

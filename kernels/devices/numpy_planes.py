@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...compiler.core.interpret import interpret
-from ...compiler.languages.interface import (
+from ...compiler.kernel.interface import (
     CAMERAS,
     FIRST,
     FOLLOW,

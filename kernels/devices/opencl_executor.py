@@ -20,23 +20,12 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
+from ...compiler.kernel.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import (
-    BYTE_SCHEDULE,
-    INDEX_LIMIT,
-    Denoiser,
-    Executor,
-    Kernel,
-    Memory,
-    Part,
-    Size,
-    in_order,
-    is_denoiser,
-    shapes,
-)
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
 from .images import Images, widest
+from .kernel import Denoiser, Kernel, Memory, Part, Size, in_order, is_denoiser, shapes
 
 if TYPE_CHECKING:
     from ...compiler.scenes.path_kernel import PathArtifact
@@ -170,10 +159,10 @@ class OpenCLExecutor(Executor):
         count, largest = height * width * most, self._device.max_mem_alloc_size
         if count >= INDEX_LIMIT or 4 * count > largest:
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{width} x {height} with {most} channels",
                 f"one image must hold fewer than {INDEX_LIMIT} numbers and at most {largest} bytes",
-                "split the picture, or use executor numpy",
+                "split the image, or use executor numpy",
             )
 
     def _local_size(self, artifact: Denoiser) -> tuple[int, int]:
@@ -186,7 +175,7 @@ class OpenCLExecutor(Executor):
             items = min(items, STACK_BYTES // max(used, 1))
         if not items:
             raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes per pixel: at most {STACK_BYTES} fit "
+                f"{self.device}: the kernel's arrays take {used} bytes per pixel; at most {STACK_BYTES} fit "
                 "a processor's stack; use narrower layers, or a GPU, or executor numpy"
             )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
@@ -220,10 +209,10 @@ class OpenCLExecutor(Executor):
             if size is None:
                 raise
             raise InputError(
-                f"size of the picture on {self.device}",
+                f"size of the image on {self.device}",
                 f"{size[1]} x {size[0]}",
-                f"the device does not run it ({' '.join(str(error).split())})",
-                "split the picture, or use executor numpy",
+                f"the device does not run it: {' '.join(str(error).split())}",
+                "split the image, or use executor numpy",
             ) from None
 
     def _start(

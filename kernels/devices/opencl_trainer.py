@@ -48,7 +48,7 @@ class OpenCLTrainer:
         device = queue.device
         if values.size >= INDEX_LIMIT or values.nbytes > device.max_mem_alloc_size:
             raise InputError(
-                "numbers of all training pictures",
+                "values of all training images",
                 values.size,
                 f"the device takes fewer than {INDEX_LIMIT}, in at most {device.max_mem_alloc_size} bytes",
                 "train on fewer or smaller frames, or with executor numpy",

@@ -19,13 +19,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.glsl import ORDER_EXTENSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.languages.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
-from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
-from ...compiler.schedules.glsl_compute import SHADER_VERSION
+from ...compiler.kernel.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
+from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
+from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
-from .executor import Denoiser, Executor, Kernel, Memory, Size, is_denoiser
+from .executor import Executor
+from .kernel import Denoiser, Kernel, Memory, Size, is_denoiser
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\
@@ -360,7 +360,7 @@ class OpenGLExecutor(Executor):
                 f"texture for {name}",
                 f"{size[0]} x {size[1]} with {channels} channels",
                 f"this OpenGL takes at most {largest} x {largest} with 4 channels",
-                "split the picture, or use another executor",
+                "split the image, or use another executor",
             )
 
     def close(self) -> None:
@@ -372,9 +372,7 @@ class OpenGLExecutor(Executor):
 def _open(kind: str) -> tuple[str, Any]:
     """Return the kind of the context and the context, or say why there is none."""
     if kind != "auto" and kind not in CONTEXTS:
-        raise InputError(
-            "OpenGL context", kind, f"must be auto, {', '.join(CONTEXTS)}", "choose one of these"
-        )
+        raise InputError("OpenGL context", kind, "unknown", f"choose one of auto, {', '.join(CONTEXTS)}")
     reasons = []
     for name in CONTEXTS if kind == "auto" else (kind,):
         try:

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
+from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
-from .executor import Denoiser, Executor, Memory, Part, Size, numbers_for, shapes
+from .executor import Executor
 from .images import images_of
+from .kernel import Denoiser, Memory, Part, Size, numbers_for, shapes
 
 PICTURE = "picture"
 """Name under which the result is read."""
@@ -29,19 +30,17 @@ class Passes:
     """Kernels with their images on a device; a context manager that gives the images back."""
 
     def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Denoiser, size: Size) -> None:
+        """Keep images of `size` (height, width) on the device for these kernels."""
+        for artifact in (encode, denoise):
+            executor._check_target(artifact)
+        executor.check_size(denoise, size)
         self.encoder, self.denoiser, self.size = encode, denoise, size
         self._executor, self._sums = executor, Memory((), None)
         self._numbers, self._given = Memory((), None), np.zeros(0, np.float32)
         with executor._session(size), ExitStack() as made:
             self._images = executor._images(encode.images, size, made)
-            self._written = [self._made(RESULT, shape, made) for shape in shapes(denoise, size)]
+            self._written = [executor._made(RESULT, shape, made) for shape in shapes(denoise, size)]
             self._giving_back = made.pop_all()
-
-    def _made(self, name: str, shape: tuple[int, ...], made: ExitStack) -> Memory:
-        """Return memory that `made` gives back."""
-        memory = self._executor._memory(name, shape)
-        made.callback(self._executor._release, memory)
-        return memory
 
     def trace(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> None:
         """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes.

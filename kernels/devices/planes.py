@@ -21,30 +21,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import GUIDES, IMAGE, LIGHT, PAST, PRIMITIVES, READ, RESULT
+from ...compiler.kernel.interface import GUIDES, IMAGE, LIGHT, PAST, RESULT
 from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
+from ...refimpl.network.dataset import known
 from ...refimpl.network.smoothing import LEVELS
-from .executor import Executor, Memory, Size
+from .executor import Executor
+from .kernel import Memory, plane_integers, plane_shape
 
 
 def smoothed(
-    executor: Executor, kernels: SmoothKernels, layers: Mapping[str, NDArray[np.float32]]
+    executor: Executor, kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]
 ) -> NDArray[np.float32]:
-    """Return the feature image (H, W, 3) of layers (H, W, C), float32, without NaN, by what they guide."""
+    """Return the feature image (H, W, 3) of the filter, at layers (H, W, C) by what they are to it.
+
+    They are color, normal, albedo, position and depth; NaN counts as 0.
+    """
+    with np.errstate(over="ignore"):
+        layers = {name: known(values.astype(np.float32)) for name, values in layers.items()}
     for kernel in (kernels.guide, kernels.smooth, kernels.encode):
         executor._check_target(kernel)
         executor.build(kernel)
     height, width = layers[FEATURE].shape[:2]
     with executor._session((height, width)), ExitStack() as made:
-        integers = _integers(kernels.smooth, (height, width))
+        integers = plane_integers(kernels.smooth, (height, width))
         arrays = {
             f"{IMAGE}{name}": executor._stored(f"{IMAGE}{name}", values, made)
             for name, values in layers.items()
         }
         shapes = {array.name: array.shape for array in kernels.smooth.interface.arrays}
         guides, light, other = (
-            _memory(executor, name, shapes[name], integers, made) for name in (GUIDES, LIGHT, LIGHT)
+            executor._made(name, plane_shape(shapes[name], integers), made) for name in (GUIDES, LIGHT, LIGHT)
         )
         _start(executor, kernels.guide, {**arrays, GUIDES: guides, LIGHT: light}, integers)
         for level in range(LEVELS):
@@ -59,54 +66,22 @@ def smoothed(
 def followed(
     executor: Executor, kernel: PlaneArtifact, arrays: Mapping[str, NDArray[np.float32]]
 ) -> NDArray[np.float32]:
-    """Return the planes (P, H, W) that a picture leaves, of a history's arrays by the kernel's names."""
+    """Return the planes (P, H, W) that an image leaves for the next one (refimpl/light/history.py).
+
+    `arrays` are those of the kernel by name: planes of first hits and of the last image, the colour
+    (H, W, 3), rows of motions, cameras.
+    """
     executor._check_target(kernel)
     executor.build(kernel)
     _, height, width = arrays[PAST].shape
     with executor._session((height, width)), ExitStack() as made:
-        integers = _integers(kernel, (height, width))
+        integers = plane_integers(kernel, (height, width))
         given = {name: executor._stored(name, values, made) for name, values in arrays.items()}
         result = kernel.interface.named(RESULT)
         assert result is not None
-        memory = _memory(executor, PAST, result.shape, integers, made)
+        memory = executor._made(PAST, plane_shape(result.shape, integers), made)
         _start(executor, kernel, {**given, RESULT: memory}, integers)
         return executor._fetch(PAST, memory)
-
-
-def run_once(executor: Executor, kernel: PlaneArtifact, size: Size) -> None:
-    """Run a kernel once on zeros."""
-    with executor._session(size), ExitStack() as made:
-        integers = {**_integers(kernel, size), "gap": 1, PRIMITIVES: 1}
-        arrays = {}
-        for array in kernel.interface.arrays:
-            shape = _shape(array.shape, integers)
-            if array.access == READ:
-                arrays[array.name] = executor._stored(array.name, np.zeros(shape, np.float32), made)
-            else:
-                name = LIGHT if array.name == RESULT else array.name
-                arrays[array.name] = _memory(executor, name, array.shape, integers, made)
-        _start(executor, kernel, arrays, integers)
-        executor._finish()
-
-
-def _integers(kernel: PlaneArtifact, size: Size) -> dict[str, int]:
-    """Return a kernel's integers for a picture: rows of planes are whole work items."""
-    height, width = size
-    return {"width": width, "height": height, "row_stride": -(-width // kernel.lanes) * kernel.lanes}
-
-
-def _shape(named: tuple[int | str, ...], integers: Mapping[str, int]) -> tuple[int, ...]:
-    """Return an array's shape in numbers."""
-    return tuple(integers[n] if isinstance(n, str) else n for n in named)
-
-
-def _memory(
-    executor: Executor, name: str, named: tuple[int | str, ...], integers: Mapping[str, int], made: ExitStack
-) -> Memory:
-    """Return memory for an array, which `made` gives back."""
-    memory = executor._memory(name, _shape(named, integers))
-    made.callback(executor._release, memory)
-    return memory
 
 
 def _start(

@@ -6,8 +6,8 @@ import platform
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...compiler.core.writing import signals_wait
-from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...models.writing import signals_wait
+from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ..folders import protect_caches
 from ..memory import widen_stacks
 from .executor import Executor
@@ -71,7 +71,7 @@ WAYS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 def open_executor(name: str, **options: Any) -> Executor:
     """Return an open executor, or raise ExecutorUnavailable that says what is missing and how to get it."""
     if name not in EXECUTORS:
-        raise InputError("executor", name, f"must be one of {', '.join(EXECUTORS)}", "choose one of these")
+        raise InputError("executor", name, "unknown", choice(name, EXECUTORS))
     if name != "numpy":
         widen_stacks()
         protect_caches()

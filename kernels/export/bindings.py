@@ -14,7 +14,7 @@ from typing import Any
 from ...compiler.artifact import MANIFEST_NAME, Artifact, manifest_text
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
-from ...compiler.languages.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.kernel.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
 from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.history_kernel import compile_history
 from ...compiler.scenes.path_kernel import PathArtifact

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
+from ...compiler.kernel.interface import BLOCK, WEIGHTS, Interface
 from ...compiler.languages.glsl_buffers import GROUP
-from ...compiler.languages.interface import BLOCK, WEIGHTS, Interface
-from ..devices.executor import Executor, Kernel, Memory, words
+from ..devices.executor import Executor
+from ..devices.kernel import Kernel, Memory, words
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ...compiler.core.ir import sha256
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..bench.peers import peer_onnxruntime
-from ..devices.executor import Executor, Part
-from . import tools
+from ..devices.executor import Executor
+from ..devices.kernel import Part
+from . import onnx_export, tools
 from .check_pair import SEED
 from .package import Export
 from .runners import WAYS
@@ -247,7 +247,7 @@ def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
     pair = export.pair
     if export.denoiser is None:
         data = export.files["denoise/denoise.onnx"]
-        device, found = peer_onnxruntime.run_graph(data, pair.images)
+        device, found = onnx_export.run_graph(data, pair.images)
         return device, found, None
     with runner(export.target, export.denoiser.target) as opened:
         found = opened.run(export.denoiser, pair.images)

@@ -25,17 +25,17 @@ from numpy.typing import NDArray
 from ...compiler.core.interpret import interpret
 from ...compiler.core.ir import Gather, Program
 from ...compiler.core.lower import lower
-from ...compiler.languages.interface import SCENE_NUMBERS
+from ...compiler.kernel.interface import SCENE_NUMBERS
 from ...compiler.plan import Plan, plan_program
 from ...compiler.scenes import emit_path
 from ...compiler.scenes.lower_encode import layers_of
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import compile_path
-from ...compiler.schedules.emit import kernel_gather
+from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import windows
 from ...refimpl.network.dataset import FEATURES, encode_sums
 from ...refimpl.network.denoise import Model
-from ..devices.executor import Part
+from ..devices.kernel import Part
 from ..devices.registry import open_executor
 
 SIDES = (1, 3)

@@ -16,11 +16,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.kernel.interface import BLOCK
+from ...compiler.languages.glsl import SHADER_VERSION
 from ...compiler.languages.glsl_es import VERSION
-from ...compiler.languages.interface import BLOCK
-from ...compiler.schedules.glsl_compute import SHADER_VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.executor import Kernel, Memory, Size
+from ..devices.kernel import Kernel, Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor
 from .buffer_runner import BufferRunner, Launch, Prepared
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.kernel.interface import TABLE, Interface
 from ...compiler.languages.glsl_es import VERSION
 from ...compiler.languages.hosts import CHANNELS
-from ...compiler.languages.interface import TABLE, Interface
-from ..devices.executor import Memory
+from ..devices.kernel import Memory
 from .gl_runner import ESRunner
 
 TOP = f"""\

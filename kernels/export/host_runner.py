@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.kernel.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...compiler.languages.c import whole
-from ...compiler.languages.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
 from ...refimpl.errors import ExecutorUnavailable
-from ..devices.executor import Kernel
+from ..devices.kernel import Kernel
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import SCENE_NUMBERS
+from ...compiler.kernel.interface import SCENE_NUMBERS
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import numbers_of
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...refimpl import rng
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Light, Scene
 from ...refimpl.light.transport import Settings
 
@@ -74,7 +74,7 @@ class Motion:
         """Refuse what cannot move."""
         for kind in self.kinds:
             if kind not in KINDS:
-                raise InputError("what moves", kind, f"it must be one of {', '.join(KINDS)}", "choose these")
+                raise InputError("--moving", kind, "unknown", choice(kind, KINDS))
 
     def inputs(self, settings: Settings) -> SceneInputs:
         """Return the numbers that are inputs, or refuse a scene in which nothing moves."""
@@ -85,9 +85,9 @@ class Motion:
         )
         found = varying([*self.scenes, *others], settings)
         if not found.places:
-            rule = f"nothing of scene {self.scenes[0].name} moves with it"
+            rule = f"changes nothing in scene {self.scenes[0].name}"
             raise InputError(
-                "what moves", ", ".join(self.kinds), rule, f"choose of {', '.join(KINDS)}, or leave it out"
+                "--moving", ", ".join(self.kinds), rule, f"choose some of {', '.join(KINDS)}, or leave it out"
             )
         return found
 

@@ -33,7 +33,7 @@ from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.variants import FULL, parse, plan_model, vary
-from ...refimpl.errors import InputError
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.denoise import Model, learned_feature_spp
@@ -115,8 +115,7 @@ class Export:
 def export(request: Request) -> Export:
     """Return the export of a model, or say which limit of the target it exceeds."""
     if request.target not in NAMES:
-        rule = f"must be one of {', '.join(NAMES)}, html"
-        raise InputError("--target", request.target, rule, "choose one of these")
+        raise InputError("--target", request.target, "unknown", choice(request.target, [*NAMES, "html"]))
     request = _hosted(request)
     if request.model.is_imported:
         _check_imported(request)
@@ -338,16 +337,16 @@ def _place(row: Row, wanted: str) -> tuple[str, Place]:
     """Return the place of the weights and its name."""
     how = wanted or next(iter(row.places))
     if how not in row.places:
-        rule = f"target {row.name} has weights in: {', '.join(row.places)}"
-        raise InputError("--weights", how, rule, "choose one of these, or leave it out")
+        rule = f"is not available for target {row.name}"
+        raise InputError("--weights", how, rule, f"{choice(how, row.places)}, or leave it out")
     return how, row.places[how]
 
 
 def _schedule(row: Row, how: str, place: Place, wanted: str) -> str:
     """Return the schedule that is wanted, or the usual one."""
     if wanted and wanted not in place.schedules:
-        rule = f"target {row.name} with weights in place {how} has: {', '.join(place.schedules)}"
-        raise InputError("--schedule", wanted, rule, "choose one of these, or leave it out")
+        rule = f"is not available for target {row.name} with --weights {how}"
+        raise InputError("--schedule", wanted, rule, f"{choice(wanted, place.schedules)}, or leave it out")
     return wanted or place.schedules[0]
 
 
@@ -369,11 +368,11 @@ def _limits(request: Request, row: Row, place: Place, denoiser: Artifact) -> lis
         found += _check(place.limit, place.each * count, row.name)
         picked = kernel.manifest["schedule"]
         if "reason" in picked and request.schedule:
-            rule = f"it cannot hold this model: {picked['reason']}"
+            rule = f"cannot hold this model: {picked['reason']}"
             raise InputError("--schedule", request.schedule, rule, "leave it out, or choose another")
         if picked["name"] not in place.schedules:
-            rule = f"this model's cannot be there: {picked['reason']}"
-            raise InputError("--weights", "inline", rule, "choose another place")
+            rule = f"is not possible for this model: {picked['reason']}"
+            raise InputError("--weights", "inline", rule, "choose another with --weights")
         gather = kernel.program.gather
         assert gather is not None, "kernels have windows"
         found += _check(row.most_images, len(gather.images), row.name)

@@ -7,8 +7,8 @@ from typing import Any
 
 from ...compiler.artifact import Artifact, schedule_text
 from ...compiler.core.lower import OWN_NUMBERS
+from ...compiler.kernel.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.languages.c import whole
-from ...compiler.languages.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.reading.languages import is_read
 from .bindings import input_section
 from .hosts import scratch

@@ -29,10 +29,10 @@ from ...compiler.artifact import (
     manifest_text,
     weight_bytes,
 )
-from ...compiler.core.writing import is_regular, write_together
-from ...compiler.model_file import load_model
 from ...compiler.reading.languages import is_read
 from ...compiler.schedules.schedules import PLAIN
+from ...models.model_file import load_model
+from ...models.writing import is_regular, write_together
 from ...refimpl.errors import InputError, WamnetError
 from ...refimpl.network import siren
 from ...refimpl.network.dataset import Normalization, Window
@@ -136,7 +136,7 @@ def write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def _files_of(folder: Path) -> set[str]:
     """Return the files of the shelf in a folder; refuse a folder with anything else."""
-    rule, way_out = "it is not a shelf: {}", "name another folder with -o, or a new one"
+    rule, way_out = "is not a shelf: {}", "name another folder with -o, or a new one"
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise InputError("output folder", str(folder), rule.format("a link or a file"), way_out)
     found = set()

@@ -84,7 +84,7 @@ def check_measured(target: str) -> None:
     """Refuse a target of which nothing here runs what its users would run."""
     way = WAYS.get(target)
     if way is None or way.stands_in:
-        rule = "is not run here on a device of its own, so that a time would say nothing"
+        rule = "does not run on real hardware here, so a time would be meaningless"
         known = ", ".join(name for name, each in WAYS.items() if not each.stands_in)
         raise InputError("--measure with target", target, rule, f"leave it out, or choose one of {known}")
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import WEIGHTS
+from ...compiler.kernel.interface import WEIGHTS
 
 HEAD = 5
 """Words before the first instruction."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from ...compiler.kernel.interface import BLOCK, TABLE
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
-from ...compiler.languages.interface import BLOCK, TABLE
-from ...compiler.schedules.emit_inlined import LARGEST_WEIGHTS
+from ...compiler.schedules.inlined import LARGEST_WEIGHTS
 from ...compiler.schedules.schedules import PLAIN
 from . import tools
 

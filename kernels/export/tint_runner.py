@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK
+from ...compiler.kernel.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.executor import Kernel
+from ..devices.kernel import Kernel
 from .buffer_runner import BufferRunner, Launch
 from .wgpu_runner import UNIFORM_BYTES, declared
 

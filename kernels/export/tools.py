@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...compiler.schedules.buffers_group import PORTABLE
+from ...compiler.languages.instructions import PORTABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .spirv_names import named, unsourced
 
@@ -70,7 +70,7 @@ def run(program: str, *arguments: str, folder: Path) -> str:
         ) from None
     told = " ".join((done.stdout + done.stderr).split())
     if done.returncode:
-        raise CompileError(f"{program} refuses the kernel: {told[:MOST_TOLD]}")
+        raise CompileError(f"{program} rejects the kernel: {told[:MOST_TOLD]}")
     return told
 
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import BLOCK, WEIGHTS
+from ...compiler.kernel.interface import BLOCK, WEIGHTS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.executor import Kernel, Memory
+from ..devices.kernel import Kernel, Memory
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 

@@ -34,7 +34,8 @@ from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 from ..devices.numpy_executor import follow
 from . import random_words
 

@@ -24,7 +24,8 @@ from ...compiler.scenes.path_kernel import compile_path
 from ...refimpl import rng
 from ...refimpl.light.scenes import canonical
 from ...refimpl.light.transport import BLOCKS_PER_BOUNCE, Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 
 COUNTERS = ("seed", "pixel", "sample_number")
 """Inputs of the words, in the order of refimpl/rng.py: random_block."""

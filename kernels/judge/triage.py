@@ -2,7 +2,7 @@
 
 1. Compile the network for each executor and schedule [`kernels_of`], run each kernel, and hold each number
    against the float64 reference and the bound of its schedule at this frame [`judged`], [compiler/plan.py].
-   What is not a finite number deviates. Under profile `exact` the bits must also be those of the interpreter.
+   What is not a finite number deviates.
 2. Name the odd ones out: those that deviate while others are within their bounds. If all deviate, it is the
    program or the bound that is suspect [`conclusion`].
 3. Cut the picture down to one that still shows it [reduce.py: `shrink`], and run the network's first stages
@@ -15,22 +15,19 @@ refuses a kernel in its own words has not: it has written nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core import ir
 from ...compiler.core.ir import Program
 from ...compiler.plan import Expected, Plan, plan_program
-from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import target_named
 from ...refimpl.errors import CompileError
 from ..devices.images import Images
-from ..devices.numpy_executor import NumpyExecutor
 from .apart import Outcome, Runner
 
 Compile = Callable[[Plan], Artifact]
@@ -41,9 +38,6 @@ NONE: Mapping[str, str] = {}
 
 PICKED, EVERY = "picked", "all"
 """Which schedules are run: the one that the executor picks, or all that its target has."""
-
-EXACT = "exact"
-"""The profile whose kernels have the interpreter's bits."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +59,7 @@ class Kernel:
 class Verdict:
     """What a kernel wrote: its worst number, (row, column, channel), and how far that one may be off.
 
-    `ratio`: the largest error / bound; `bits`: numbers that have not the interpreter's bits (profile exact);
-    `refusal`, `failure`: why there is no picture.
+    `ratio`: the largest error / bound; `refusal`, `failure`: why there is no picture.
     """
 
     kernel: Kernel
@@ -76,7 +69,6 @@ class Verdict:
     found: float = 0.0
     expected: float = 0.0
     bound: float = 0.0
-    bits: int = 0
     refusal: str = ""
     failure: str = ""
 
@@ -88,7 +80,7 @@ class Verdict:
     @property
     def within(self) -> bool:
         """Tell whether the picture is as promised; NaN is not."""
-        return self.ran and not self.failure and self.ratio <= 1.0 and not self.bits
+        return self.ran and not self.failure and self.ratio <= 1.0
 
     @property
     def deviates(self) -> bool:
@@ -107,8 +99,6 @@ class Verdict:
             return f"refused: {self.refusal}"
         if self.failure:
             return f"FAILED: {self.failure}"
-        if self.bits:
-            return f"DEVIATES: {self.bits} numbers have other bits"
         if not self.within:
             return "DEVIATES"
         return "within" if self.promised else "no bound"
@@ -163,7 +153,6 @@ class Judge:
     def __init__(self, images: Images) -> None:
         self.images = images
         self._known: dict[Any, Expected] = {}
-        self._bits: dict[str, NDArray[np.float32]] = {}
 
     def verdict(self, kernel: Kernel) -> Verdict:
         """Run a kernel, and judge what it writes."""
@@ -172,9 +161,7 @@ class Judge:
         outcome = kernel.runner.run(kernel.artifact, self.images)
         if outcome.image is None:
             return Verdict(kernel, refusal=outcome.refusal, failure=outcome.failure)
-        plan = kernel.artifact.plan
-        wanted = self._interpreted(plan) if plan.profile.name == EXACT else None
-        return _judged(kernel, outcome, self._expected(plan), wanted)
+        return _judged(kernel, outcome, self._expected(kernel.artifact.plan))
 
     def _expected(self, plan: Plan) -> Expected:
         """Return what a plan's kernel may write; most schedules share one bound."""
@@ -184,15 +171,6 @@ class Judge:
             self._known[key] = plan.expected(self.images)
         return self._known[key]
 
-    def _interpreted(self, plan: Plan) -> NDArray[np.float32]:
-        """Return the picture (H, W, C) whose bits profile exact promises."""
-        key = ir.digest(plan.analysed)
-        if key not in self._bits:
-            with NumpyExecutor() as executor:
-                there = replace(plan, target=target_named(executor.name), asked=PLAIN)
-                self._bits[key] = executor.run(compile_plan(there), self.images)
-        return self._bits[key]
-
 
 def judged(kernels: Sequence[Kernel], images: Images) -> list[Verdict]:
     """Run kernels on images (H, W, C), and return the verdicts in their order."""
@@ -200,24 +178,15 @@ def judged(kernels: Sequence[Kernel], images: Images) -> list[Verdict]:
     return [judge.verdict(kernel) for kernel in kernels]
 
 
-def _judged(kernel: Kernel, outcome: Outcome, held: Expected, wanted: NDArray[np.float32] | None) -> Verdict:
+def _judged(kernel: Kernel, outcome: Outcome, held: Expected) -> Verdict:
     """Return the verdict about a picture (H, W, C)."""
     assert outcome.image is not None
-    image = np.ascontiguousarray(outcome.image)
-    found = image.astype(np.float64)
+    found = outcome.image.astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         error = np.abs(found - held.value)
         # A bound of 0 is kept by no error only.
         ratio = np.where(error == 0.0, 0.0, np.where(np.isfinite(found), error / held.bound, np.inf))
-    other = np.zeros(found.shape, bool)
-    if wanted is not None:
-        other = image.view(np.uint32) != np.ascontiguousarray(wanted).view(np.uint32)
-    # The worst number is beyond its bound, or else has other bits, or else is the farthest off.
-    if other.any() and ratio.max() <= 1.0:
-        ratio_of = np.where(other, ratio, -1.0)
-    else:
-        ratio_of = ratio
-    at = tuple(int(i) for i in np.unravel_index(int(np.argmax(ratio_of)), found.shape))
+    at = tuple(int(i) for i in np.unravel_index(int(np.argmax(ratio)), found.shape))
     return Verdict(
         kernel,
         error=float(np.nanmax(error)) if np.isfinite(found).all() else float("inf"),
@@ -226,7 +195,6 @@ def _judged(kernel: Kernel, outcome: Outcome, held: Expected, wanted: NDArray[np
         found=float(found[at]),
         expected=float(held.value[at]),
         bound=float(held.bound[at]),
-        bits=int(other.sum()),
     )
 
 

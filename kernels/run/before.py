@@ -2,7 +2,7 @@
 
 1. Each picture of a film leaves a history for the next [`Film`].
 2. A frame of a data set has so many pictures before it, 1 / PER_S apart, by samples that the frame itself
-   does not use [`followed`].
+   does not use [`followed`]. Its other pictures are rendered by bands of rows [`carry_out`].
 
 A history is defined in refimpl/light/history.py. Any executor renders the pictures; one that has the
 history's kernel computes the history too [follow_on.py].
@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
+from ...models.data.frame_plan import Task, version
+from ...refimpl.errors import InputError
 from ...refimpl.frame import HISTORY, Floats, Frame
 from ...refimpl.light import history
 from ...refimpl.light.history import History
@@ -27,9 +29,6 @@ PER_S = 24.0
 
 REFERENCE = "numpy"
 """The executor whose histories are those of the definition itself."""
-
-MOST_BEFORE = 256
-"""Most pictures before a frame: at rest a history counts to 64, and studies to four times as many."""
 
 
 def wants(features: Collection[str]) -> bool:
@@ -86,3 +85,15 @@ def followed(
         rendered = render_frame(executor, now, each, on_progress=on_progress, frames=kernels).frame
         frame = film.add(now, each, rendered)
     return frame
+
+
+def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
+    """Render a task's rows; a worker that has another version of this package refuses."""
+    if task.version != version():
+        rule = f"the data set is made by {task.version}, and every worker must have the same"
+        raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
+    picture = task.picture
+    executor = picture.request.executor
+    if picture.before:
+        return followed(executor, picture.scene_at, picture.job, picture.before, on_progress)
+    return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame

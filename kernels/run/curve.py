@@ -107,7 +107,7 @@ def check_limits(limits: Limits) -> None:
     for option, name, limit in limits.rules:
         if not math.isfinite(limit) or (limit < 0 and name != "psnr_loss_db"):
             least = "finite" if name == "psnr_loss_db" else "finite and >= 0"
-            raise InputError(option, limit, f"it must be {least}", f"for example {option} 0.1")
+            raise InputError(option, limit, f"must be {least}", f"for example {option} 0.1")
 
 
 def choose(points: Sequence[Point], limits: Limits) -> Choice:
@@ -166,7 +166,7 @@ def _nothing(points: Sequence[Point], limits: Limits) -> InputError:
 
     nearest = min(known, key=lambda point: (excess(point), point.milliseconds, point.variant))
     rule = f"no point of the curve keeps it; the nearest is {nearest.text}"
-    return InputError("limit", wanted, rule, "allow more, or train a variant (wamnet train --variant)")
+    return InputError("limit", wanted, rule, "allow more, or train a variant: wamnet train --variant")
 
 
 # ---- files ------------------------------------------------------------------------------------------------

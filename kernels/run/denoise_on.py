@@ -23,14 +23,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import schedule_text
-from ...compiler.languages.interface import FULL, PLAIN
-from ...compiler.model_file import model_bytes
+from ...compiler.kernel.interface import FULL, PLAIN
+from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
-from ..devices.executor import Denoiser as Kernel
-from ..devices.executor import Executor, Size
+from ..devices.executor import Executor
 from ..devices.images import Images
+from ..devices.kernel import Denoiser as Kernel
+from ..devices.kernel import Size
+from ..devices.planes import smoothed
 from ..memory import keep_freed_memory
 from .kept import kept_kernels
 from .tune import Subject, pick
@@ -96,14 +98,10 @@ def filter_of(
     """Return the kernels, built, that smooth a frame's features on a device; None: the reference does.
 
     The reference smooths where a device would take longer, where a picture has the same bits on all devices
-    (integers, profile `exact`), and layers with more digits than a kernel reads.
+    (integers), and layers with more digits than a kernel reads.
     """
     layers = [layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers]
     if not layers or not executor.smooths or model.is_whole:
-        return None
-    from ...compiler.core.profiles import profile_named
-
-    if profile_named(profile).common:
         return None
     if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
         return None
@@ -145,7 +143,8 @@ def images_on(
     found = dict(images_of(replace(model, features=tuple(others)), frame))
     for feature in (FEATURES[name] for name in model.features if name not in found):
         given = {"color": feature.layer, **feature.guides}
-        found[feature.name] = executor.smooth(kernels, {what: frame[layer] for what, layer in given.items()})
+        layers = {what: frame[layer] for what, layer in given.items()}
+        found[feature.name] = smoothed(executor, kernels, layers)
     return {name: found[name] for name in model.features}
 
 

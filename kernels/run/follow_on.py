@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.languages.interface import CAMERAS, FIRST, IMAGE, MOTIONS, PAST
+from ...compiler.kernel.interface import CAMERAS, FIRST, IMAGE, MOTIONS, PAST
 from ...compiler.scenes.emit_path import planes
 from ...compiler.scenes.history_kernel import compile_history
 from ...refimpl import vectors
@@ -30,6 +30,7 @@ from ...refimpl.light.history import LIMITS, First, History, Limits, Motion
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ..devices.executor import Executor
+from ..devices.planes import followed
 from .render_on import Frames, sums_of
 
 END = ("last_surface", "last_point", "last_normal", "last_direction")
@@ -60,7 +61,7 @@ def follow_on(
         MOTIONS: _motions(moves, limits),
         CAMERAS: _cameras(scene, before.scene),
     }
-    number, *normal, red, green, blue, count = executor.follow(compile_history(executor.name), arrays)
+    number, *normal, red, green, blue, count = followed(executor, compile_history(executor.name), arrays)
     mean = np.stack([red, green, blue], axis=-1)
     return History(scene, number.astype(np.int32), np.stack(normal, axis=-1), mean, count)
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.languages.interface import Array, Interface
+from ...compiler.kernel.interface import Array, Interface
 from .. import cache
-from ..devices.executor import Kernel
+from ..devices.kernel import Kernel
 
 SAME = ("source", "manifest", "target", "profile", "entry_point", "digest")
 """Fields that are JSON's types by themselves."""

@@ -37,11 +37,11 @@ from ...compiler.scenes.lower_encode import feature_rays, layers_of, learned_ray
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
-from ...compiler.schedules.emit import kernel_gather, output_channels
-from ...compiler.schedules.emit_packed import WEIGHTS_A_TEXEL
+from ...compiler.schedules.common import kernel_gather, output_channels
+from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...compiler.variants import parse, vary
 from ...refimpl import rng
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light import transport
 from ...refimpl.light.render import Job, feature_settings, render
 from ...refimpl.light.scene import Scene
@@ -121,8 +121,8 @@ def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tu
     """
     if model.is_whole or (fast is not None and fast.is_whole):
         if fast is not None:
-            rule = "a network of integers cannot be cut to a rank, and is the only one of its page"
-            raise InputError("second model", "given", rule, "leave it out")
+            rule = "excluded: an integer network cannot be cut to a rank, and is the only one of its page"
+            raise InputError("second model", NO_VALUE, rule, "leave it out")
         return (Network("full", model),)
     cut = fast or model
     n_out, n_in = cut.siren.weights[0].shape

@@ -31,15 +31,16 @@ from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.render import Job, feature_job, feature_sampler
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import SPREAD, Settings
 from ...refimpl.network.dataset import check_features
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.whole import INPUT_LEVELS
-from ..devices.executor import Executor, Part
-from ..devices.passes import PICTURE
+from ..devices.executor import Executor
+from ..devices.kernel import Part
+from ..devices.passes import PICTURE, Passes
 from .moving import MovingPaths
 from .render_on import SAMPLES_AT_ONCE
 from .tune import choose
@@ -58,9 +59,7 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
     if feature_job(job) is None:
         return None
     if seen:
-        rule = (
-            "in a pipeline what is seen past mirrors and glass is seen by the paths, of which there are fewer"
-        )
+        rule = "in a pipeline the paths see through mirrors and glass, and there are fewer of them"
         raise InputError("feature_spp", job.feature_spp, rule, "use 0, or render_on and denoise_on")
     source, sampler = feature_sampler(job), job.settings.sampler
     if source not in (sampler, SPREAD[sampler]):
@@ -68,7 +67,7 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
         raise InputError("feature_sampler", source, rule, f"use {sampler} or {SPREAD[sampler]}")
     if whole:
         rule = "kernels of render_on trace no rays of features"
-        raise InputError("whole", whole, rule, "render references by a kernel of their own")
+        raise InputError("whole", whole, rule, "render references with a separate kernel")
     return FeatureRays(job.feature_spp, source)
 
 
@@ -119,7 +118,7 @@ class Pipeline:
         self._rays = _rays_of(job, whole, sees(self._features))
         if whole and sees(self._features):
             rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
-            raise InputError("whole", whole, rule, "render references by a kernel of their own")
+            raise InputError("whole", whole, rule, "render references with a separate kernel")
         self._in_integers = model.is_whole
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
@@ -142,7 +141,7 @@ class Pipeline:
         )
         self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
         self._drawn = self._closed = False
-        self.passes = executor.passes(self.encode, self.denoise, size)
+        self.passes = Passes(executor, self.encode, self.denoise, size)
 
     @property
     def _ray_count(self) -> int:
@@ -260,18 +259,18 @@ class Pipeline:
         """Refuse a feature without an image."""
         if feature not in self._features:
             known = ", ".join(self._features)
-            raise InputError("feature image", feature, f"there are {known}", "name it in show=")
+            raise InputError("feature image", feature, f"is not one of {known}", "name it in show=")
 
     def _check_drawn(self) -> None:
         """Refuse to read what was not drawn."""
         self._check_open()
         if not self._drawn:
-            raise InputError("pipeline", "nothing drawn", "an image is read after it was drawn", "draw first")
+            raise InputError("pipeline", NO_VALUE, "has drawn no image yet", "draw first")
 
     def _check_open(self) -> None:
         """Refuse work without images."""
         if self._closed:
-            raise InputError("pipeline", "closed", "its images were given back", "make another one")
+            raise InputError("pipeline", NO_VALUE, "closed", "make another one")
 
     def close(self) -> None:
         """Give the images on the device back; the executor stays open."""

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from ...refimpl.errors import InputError
+from ...models.data.frame_plan import Rows
+from ...refimpl.errors import InputError, choice
 from ...refimpl.light.environment import with_sun
 from ...refimpl.light.render import Job, Render, render
 from ...refimpl.light.scene import Scene
@@ -22,9 +23,6 @@ from ..devices.registry import open_executor
 from ..memory import keep_freed_memory
 from .render_on import Frames, render_on
 from .render_pool import render_parallel
-
-Rows = tuple[int, int]
-"""A band of rows [first, last)."""
 
 Progress = Callable[[int], None]
 """Called with the number of samples that were just finished."""
@@ -106,8 +104,7 @@ RENDERERS: Mapping[str, Renderer] = {
 def renderer(executor: str) -> Renderer:
     """Return how an executor renders, or refuse its name."""
     if executor not in RENDERERS:
-        rule = f"must be one of {', '.join(RENDERERS)}"
-        raise InputError("executor that renders", executor, rule, "choose one of these")
+        raise InputError("executor that renders", executor, "unknown", choice(executor, RENDERERS))
     return RENDERERS[executor]
 
 

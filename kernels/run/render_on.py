@@ -25,7 +25,7 @@ from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of, most_planes
 from ...compiler.scenes.scene_inputs import SceneInputs
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import SEEN, Frame
 from ...refimpl.light.render import (
     Job,
@@ -38,7 +38,8 @@ from ...refimpl.light.render import (
 )
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor, Part
+from ..devices.executor import Executor
+from ..devices.kernel import Part
 from ..memory import keep_freed_memory
 from .moving import Moment, MovingPaths
 
@@ -131,10 +132,8 @@ def render_on(
         moment = frames.of(executor, scene, job, profile)
     kernel = compile_scene(executor, scene, job, profile) if moment is None else moment.kernel
     if kernel.programs.rays:
-        rule = "a render's kernel adds features up over the samples, part by part"
-        raise InputError(
-            "kernel", "features of their own rays", rule, "render with frames=, or without either"
-        )
+        rule = "has separate feature rays, and a render's kernel sums features over the samples"
+        raise InputError("kernel", NO_VALUE, rule, "render with frames=, or without either")
     numbers = None if moment is None else moment.numbers
     totals = _totals(executor, kernel, numbers, job, (first, last), on_progress)
     return _render(kernel, totals, job.layers, render_info(scene, job))

@@ -8,7 +8,7 @@
    what the next run will wait for. Where the weights are in the source, another model is another source,
    and the first time counts [`_built`].
 4. The table is kept in the cache folder [cache.py] under all that it depends on: device, driver, cores, shape
-   of the network, profile, rank, size of the picture to a factor of two, the compiler's own text [`_entry`].
+   of the network, profile, rank, size of the image to a factor of two, the compiler's own text [`_entry`].
 5. [`choose`] takes the schedule with the least time to build and to run so many pictures; without a table the
    one that is built in for the device. It says which and why.
 """

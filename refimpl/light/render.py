@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .. import rng, vectors
-from ..errors import InputError
+from ..errors import InputError, choice
 from ..frame import LAYERS, SEEN, USUAL, Frame
 from ..vectors import Directions, Ids
 from . import following, intersection, transport
@@ -82,11 +82,10 @@ class Job:
         _check_range("first_sample", self.first_sample, 0, MAX_SAMPLES - self.spp)
         _check_range("feature_spp", self.feature_spp, 0, MAX_SAMPLES - self.first_sample)
         if self.dtype not in ("float32", "float64"):
-            raise InputError("dtype", self.dtype, "it must be float32 or float64", "choose one of them")
-        known = transport.CAMERA_SAMPLERS
-        if self.feature_sampler and self.feature_sampler not in known:
-            rule = f"known are {', '.join(known)}"
-            raise InputError("feature_sampler", self.feature_sampler, "it is unknown", rule)
+            raise InputError("dtype", self.dtype, "must be float32 or float64", "convert it")
+        source, known = self.feature_sampler, transport.CAMERA_SAMPLERS
+        if source and source not in known:
+            raise InputError("feature_sampler", source, "unknown", choice(source, known))
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -120,7 +119,7 @@ class Render:
 def _check_range(name: str, value: Any, low: int, high: int) -> None:
     """Refuse an argument that is not an integer from low to high."""
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or not low <= value <= high:
-        raise InputError(name, value, f"it must be an integer from {low} to {high}", "choose another value")
+        raise InputError(name, value, f"must be an integer from {low} to {high}", "choose another value")
 
 
 def render(
@@ -220,7 +219,7 @@ def checked_rows(job: Job, rows: tuple[int, int] | None) -> tuple[int, int]:
     """Return the rows [first, last) of a job, all for None, or refuse them."""
     first, last = rows if rows is not None else (0, job.height)
     if not 0 <= first < last <= job.height:
-        raise InputError("rows", rows, f"they must be a range within 0 to {job.height}", "give first < last")
+        raise InputError("rows", rows, f"must be a range within 0 to {job.height}", "give first < last")
     return first, last
 
 

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
-from ..errors import InputError
+from ..errors import NO_VALUE, InputError, choice
 from ..reading import Special, parse_json, to_dataclass
 from .materials import MATERIALS, Material
 from .shapes import SHAPES, Shape
@@ -150,25 +150,26 @@ def from_json(text: str | bytes) -> Scene:
     """
     data = parse_json(text, "scene", "fix the text: a scene is a JSON object")
     if not isinstance(data, dict):
-        raise InputError("scene text", data, "a scene is a JSON object", "take one from `wamnet scene`")
+        raise InputError("scene", data, "must be a JSON object", "take one from `wamnet scene`")
     form, version = data.pop("format", None), data.pop("version", None)
     if form != FORMAT:
-        raise InputError("scene.format", repr(form), f"it must be {FORMAT!r}", "is this a scene?")
+        raise InputError("scene.format", form, f"must be {FORMAT!r}", "check that the file is a scene")
     if version is True or version != VERSION:
-        rule = f"it must be {VERSION}"
-        raise InputError("scene.version", repr(version), rule, "convert the file or update wamnet")
+        rule = f"must be {VERSION}"
+        raise InputError("scene.version", version, rule, "convert the file or update wamnet")
     return validate(to_dataclass(Scene, data, "scene", largest=LARGEST_NUMBER, special=SPECIAL))
 
 
 def _material(value: Any, path: str) -> Material:
     """Make a material from a JSON object with its `kind`."""
     if not isinstance(value, dict):
-        raise InputError(path, value, "it must be a JSON object", 'give a kind: {"kind": "mirror"}')
+        raise InputError(path, value, "must be a JSON object", 'give a kind: {"kind": "mirror"}')
     data = dict(value)
     kind = data.pop("kind", None)
     if not isinstance(kind, str) or kind not in MATERIALS:
-        rule = "no material has this name" if "kind" in value else "it is required"
-        raise InputError(f"{path}.kind", repr(kind), rule, f"known are {', '.join(MATERIALS)}")
+        if "kind" not in value:
+            raise InputError(f"{path}.kind", NO_VALUE, "missing", f"choose one of {', '.join(MATERIALS)}")
+        raise InputError(f"{path}.kind", kind, "unknown material", choice(str(kind), MATERIALS))
     return to_dataclass(MATERIALS[kind], data, path, largest=LARGEST_NUMBER)
 
 
@@ -248,16 +249,12 @@ def _check_camera(camera: Camera) -> None:
     _check_finite(camera, "scene.camera")
     path, fov = "scene.camera", camera.vertical_fov_deg
     if not 0.0 < fov < 180.0:
-        raise InputError(
-            f"{path}.vertical_fov_deg", fov, "it must lie between 0 and 180", "40 is a usual angle"
-        )
+        raise InputError(f"{path}.vertical_fov_deg", fov, "must lie between 0 and 180", "40 is a usual angle")
     forward = _difference(camera.look_at, camera.position)
     if length(forward) == 0.0:
-        raise InputError(
-            f"{path}.look_at", camera.look_at, "it must differ from position", "move one of them"
-        )
+        raise InputError(f"{path}.look_at", camera.look_at, "must differ from position", "move one of them")
     if not spans_area(forward, camera.up):
-        raise InputError(f"{path}.up", camera.up, "it must not be parallel to the view", "choose another up")
+        raise InputError(f"{path}.up", camera.up, "must not be parallel to the view", "choose another up")
 
 
 def _check_sky(sky: Sky, background: Vector) -> None:
@@ -269,10 +266,10 @@ def _check_sky(sky: Sky, background: Vector) -> None:
         )
     if length(sky.sun_direction) == 0.0:
         raise InputError(
-            f"{path}.sun_direction", sky.sun_direction, "it must not be zero", "straight up is 0, 1, 0"
+            f"{path}.sun_direction", sky.sun_direction, "must not be zero", "straight up is 0, 1, 0"
         )
     if not 0.0 <= sky.sun_concentration <= LARGEST_CONCENTRATION:
-        rule = f"it must lie in [0, {LARGEST_CONCENTRATION:g}]"
+        rule = f"must lie in [0, {LARGEST_CONCENTRATION:g}]"
         raise InputError(f"{path}.sun_concentration", sky.sun_concentration, rule, "1000 is a sun in haze")
     if max(background) > 0.0:
         rule = "an environment takes the background's place"
@@ -282,14 +279,12 @@ def _check_sky(sky: Sky, background: Vector) -> None:
 def _check_room(room: Room, path: str) -> None:
     for i, (low, high) in enumerate(zip(room.low, room.high, strict=True)):
         if not low < high:
-            raise InputError(
-                f"{path}.high[{i}]", high, f"it must exceed low[{i}] = {low}", "swap or move them"
-            )
+            raise InputError(f"{path}.high[{i}]", high, f"must exceed low[{i}] = {low}", "swap or move them")
     for i, reflectance in enumerate(room.reflectances):
         _check(reflectance, f"{path}.reflectances[{i}]", _is_share, *_SHARE_RULE)
     if len(room.materials) not in (0, len(WALLS)):
         count = f"{len(room.materials)} entries"
-        raise InputError(f"{path}.materials", count, "they must be six or none", "use null for matte walls")
+        raise InputError(f"{path}.materials", count, "must be six or none", "use null for matte walls")
     for i, material in enumerate(room.materials):
         _check_material(material, f"{path}.materials[{i}]", has_inside=False)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, suggested
+from ..errors import InputError, choice
 from .materials import Conductor, Dielectric, Mirror
 from .scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sky, Sphere, Vector, validate
 
@@ -254,18 +254,18 @@ CANONICAL: dict[str, Callable[..., Scene]] = {
 def canonical(name: str, **parameters: Any) -> Scene:
     """Return a canonical scene by name; raise InputError for an unknown name, and wrong parameters."""
     if name not in CANONICAL:
-        raise InputError("scene", name, "no canonical scene has this name", suggested(name, CANONICAL))
+        raise InputError("scene", name, "unknown", choice(name, CANONICAL) + ", or give a .json file")
     known = inspect.signature(CANONICAL[name]).parameters
     for parameter, value in parameters.items():
-        what = f"parameter {parameter}"
         if parameter not in known:
-            raise InputError(what, value, f"{name} has none such", f"known are {', '.join(known)}")
+            raise InputError("parameter", parameter, f"unknown to scene {name}", choice(parameter, known))
         default = known[parameter].default
         if np.shape(value) != np.shape(default):
             wanted = "three numbers with commas" if np.shape(default) else "one number"
-            raise InputError(what, value, f"{name} wants {wanted}", f"for example {default}")
+            rule = f"scene {name} needs {wanted}"
+            raise InputError(f"parameter {parameter}", value, rule, f"for example {default}")
     time = parameters.get("time", 0.0)
     if not abs(time) <= LARGEST_TIME_S:
-        rule = f"it must be a number from {-LARGEST_TIME_S:g} to {LARGEST_TIME_S:g} seconds"
+        rule = f"must be a number from {-LARGEST_TIME_S:g} to {LARGEST_TIME_S:g} seconds"
         raise InputError("time", time, rule, f"the scenes repeat every {TURN_SECONDS:g} seconds")
     return validate(CANONICAL[name](**parameters))

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from .. import rng, vectors
-from ..errors import InputError
+from ..errors import InputError, choice
 from ..vectors import Colors, Directions, Floats, Ids, Normals, Points, Radiance, Truths
 from . import environment, intersection, sampling, shading, sobol
 from .environment import Environment
@@ -102,26 +102,22 @@ class Settings:
     def __post_init__(self) -> None:
         """Refuse settings outside their rules."""
         if not isinstance(self.max_depth, int) or self.max_depth < 0:
-            raise InputError(
-                "max_depth", self.max_depth, "it counts scatterings", "use an integer of 0 or more"
-            )
+            raise InputError("max_depth", self.max_depth, "must be an integer of 0 or more", "5 is usual")
         if self.max_depth >= LARGEST_DEPTH:
-            rule = f"random numbers are counted in 32 bits: it must be below {LARGEST_DEPTH}"
+            rule = f"must be below {LARGEST_DEPTH}, since random numbers are counted in 32 bits"
             raise InputError("max_depth", self.max_depth, rule, "5 is usual")
         if self.roulette_depth is not None and not 0 <= self.roulette_depth < LARGEST_DEPTH:
-            rule = f"it must be 0 or more, and below {LARGEST_DEPTH}"
+            rule = f"must be 0 or more, and below {LARGEST_DEPTH}"
             raise InputError("roulette_depth", self.roulette_depth, rule, "use None for none")
         if self.strategy not in STRATEGIES:
-            raise InputError("strategy", self.strategy, "it is unknown", f"known are {', '.join(STRATEGIES)}")
+            raise InputError("strategy", self.strategy, "unknown", choice(self.strategy, STRATEGIES))
         if self.heuristic not in HEURISTICS:
-            raise InputError(
-                "heuristic", self.heuristic, "it is unknown", f"known are {', '.join(HEURISTICS)}"
-            )
+            raise InputError("heuristic", self.heuristic, "unknown", choice(self.heuristic, HEURISTICS))
         if self.sampler == NET and self.max_depth > 0:
-            rule = "its numbers are for camera rays, not for scatterings"
-            raise InputError("sampler", self.sampler, rule, f"use one of {', '.join(SAMPLERS)}")
+            rule = "samples camera rays only, not scatterings"
+            raise InputError("sampler", self.sampler, rule, f"choose one of {', '.join(SAMPLERS)}")
         if self.sampler not in CAMERA_SAMPLERS:
-            raise InputError("sampler", self.sampler, "it is unknown", f"known are {', '.join(SAMPLERS)}")
+            raise InputError("sampler", self.sampler, "unknown", choice(self.sampler, SAMPLERS))
 
     def facts(self) -> dict[str, Any]:
         """Return the settings by name, without the sampler where it is the default."""

@@ -86,7 +86,7 @@ def check_ranges(ranges: Ranges) -> None:
         if pair is None:
             continue
         low, high = _limits(name)
-        rule = f"LOW:HIGH within {low:g} to {high:g}, LOW not above HIGH"
+        rule = f"must be LOW:HIGH within {low:g} to {high:g}, LOW not above HIGH"
         if not (all(map(math.isfinite, pair)) and low <= pair[0] <= pair[1] <= high):
             raise InputError(f"range of {name}", f"{pair[0]}:{pair[1]}", rule, "choose other limits")
 
@@ -142,12 +142,12 @@ def varied(scene: Scene, variation: Variation) -> Scene:
     for name in ("yaw_deg", "pitch_deg", "distance"):
         value, (low, high) = getattr(v, name), _limits(name)
         if not low <= value <= high:
-            raise InputError(name, value, f"it must be a number from {low:g} to {high:g}", "choose another")
+            raise InputError(name, value, f"must be a number from {low:g} to {high:g}", "choose another")
     lights = scene.lights
     if v.lights:
         if len(v.lights) != len(lights):
             rule = f"the scene has {len(lights)}"
-            raise InputError("number of lamps' colours", len(v.lights), rule, "give one for each")
+            raise InputError("number of light colours", len(v.lights), rule, "give one per light")
         lights = tuple(replace(light, color=color) for light, color in zip(lights, v.lights, strict=True))
     told = {name: repr(float(getattr(v, name))) for name in ("yaw_deg", "pitch_deg", "distance")}
     told["lights"] = json.dumps([light.color for light in lights])

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, choice
 
 Array = NDArray[np.floating[Any]]
 
@@ -100,6 +100,5 @@ ACTIVATIONS: Mapping[str, Activation] = {
 def activation_named(name: str) -> Activation:
     """Return the activation, or say which ones there are."""
     if name not in ACTIVATIONS:
-        known = ", ".join(ACTIVATIONS)
-        raise InputError("activation", name, "not a known activation", f"use one of {known}")
+        raise InputError("activation", name, "unknown", choice(name, ACTIVATIONS))
     return ACTIVATIONS[name]

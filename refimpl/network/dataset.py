@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..encoding import to_display
-from ..errors import InputError
+from ..errors import NO_VALUE, InputError, choice
 from ..frame import FIRST_HIT, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
@@ -300,20 +300,20 @@ class Window:
 def check_window(window: Window) -> None:
     """Refuse a size or a border rule that means nothing."""
     if not isinstance(window.size, int) or not 1 <= window.size <= LARGEST_WINDOW_PX:
-        rule = f"an integer from 1 to {LARGEST_WINDOW_PX}"
+        rule = f"must be an integer from 1 to {LARGEST_WINDOW_PX}"
         raise InputError("window size", window.size, rule, "the paper's is 12")
     if window.border not in BORDERS:
-        raise InputError("window border", window.border, "a known rule", f"use one of {', '.join(BORDERS)}")
+        raise InputError("window border", window.border, "unknown", choice(window.border, BORDERS))
 
 
 def check_features(features: Sequence[str]) -> None:
     """Refuse feature names that are unknown, repeated or none."""
-    known = ", ".join(FEATURES)
     for name in features:
         if name not in FEATURES:
-            raise InputError("feature name", name, "not a known feature", f"use some of {known}")
+            raise InputError("feature", name, "unknown", choice(name, FEATURES))
     if not features or len(set(features)) != len(features):
-        raise InputError("features", ", ".join(features), "at least one, each once", f"use some of {known}")
+        rule = "must be at least one, each once"
+        raise InputError("features", ", ".join(features), rule, f"choose some of {', '.join(FEATURES)}")
 
 
 def check_normalization(normalization: Normalization) -> None:
@@ -323,11 +323,11 @@ def check_normalization(normalization: Normalization) -> None:
         least, most = NORMALIZATION_LIMITS[name]
         if not least <= value <= most:
             raise InputError(
-                name, value, f"finite, from {least:g} to {most:g}", "use normalization_of(frames)"
+                name, value, f"must be from {least:g} to {most:g}", "use normalization_of(frames)"
             )
     center = normalization.position_center
     if len(center) != 3 or not all(abs(value) <= LARGEST_SCALE for value in center):
-        rule = f"three finite numbers of at most {LARGEST_SCALE:g} in magnitude"
+        rule = f"must be three finite numbers of at most {LARGEST_SCALE:g} in magnitude"
         raise InputError("position_center", center, rule, "use normalization_of(frames)")
 
 
@@ -539,7 +539,7 @@ def build(
 def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
     """Refuse no pairs, pairs whose pictures differ in size, and noisy frames with what is not a number."""
     if not pairs:
-        raise InputError("training pairs", "none", "at least one", "give a noisy frame and its reference")
+        raise InputError("training pairs", NO_VALUE, "missing", "give a noisy frame and its reference")
     for index, (noisy, reference) in enumerate(pairs):
         for name, values in noisy.layers.items():
             check_finite(f"pair {index}: layer {name!r}", values)

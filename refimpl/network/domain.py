@@ -230,13 +230,13 @@ def from_json(text: str) -> Domain:
     for name in ("middle", "scale"):
         rows = getattr(domain, name)
         if [len(row) for row in rows] != [channels] * len(STATISTICS):
-            rule = f"it must have {len(STATISTICS)} rows of {channels} numbers"
+            rule = f"must have {len(STATISTICS)} rows of {channels} numbers"
             raise InputError(f"{DOMAIN}.{name}", rows, rule, WAY_OUT)
     least = min(number for row in domain.scale for number in row)
     limits = {"scale": (least, 0.0), "threshold": (domain.threshold, 0.0), "rate": (domain.rate, 0.0)}
     for name, (number, low) in limits.items():
         if not low < number < math.inf:
-            raise InputError(f"{DOMAIN}.{name}", number, "it must be positive", WAY_OUT)
+            raise InputError(f"{DOMAIN}.{name}", number, "must be positive", WAY_OUT)
     return domain
 
 

@@ -7,7 +7,7 @@
 3. A picture is that function of the window of each pixel [`evaluate`].
 
 Convolutions are such layers: a neuron for each channel at each place that the window's middle depends on.
-compiler/importing makes them of a graph in ONNX's form. Source of the operators' meanings: ONNX, "Operator
+models/importing makes them of a graph in ONNX's form. Source of the operators' meanings: ONNX, "Operator
 Schemas", operators 1 to 22.
 """
 

@@ -102,10 +102,12 @@ def init(
 def check_shape(widths: Sequence[int], omega_0_first: float, omega_0_hidden: float) -> None:
     """Refuse widths and omegas that name no network."""
     if len(widths) < 2 or any(not isinstance(width, int) or width < 1 for width in widths):
-        raise InputError("widths", tuple(widths), "at least two integers >= 1", "give D_in, ..., D_out")
+        raise InputError(
+            "widths", tuple(widths), "must be two or more positive integers", "give D_in, ..., D_out"
+        )
     for name, omega_0 in (("omega_0_first", omega_0_first), ("omega_0_hidden", omega_0_hidden)):
         if not 0 < omega_0 <= LARGEST_PARAMETER:
-            rule = f"finite and > 0, at most {LARGEST_PARAMETER:g}"
+            rule = f"must be positive and at most {LARGEST_PARAMETER:g}"
             raise InputError(name, omega_0, rule, "use 1 to 30; small values smooth more")
 
 

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..errors import InputError, TrainingError
+from ..errors import NO_VALUE, InputError, TrainingError, choice
 from ..frame import Frame
 from ..reading import parse_json, to_dataclass
 from . import adam, dataset, factored, siren, whole
@@ -168,30 +168,31 @@ def check_recipe(recipe: Recipe) -> None:
     for name, least in counts.items():
         value = getattr(recipe, name)
         if not isinstance(value, int) or not least <= value < POOL_STREAM:
-            rule = f"an integer from {least} to {POOL_STREAM - 1}"
+            rule = f"must be an integer from {least} to {POOL_STREAM - 1}"
             raise InputError(f"recipe: {name}", value, rule, "see the presets " + ", ".join(PRESETS))
     if not (math.isfinite(recipe.learning_rate) and recipe.learning_rate > 0):
-        raise InputError("recipe: learning_rate", recipe.learning_rate, "finite and > 0", "try 0.001")
+        raise InputError(
+            "recipe: learning_rate", recipe.learning_rate, "must be finite and positive", "try 0.001"
+        )
     if recipe.rank > 0:
         factored.check_rank(recipe.rank, recipe.window.size, *recipe.layer_widths[:2])
     activation_named(recipe.activation)
     if recipe.whole:
         _check_whole(recipe)
     if recipe.schedule not in SCHEDULES:
-        known = ", ".join(SCHEDULES)
-        raise InputError("recipe: schedule", recipe.schedule, "not a known schedule", f"use one of {known}")
+        raise InputError("recipe: schedule", recipe.schedule, "unknown", choice(recipe.schedule, SCHEDULES))
 
 
 def _check_whole(recipe: Recipe) -> None:
     """Refuse what does not become a network of integers."""
     if recipe.whole not in SINES:
         known = ", ".join(map(str, SINES))
-        rule = f"the largest value of a known sine: {known}"
-        raise InputError("recipe: whole", recipe.whole, rule, "use one of these, or 0 for floats")
+        rule = "must be the largest value of an integer sine"
+        raise InputError("recipe: whole", recipe.whole, rule, f"choose one of {known}, or 0 for floats")
     for name, floats in (("rank", 0), ("activation", SINE)):
         value = getattr(recipe, name)
         if value != floats:
-            rule = "a network of integers has sines, and no rank"
+            rule = "integer networks have sines, and no rank"
             raise InputError(f"recipe: {name}", value, rule, f"use {floats}, or train floats")
 
 
@@ -300,12 +301,12 @@ def start(
 def _check_network(network: Siren, recipe: Recipe) -> None:
     """Refuse to continue with a network of integers, or of another shape than the recipe's."""
     if isinstance(network, Whole):
-        rule = "training moves floats"
-        raise InputError("first network", "of integers", rule, "begin with the model that was rounded")
+        rule = "is an integer network, and training needs floats"
+        raise InputError("first network", NO_VALUE, rule, "start with the model that was rounded")
     has = (network.widths, network.omega_0_first, network.omega_0_hidden, network.activation)
     wants = (recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden, recipe.activation)
     if has != wants:
-        rule = f"the recipe has {wants}"
+        rule = f"must be those of the recipe, {wants}"
         what = "widths, omegas and activation of the first network"
         raise InputError(what, has, rule, "use the recipe that it had")
 
@@ -366,8 +367,8 @@ def check_parameters(state: TrainState) -> None:
     """Refuse to hand out parameters that the last step made infinite or NaN."""
     if not all(np.isfinite(array).all() for array in state.siren.weights + state.siren.biases):
         raise TrainingError(
-            f"parameters after step {state.step} are not finite: they must be; lower the learning rate "
-            f"({state.recipe.learning_rate}) or check the frames"
+            f"parameters after step {state.step}: must be finite "
+            f"(lower the learning rate, {state.recipe.learning_rate}, or check the frames)"
         )
 
 
@@ -415,8 +416,8 @@ def check_loss(loss: float, step: int, recipe: Recipe) -> None:
     """Refuse to follow a gradient when the loss is not finite."""
     if not math.isfinite(loss):
         raise TrainingError(
-            f"loss at step {step} is {loss}: it must stay finite; lower the learning rate "
-            f"({recipe.learning_rate}) or check the frames"
+            f"loss at step {step} {loss}: must stay finite "
+            f"(lower the learning rate, {recipe.learning_rate}, or check the frames)"
         )
 
 
@@ -550,9 +551,9 @@ def check_state(state: TrainState) -> None:
         for index, (array, shape) in enumerate(zip(arrays, shapes, strict=True)):
             what, way_out = f"{name} {index}", "start a new run"
             if array.shape != shape or array.dtype != state.siren.dtype or array.dtype.kind != "f":
-                rule = f"its recipe calls for {shape}, all of one float type"
+                rule = f"must be of shape {shape} and one float type"
                 raise InputError(what, f"{array.dtype} {array.shape}", rule, way_out)
             if name == "parameter" and not np.isfinite(array).all():
-                raise InputError(what, "NaN or infinite", "parameters must be finite", way_out)
+                raise InputError(what, NO_VALUE, "must be finite", way_out)
     if not 0 <= state.step <= state.recipe.steps:
-        raise InputError("step", state.step, f"from 0 to {state.recipe.steps}", "start a new run")
+        raise InputError("step", state.step, f"must be from 0 to {state.recipe.steps}", "start a new run")

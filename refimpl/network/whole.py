@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import NO_VALUE, InputError
 from .activation import SINE
 from .siren import Siren
 
@@ -190,8 +190,8 @@ def rounded(siren: Siren, size: int, amplitude: int = 127) -> Whole:
         found = Whole(weights, biases, *omegas, siren.activation, factors, amplitude, fraction)
         if not any(_faults(found)):
             return found
-    rule = f"sums of the last layer must stay below {LARGEST_INT / COLOUR_STEPS:.6g} in colour"
-    raise InputError("network to be rounded", "too large", rule, "train the model again")
+    rule = f"is too large: sums of the last layer must stay below {LARGEST_INT / COLOUR_STEPS:.6g} in colour"
+    raise InputError("network to be rounded", NO_VALUE, rule, "train the model again")
 
 
 def _unit(siren: Siren, layer: int, fraction: int = 0) -> float:
@@ -302,13 +302,13 @@ def diffused(taps: Array, most: int) -> Array:
 def _check_roundable(siren: Siren, size: int, amplitude: int) -> None:
     """Refuse a network without angles, one that is rounded already, and an amplitude without a sine."""
     if siren.activation != SINE:
-        rule = "integers have a sine, no other activation"
+        rule = "integer networks have sines only"
         raise InputError("activation", siren.activation, rule, f"train with --activation {SINE}")
     if isinstance(siren, Whole):
-        raise InputError("network to be rounded", "of integers", "is rounded already", "use it as it is")
+        raise InputError("network to be rounded", NO_VALUE, "is rounded already", "use it as it is")
     if amplitude not in SINES:
-        known = " or ".join(map(str, SINES))
-        raise InputError("amplitude", amplitude, "the largest hidden value of a known sine", f"use {known}")
+        rule = "must be the largest value of an integer sine"
+        raise InputError("amplitude", amplitude, rule, f"choose one of {', '.join(map(str, SINES))}")
     n_in = siren.widths[0]
     if size < 1 or n_in % (size * size) or n_in > MOST_INPUTS or max(siren.widths[1:]) > MOST_INPUTS:
         rule = (

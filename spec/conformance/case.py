@@ -135,8 +135,8 @@ def check_integers(kind: Kind, inputs: Mapping[str, Any]) -> None:
     """Refuse a request whose integers are not integers of JSON."""
     for name in kind.integers:
         if name in inputs and type(inputs[name]) is not int:
-            rule = "it must be an integer of JSON"
-            raise InputError(name, json.dumps(inputs[name]), rule, "write it without a point")
+            rule = "must be an integer of JSON"
+            raise InputError(name, inputs[name], rule, "write it without a point")
 
 
 def text_of(kind: Kind) -> str:
@@ -191,7 +191,7 @@ def _placed(value: Any, folder: Path) -> Any:
     names = named.split("/") if isinstance(named, str) else [named]
     path = folder.joinpath(*(plain_name(name, "file of a vector", WAY_OUT) for name in names)).resolve()
     if not path.is_relative_to(folder.resolve()):
-        rule = "it must lie in the folder of vectors, also where it is a link"
+        rule = "must lie in the folder of vectors, also where it is a link"
         raise InputError("file of a vector", named, rule, WAY_OUT)
     return {**value, "file": str(path)}
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.reading import read_file, refusing
 
 
@@ -53,8 +53,8 @@ def rounded_up(bound: Any) -> Any:
 def from_file(value: Mapping[str, Any], what: str) -> NDArray[np.float32]:
     """Return the array (...) in the file that a JSON value names."""
     way_out = "see spec/conformance.md"
-    rule = "it must name a file of little-endian float32 of its shape"
-    with refusing(what, _shortened(value), rule, way_out):
+    rule = "must name a file of little-endian float32 of its shape"
+    with refusing(what, value, rule, way_out):
         shape = tuple(int(side) for side in value["shape"])
         raw = read_file(str(value["file"]), what, way_out, stated=4 * math.prod(shape))
         return np.frombuffer(raw, "<f4").astype(np.float32).reshape(shape)
@@ -84,7 +84,7 @@ def from_json(value: Any, what: str) -> NDArray[Any]:
     try:
         flat = list(_leaves(value))
     except RecursionError:
-        raise InputError(what, "nested too deeply", "it must be a list of numbers", "see spec") from None
+        raise InputError(what, NO_VALUE, "is nested too deeply", "give a list of numbers") from None
     if flat and all(isinstance(leaf, bool) for leaf in flat):
         return np.array(value, np.bool_)
     if flat and all(isinstance(leaf, int) and not isinstance(leaf, bool) for leaf in flat):
@@ -113,9 +113,7 @@ def _array(value: Any, convert: Any, dtype: Any, what: str) -> NDArray[Any]:
         raise
     except (ValueError, OverflowError, RecursionError):
         rule = "lists must be of one length on each axis, integers below 2**63"
-        raise InputError(
-            what, _shortened(value), rule, "answer with the shape that the format page states"
-        ) from None
+        raise InputError(what, value, rule, "answer with the shape that the format page states") from None
 
 
 def _float(leaf: Any, what: str) -> float:
@@ -127,11 +125,5 @@ def _float(leaf: Any, what: str) -> float:
             return float(leaf)
     except (ValueError, OverflowError):
         pass
-    rule = "it must be a number, as JSON or as text such as 0x1.8p+1"
-    raise InputError(what, _shortened(leaf), rule, "see the format page of this kind")
-
-
-def _shortened(value: Any) -> str:
-    """Return a value as a text that fits a line."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    rule = "must be a number, as JSON or as text such as 0x1.8p+1"
+    raise InputError(what, leaf, rule, "see the format page of this kind")

@@ -29,7 +29,8 @@ from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_sc
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, target_named
-from ...kernels.devices.executor import Executor, Part
+from ...kernels.devices.executor import Executor
+from ...kernels.devices.kernel import Part
 from ...kernels.run.denoise_on import denoise_on
 from ...kernels.run.render_on import render_on
 from ...refimpl.errors import CompileError

@@ -72,7 +72,7 @@ def read_vectors(folder: Path) -> dict[str, list[Case]]:
     """Return all cases under a folder, by kind."""
     paths = sorted(path for path in folder.glob("*.json") if path.name != SCHEMA)
     if not paths:
-        rule = "it holds no file of vectors"
+        rule = "holds no file of vectors"
         raise InputError("folder of vectors", str(folder), rule, "give spec/vectors or a copy of it")
     return dict(cases_module.load(path) for path in paths)
 
@@ -119,7 +119,7 @@ def introduced(session: Session) -> Mapping[str, Any]:
     try:
         return session.hello()
     except NoAnswerError as error:
-        rule = f"it must answer to hello ({error.verdict}: {error})"
+        rule = f"must answer to hello ({error.verdict}: {error})"
         way_out = "see spec/conformance.md; --timeout gives it more time"
         raise InputError("--program", " ".join(session.command), rule, way_out) from None
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...compiler.core.writing import write_together
+from ...models.writing import write_together
 from ...refimpl.errors import InputError
 from .case import FORMAT, VERSION, Kind, text_of
 from .kinds import KINDS
@@ -182,6 +182,6 @@ def write(folder: Path) -> int:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            "folder of vectors", str(folder), f"it cannot be written ({reason})", "choose another"
+            "folder of vectors", str(folder), f"cannot be written: {reason}", "choose another"
         ) from None
     return len(found)

@@ -12,7 +12,7 @@ from small_page import SmallPage, make
 
 from wamnet.cli.files import exr
 from wamnet.cli.main import main
-from wamnet.compiler.model_file import save_model
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import siren

@@ -16,8 +16,8 @@ from PIL import Image
 from wamnet.cli.commands import animate
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels.run.render_frame import render_frame
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
@@ -41,7 +41,7 @@ def model(samples, tmp_path) -> None:
 def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     """Noisy, denoised and reference of the second time, side by side below their labels."""
     outcome = wamnet("animate", "m.safetensors", *SHORT, "--reference-spp", 2, "--start", 1, "-o", "a")
-    assert (outcome.status, outcome.out) == (0, "a: 2 pictures, 2 of them made now\n")
+    assert (outcome.status, outcome.out) == (0, "a: 2 frames, 2 of them rendered now\n")
     network, scene = load_model(tmp_path / "m.safetensors"), canonical("minicubes", time=1.2)
     noisy, reference = (render(scene, Job(13, 13, spp, seed)).frame for spp, seed in ((1, 2), (2, 3)))
     got = read_png(tmp_path / "a/00001.png")
@@ -126,7 +126,7 @@ def test_a_network_that_sees_the_history_gets_that_of_the_film(
     before = last.read_bytes()
     last.unlink()
     assert wamnet("animate", "h.safetensors", *film, "-o", "a").out.endswith(
-        "3 pictures, 1 of them made now\n"
+        "3 frames, 1 of them rendered now\n"
     )
     assert last.read_bytes() == before
 
@@ -146,7 +146,7 @@ def test_a_network_that_sees_the_sun_gets_it(wamnet, tmp_path, monkeypatch, exec
     got = read_png(tmp_path / "day" / "00000.png")[LABEL_PX:-1, 13:26]
     # As for the history above.
     assert np.abs(got - denoise(load_model(tmp_path / "sun.safetensors"), whole)).max() <= 1.0 / 255
-    text = "features is sun: a path kernel knows what a pixel's paths meet, not where the sun is"
+    text = "features 'sun': a path kernel knows what a pixel's paths meet, not where the sun is"
     assert text in wamnet("view", "sun.safetensors", "--scene", "daylight", "-o", "page.html").err
 
 
@@ -158,7 +158,7 @@ def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
     save_model(tmp_path / "f.safetensors", replace(network, info=facts))
     two = ("--scene", "mine.json", "--yaw", 9, "--seconds", 0.2, "--fps", 10, "--size", 13)
     outcome = wamnet("animate", "f.safetensors", *two, "-o", "still")
-    assert "2 of 2 pictures are unlike those of the training: cornell is another scene file" in outcome.out
+    assert "2 of 2 frames are unlike those of the training: cornell is another scene file" in outcome.out
     shown = varied(canonical("cornell"), Variation(9.0))
     for index in (0, 1):
         noisy = encoding.to_display(render(shown, Job(13, 13, seed=2 * index)).frame["color"], 0.0)
@@ -166,7 +166,7 @@ def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
         # Half a step of 8 bits, and a rounding to float32 of either value.
         assert np.abs(got - noisy).max() <= 0.5 / 255 + 2.0**-23
     (tmp_path / "mine.json").write_text((tmp_path / "mine.json").read_text().replace("0.73", "0.74"))
-    assert "it holds something else: 00000.png" in wamnet("animate", "f.safetensors", *two, "-o", "still").err
+    assert "holds something else: 00000.png" in wamnet("animate", "f.safetensors", *two, "-o", "still").err
 
 
 def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
@@ -177,7 +177,7 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     assert (animate.scene_of(learned), learned_feature_spp(learned)) == ("cornell", 3)
     assert (animate.scene_of(network), learned_feature_spp(network)) == ("minicubes", 0)
     file = replace(network, info={"trained_on_scene": "cornell", "trained_on_scene_sha256": "0" * 64})
-    with pytest.raises(InputError, match="trained on is cornell: it is that of a scene file; name the file"):
+    with pytest.raises(InputError, match=r"trained on 'cornell': is that of a scene file \(name the file"):
         animate.scene_of(file)
     odd = replace(network, info={"trained_on_scene": "cornell, empty", "trained_on_feature_spp": "1, 3"})
     assert (animate.scene_of(odd), learned_feature_spp(odd)) == ("minicubes", 3)
@@ -200,7 +200,7 @@ def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
     network = load_model(tmp_path / "m.safetensors")
     learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
     save_model(tmp_path / "n.safetensors", replace(network, info=learned))
-    begin, unlike = "outside of what the model has learned: ", "pictures are unlike those of the training: "
+    begin, unlike = "outside the training ranges: ", "frames are unlike those of the training: "
     outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
     assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
     outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")
@@ -230,7 +230,7 @@ def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> N
         cut, low, full = (read_png(tmp_path / folder / picture) for folder in ("cut", "low", "full"))
         assert np.abs(np.rint(255 * (cut - low))).max() <= 1
         assert np.abs(np.rint(255 * (cut - full))).max() > 1
-    text = "it holds something else: 00000.png"
+    text = "holds something else: 00000.png"
     assert text in refused("animate", "m.safetensors", *SHORT, *devices, "--rank", 1, "-o", "cut")
 
 
@@ -238,7 +238,7 @@ def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> N
 def test_films(wamnet, tmp_path, suffix) -> None:
     """As many pictures of that size as the animation has; their folder is gone."""
     outcome = wamnet("animate", "m.safetensors", *SHORT, "-o", f"f{suffix}")
-    assert (outcome.status, outcome.out) == (0, f"f{suffix}: 2 pictures, 2 of them made now\n")
+    assert (outcome.status, outcome.out) == (0, f"f{suffix}: 2 frames, 2 of them rendered now\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"f{suffix}", "m.safetensors"]
     if suffix == ".gif":
         with Image.open(tmp_path / "f.gif") as film:
@@ -270,7 +270,7 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(animate, "write_shot", write)
     (tmp_path / "a.gif.frames/00001.png").write_bytes(b"damaged")
     assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a.gif").out.endswith(
-        "2 pictures, 1 of them made now\n"
+        "2 frames, 1 of them rendered now\n"
     )
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
 
@@ -291,7 +291,7 @@ def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -
     """A pipe was waited for; a header of 60,000 x 60,000 pixels was a traceback of Pillow's."""
     (tmp_path / "a").mkdir()
     os.mkfifo(tmp_path / "a/00000.png")
-    assert "it is not a regular file (a pipe or a device)" in refused(
+    assert "is a pipe or a device, not a regular file" in refused(
         "animate", "m.safetensors", *SHORT, "-o", "a"
     )
     (tmp_path / "a/00000.png").unlink()
@@ -308,7 +308,7 @@ def test_the_folder_of_a_film_s_pictures_is_no_link(refused, tmp_path) -> None:
     """What is in it would be written over and removed."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "a.gif.frames").symlink_to("mine")
-    text = "folder is a.gif.frames: it is a symbolic link, and a folder of this command's own"
+    text = "folder 'a.gif.frames': is a symbolic link, and a folder of this command's own"
     assert text in refused("animate", "m.safetensors", *SHORT, "-o", "a.gif")
 
 
@@ -323,31 +323,31 @@ def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--fps", 0], "it must be finite and last; change it"),
-        (["--fps", 1e9], "number of pictures is 8000000000: a film has 100000 at most"),
-        (["--size", 0], "width is 0"),
-        (["--rank", 9999], "rank is 9999: a window of "),
-        (["--rank", -1], "rank is -1: a window of "),
-        (["--scene", "nowhere"], "scene is nowhere"),
-        (["--reference-spp", -1], "spp is -1"),
+        (["--fps", 0], "must be finite and last (change it"),
+        (["--fps", 1e9], "number of frames 8000000000: an animation has 100000 at most"),
+        (["--size", 0], "width 0"),
+        (["--rank", 9999], "rank 9999: a window of "),
+        (["--rank", -1], "rank -1: a window of "),
+        (["--scene", "nowhere"], "scene 'nowhere"),
+        (["--reference-spp", -1], "spp -1"),
         (
             ["-o", "a.avi"],
-            "output is a.avi: a film's name must end in .mp4 or .gif, a folder's in none; rename",
+            "output 'a.avi': must end in .mp4 or .gif, or name a folder (rename",
         ),
-        (["-o", "no/a.gif"], "output folder is no: it does not exist"),
-        (["-o", "no/a"], "output folder is no: it does not exist"),
-        (["-o", "file"], "output folder is file: it is a file"),
-        (["-o", "full"], "output folder is full: it holds something else: x; choose another with -o"),
-        (["--set", "time=1"], "parameter time is 1.0: each picture has its own; use --start and --seconds"),
-        (["--yaw", 999], "yaw_deg is 999.0: it must be a number from -180 to 180"),
-        (["--light", "3=1,1,1"], "--light is 3=1,1,1: the scene's lamps are 1 to 2"),
-        (["--set", "fps=1"], "parameter fps is 1.0: minicubes has none such; known are time, warm"),
-        (["--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
+        (["-o", "no/a.gif"], "output folder 'no': not found"),
+        (["-o", "no/a"], "output folder 'no': not found"),
+        (["-o", "file"], "output folder 'file': is a file"),
+        (["-o", "full"], "output folder 'full': holds something else: x (choose another with -o"),
+        (["--set", "time=1"], "parameter time 1.0: every frame has its own (use --start and --seconds"),
+        (["--yaw", 999], "yaw_deg 999.0: must be a number from -180 to 180"),
+        (["--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lights are 1 to 2"),
+        (["--set", "fps=1"], "parameter 'fps': unknown to scene minicubes (choose one of time, warm"),
+        (["--set", "warm=1"], "parameter warm 1.0: scene minicubes needs three numbers"),
         (
             ["--fps", 0.001, "--seconds", 2000, "-o", "a.gif"],
-            "--fps is 0.001: a GIF shows each picture for 655.35 s at most; use more, or .mp4",
+            "--fps 0.001: a GIF shows each frame for 655.35 s at most (use more, or .mp4",
         ),
-        (["--fps", 60, "-o", "a.gif"], "--fps is 60.0: a GIF has 50 at most; use fewer, or .mp4"),
+        (["--fps", 60, "-o", "a.gif"], "--fps 60.0: a GIF has 50 at most (use fewer, or .mp4"),
     ],
 )
 def test_refusals(refused, tmp_path, arguments, text) -> None:
@@ -361,11 +361,11 @@ def test_refusals(refused, tmp_path, arguments, text) -> None:
 def test_another_animation_is_refused(wamnet, refused) -> None:
     """Other pictures, and more of them, are not overwritten nor left among the new ones."""
     wamnet("animate", "m.safetensors", *SHORT, "-o", "a")
-    assert "it holds something else: 00000.png" in refused(
+    assert "holds something else: 00000.png" in refused(
         "animate", "m.safetensors", *SHORT, "--seed", 1, "-o", "a"
     )
     fewer = ("--seconds", 0.2, "--fps", 5, "--size", 13)
-    assert "it holds something else: 00001.png" in refused("animate", "m.safetensors", *fewer, "-o", "a")
+    assert "holds something else: 00001.png" in refused("animate", "m.safetensors", *fewer, "-o", "a")
     assert images.LABEL_PX > 0
 
 

@@ -102,7 +102,7 @@ def test_other_weights_are_refused(wamnet, kernel):
 def test_half_a_file_is_a_bad_file(refused, kernel):
     path = kernel / "denoise.certificate.json"
     path.write_bytes(path.read_bytes()[:200])
-    assert "no JSON that can be taken" in refused("certify", path)
+    assert "is not acceptable JSON" in refused("certify", path)
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "../secret", "..", "a/b", ""])
@@ -112,7 +112,7 @@ def test_a_manifest_that_names_other_folders_is_refused_before_they_are_read(ref
     manifest = json.loads(path.read_text())
     path.write_text(json.dumps({**manifest, "files": {**manifest["files"], name: "0"}}))
     (kernel.parent / "secret").write_text("x")
-    assert "it must be the plain name of a file" in refused("certify", kernel)
+    assert "must be the plain name of a file" in refused("certify", kernel)
 
 
 def test_a_pipe_beside_a_kernel_is_refused_at_once(refused, kernel):
@@ -121,14 +121,14 @@ def test_a_pipe_beside_a_kernel_is_refused_at_once(refused, kernel):
     os.mkfifo(kernel / "pipe")
     named = {"files": {**manifest["files"], "pipe": "0"}, "file_bytes": {**manifest["file_bytes"], "pipe": 0}}
     path.write_text(json.dumps({**manifest, **named}))
-    assert "it is not a regular file" in refused("certify", kernel)
+    assert "not a regular file" in refused("certify", kernel)
 
 
 def test_a_file_of_another_length_is_refused(refused, kernel):
     """RDG-4: the manifest states how long it is."""
     with (kernel / "weights.bin").open("r+b") as file:
         file.truncate(8)
-    assert "weights.bin in bytes is 8: it must be the stated one, " in refused("certify", kernel)
+    assert "weights.bin in bytes 8: must be the stated one, " in refused("certify", kernel)
 
 
 @pytest.mark.parametrize("size", [None, -1, 1.5, "8", True])
@@ -136,7 +136,7 @@ def test_a_length_is_a_whole_number(refused, kernel, size):
     path = kernel / "manifest.json"
     manifest = json.loads(path.read_text())
     path.write_text(json.dumps({**manifest, "file_bytes": {**manifest["file_bytes"], "weights.bin": size}}))
-    assert "file_bytes: weights.bin is" in refused("certify", kernel)
+    assert "file_bytes: weights.bin " in refused("certify", kernel)
 
 
 def test_a_manifest_from_before_lengths_is_accepted(wamnet, kernel):
@@ -163,7 +163,7 @@ def test_a_kernel_without_one_is_a_bad_file(wamnet, refused, samples, tmp_path):
     made = wamnet("compile", model, "--target", "glsl", "--profile", "native", "-o", "plain")
     assert made.status == 0
     assert "no certificate: nothing is promised of the sine (" in made.out
-    assert "no such file; kernels of profile ieee have one" in refused("certify", "plain")
+    assert "not found (kernels of profile ieee have one" in refused("certify", "plain")
 
 
 @pytest.mark.parametrize(

@@ -53,12 +53,12 @@ def test_identical_and_tiny_pictures(wamnet, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("names", "text"),
     [
-        (("a.exr", "none.exr"), "input file is none.exr: it does not exist; check the name"),
-        (("a.exr", "a.jpg"), "input file is a.jpg: its name must end in .exr or .png; convert it"),
-        (("a.exr", "text.exr"), "input file is text.exr: it is not an OpenEXR image"),
-        (("a.exr", "text.png"), "input file is text.png: it is not a PNG"),
-        (("a.exr", "small.exr"), "size of a.exr is 13x12: small.exr has 2x1; compare pictures of one size"),
-        (("a.exr", "depth.exr"), "depth.exr: list of layers is depth: color must be among them"),
+        (("a.exr", "none.exr"), "input file 'none.exr': not found (check the name"),
+        (("a.exr", "a.jpg"), "input file 'a.jpg': must end in .exr or .png (convert it"),
+        (("a.exr", "text.exr"), "input file 'text.exr': is not an OpenEXR image"),
+        (("a.exr", "text.png"), "input file 'text.png': is not a PNG"),
+        (("a.exr", "small.exr"), "size of a.exr '13x12': small.exr has 2x1 (compare images of one size"),
+        (("a.exr", "depth.exr"), "depth.exr: list of layers 'depth': color must be among them"),
     ],
 )
 def test_refusals(refused, samples, tmp_path, names, text) -> None:
@@ -119,18 +119,18 @@ def test_unexplained_components_in_words() -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ((), "wamnet compare is incomplete: it needs IMAGE and REFERENCE, or --paths SCENE; see wamnet"),
-        (("a.exr",), "wamnet compare is incomplete: it needs IMAGE and REFERENCE, or --paths SCENE"),
-        (("a.exr", "b.exr", "--width", 64), "argument is --width: it has no meaning without --paths SCENE;"),
-        (("a.exr", "b.exr", "--set", "a=1"), "argument is --set: it has no meaning without --paths SCENE"),
-        (("a.exr", "--paths", "empty"), "argument is IMAGE: it has no meaning with --paths; leave it out"),
-        (("--paths", "empty", "--exposure", 0), "argument is --exposure: it has no meaning with --paths"),
-        (("--paths", "nowhere"), "scene is nowhere: no canonical scene"),
-        (("--paths", "empty", "--width", 0), "width is 0: it must be an integer from 1 to 65536"),
-        (("--paths", "empty", "--max-depth", -1), "max_depth is -1: it counts scatterings"),
+        ((), "wamnet compare: needs IMAGE and REFERENCE, or --paths SCENE (see wamnet"),
+        (("a.exr",), "wamnet compare: needs IMAGE and REFERENCE, or --paths SCENE"),
+        (("a.exr", "b.exr", "--width", 64), "argument '--width': has no meaning without --paths SCENE ("),
+        (("a.exr", "b.exr", "--set", "a=1"), "argument '--set': has no meaning without --paths SCENE"),
+        (("a.exr", "--paths", "empty"), "argument 'IMAGE': has no meaning with --paths (leave it out"),
+        (("--paths", "empty", "--exposure", 0), "argument '--exposure': has no meaning with --paths"),
+        (("--paths", "nowhere"), "scene 'nowhere': unknown"),
+        (("--paths", "empty", "--width", 0), "width 0: must be an integer from 1 to 65536"),
+        (("--paths", "empty", "--max-depth", -1), "max_depth -1: must be an integer of 0 or more"),
         (
             ("--paths", "empty", "--executor", "numpy", "--spp", 1),
-            "spp is 1: Welch's test needs the variance",
+            "spp 1: Welch's test needs the variance",
         ),
     ],
 )

@@ -135,31 +135,31 @@ def test_vectors_are_written(wamnet, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ((), "--program, --executor is neither given: exactly one says who is asked"),
-        (("--program", "a", "--executor", "numpy"), "--program, --executor is both given"),
-        (("--program", "'"), "it is not a command (No closing quotation)"),
-        (("--program", " "), "it is not a command"),
+        ((), "--program and --executor: one of them is needed"),
+        (("--program", "a", "--executor", "numpy"), "--program and --executor: exclude each other"),
+        (("--program", "'"), "is not a command: No closing quotation ("),
+        (("--program", " "), "is not a command"),
         (
             ("--program", "/no/such/program"),
-            "it must answer to hello (crash: /no/such/program cannot be started",
+            "must answer to hello (crash: /no/such/program cannot be started",
         ),
         (
             ("--executor", "abacus"),
-            "--executor is abacus: it is unknown; known are reference, numpy, opencl, opengl",
+            "--executor 'abacus': unknown (choose one of reference, numpy, opencl, opengl",
         ),
         (("--executor", "numpy", "--profile", "fast"), "fast"),
         (
             ("--executor", "numpy", "--timeout", "0"),
-            "--timeout is 0.0: it must be a positive number of seconds",
+            "--timeout 0.0: must be a positive number of seconds",
         ),
         (
             ("--executor", "numpy", "--timeout", "nan"),
-            "--timeout is nan: it must be a positive number of seconds",
+            "--timeout nan: must be a positive number of seconds",
         ),
-        (("--executor", "numpy", "-k", "nothing"), "-k is nothing: no case has such an id, clause or flag"),
-        (("--executor", "numpy", "--vectors", "/no/such/folder"), "it holds no file of vectors"),
-        (("--executor", "numpy", "--json", "/no/such/folder/a"), "output folder is /no/such/folder"),
-        (("--write", "x", "--executor", "numpy"), "--write is x: it makes vectors and asks nobody"),
+        (("--executor", "numpy", "-k", "nothing"), "-k 'nothing': no case has such an id, clause or flag"),
+        (("--executor", "numpy", "--vectors", "/no/such/folder"), "holds no file of vectors"),
+        (("--executor", "numpy", "--json", "/no/such/folder/a"), "output folder '/no/such/folder"),
+        (("--write", "x", "--executor", "numpy"), "--write 'x': it makes vectors and asks nobody"),
     ],
 )
 def test_what_is_refused(wamnet, arguments, text):

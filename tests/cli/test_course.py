@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli.course.labs import LABS
+from wamnet_course.labs import LABS
 
 pytestmark = pytest.mark.needs("programs")
 
@@ -38,7 +38,7 @@ def test_a_folder_has_skeletons_and_no_answers(started):
 
 def test_a_folder_that_holds_something_is_refused(started, refused):
     (started / "lab01_sphere.py").write_text("mine")
-    assert "output folder is mine: it is not empty" in refused("course", "start", "mine")
+    assert "output folder 'mine': is not empty" in refused("course", "start", "mine")
     assert (started / "lab01_sphere.py").read_text() == "mine"
 
 
@@ -82,16 +82,16 @@ def test_a_class_is_graded(wamnet, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("check 13", "lab is 13: there is none of this name; known are lab1, lab2"),
-        ("check 1 nowhere", "folder of answers is nowhere: it is no folder; wamnet course start makes one"),
-        ("check 1 --seconds 0", "--seconds is 0: it must be 1 to 3600"),
-        ("check 1 --memory 1000000", "--memory is 1000000: it must be 1 to 65536"),
-        ("grade nowhere -o out", "folder of students is nowhere: it is no folder"),
-        ("grade empty -o out", "folder of students is empty: it holds no folders"),
-        ("grade full -o full", "output folder is full: it is not empty"),
-        ("grade full -o out --workers 0", "--workers is 0: it must be at least 1"),
-        ("grade full -o out --lab x", "lab is x: there is none of this name"),
-        ("start nowhere/mine", "output folder is nowhere: it does not exist"),
+        ("check 13", "lab '13': there is none of this name"),
+        ("check 1 nowhere", "folder of answers 'nowhere': it is no folder (wamnet course start makes one"),
+        ("check 1 --seconds 0", "--seconds 0: it must be 1 to 3600"),
+        ("check 1 --memory 1000000", "--memory 1000000: it must be 1 to 65536"),
+        ("grade nowhere -o out", "folder of students 'nowhere': it is no folder"),
+        ("grade empty -o out", "folder of students 'empty': it holds no folders"),
+        ("grade full -o full", "output folder 'full': is not empty"),
+        ("grade full -o out --workers 0", "--workers 0: it must be at least 1"),
+        ("grade full -o out --lab x", "lab 'x': there is none of this name"),
+        ("start nowhere/mine", "output folder 'nowhere': not found"),
     ],
 )
 def test_bad_input_is_refused(arguments, words, refused, tmp_path):
@@ -125,7 +125,7 @@ def test_without_a_sandbox_the_command_asks_for_trust(refused, wamnet, tmp_path,
     monkeypatch.setenv("PATH", "")
     message = refused("course", "grade", "class", "-o", "out", "--lab", "1")
     assert message.count("\n") == 1
-    assert "sandbox is bwrap: No such file or directory" in message
+    assert "sandbox 'bwrap: No such file or directory'" in message
     assert "install bubblewrap, or add --trusted" in message
     # A lab that is named twice is graded once.
     outcome = wamnet("course", "grade", "class", "-o", "out", "--lab", "1", "--lab", "sphere", "--trusted")

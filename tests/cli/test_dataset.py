@@ -18,7 +18,8 @@ import pytest
 from wamnet import kernels
 from wamnet.cli.common import cluster
 from wamnet.cli.files import dataset_files, exr
-from wamnet.kernels.run import draws, frame_plan, render_frame
+from wamnet.kernels.run import render_frame
+from wamnet.models.data import draws, frame_plan
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
@@ -127,7 +128,7 @@ def test_what_is_seen_is_the_request_s(wamnet, tmp_path) -> None:
 def test_a_scene_and_a_check_do_not_mix(wamnet, refused) -> None:
     """The folder says what it shows."""
     assert wamnet("dataset", *TINY, "-o", "a").status == 0
-    assert "argument SCENE is glossy: --check looks at the folder" in refused(
+    assert "argument SCENE 'glossy': --check looks at the folder" in refused(
         "dataset", "glossy", "--check", "-o", "a"
     )
 
@@ -141,7 +142,7 @@ def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
     outcome = wamnet("dataset", "--check", "-o", "a")
     assert outcome.status == 2
     assert outcome.out == "a/train/00001-target.exr: damaged\n"
-    assert outcome.err.startswith("wamnet: error: data set is a: 1 of its pictures are not as manifest.json")
+    assert outcome.err.startswith("wamnet: error: data set 'a': 1 of its images do not match manifest.json")
     assert path.read_bytes() == b"x"
     outcome = wamnet("dataset", *TINY, "-o", "a")
     assert outcome.out.startswith("a/train/00001-target.exr: damaged, is made again\n")
@@ -241,33 +242,36 @@ def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
 def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
     """Before anything is rendered: the lattice of a scene that stands still is one picture."""
     text = refused("dataset", "daylight", "--frames", 2, "--test", 1, "--size", 12, "-o", "still")
-    assert "test frame is test/00000" in text
-    assert "over 99 % of the pixels; move the camera (--yaw, --pitch, --distance)" in text
+    assert "test frame 'test/00000 (" in text
+    assert "over 99 % of the pixels (move the camera (--yaw, --pitch, --distance)" in text
     assert not (tmp_path / "still").exists()
 
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ([], "argument SCENE is missing: a data set shows a scene; name one: minicubes"),
-        (["--check"], "data set is dataset: it has no manifest.json; make one"),
-        (["none.json"], "scene file is none.json: it cannot be read (No such file or directory); check"),
+        ([], "argument SCENE: missing"),
+        (["--check"], "data set 'dataset': has no manifest.json (make one"),
+        (["none.json"], "scene file 'none.json': not found (check"),
         (
             ["minicbes"],
-            "no canonical scene has this name; did you mean minicubes? known are minicubes, glossy",
+            "unknown (did you mean 'minicubes'? choose one of minicubes, glossy",
         ),
-        (["minicubes", "--frames", 0], "frames is 0: it must be an integer from 1 to"),
-        (["minicubes", "--workers", 0], "workers is 0: at least one process must work"),
-        (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers; leave"),
-        (["minicubes", "--set", "time=1"], "parameter time is 1.0: each frame has its own"),
-        (["minicubes", "--set", "warm=1"], "parameter warm is 1.0: minicubes wants three numbers"),
-        (["minicubes", "--yaw", "5"], "--yaw is 5: it must be LOW:HIGH; for example --yaw=-24:24"),
-        (["minicubes", "--pitch", "0:99"], "range of pitch_deg is 0.0:99.0: LOW:HIGH within -85 to 85"),
-        (["minicubes", "--outside", 1], "number of frames outside is 1: a data set whose frames differ"),
-        (["minicubes", "--arc", 9], "arc_s is 9.0: training leaves it out of the animation"),
-        (["minicubes", "--spp", 0], "spp is 0: it must be an integer from 1"),
-        (["minicubes", "--before", 257], "before is 257: from 0 to 256 pictures; choose fewer"),
-        (["minicubes", "--before=-1"], "before is -1: from 0 to 256 pictures"),
+        (["minicubes", "--frames", 0], "frames 0: must be an integer from 1 to"),
+        (["minicubes", "--workers", 0], "workers 0: at least one process must work"),
+        (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers (leave"),
+        (["minicubes", "--set", "time=1"], "parameter time 1.0: each frame has its own"),
+        (["minicubes", "--set", "warm=1"], "parameter warm 1.0: scene minicubes needs three numbers"),
+        (["minicubes", "--yaw", "5"], "--yaw '5': must be LOW:HIGH (for example --yaw=-24:24"),
+        (
+            ["minicubes", "--pitch", "0:99"],
+            "range of pitch_deg '0.0:99.0': must be LOW:HIGH within -85 to 85",
+        ),
+        (["minicubes", "--outside", 1], "number of frames outside 1: a data set whose frames differ"),
+        (["minicubes", "--arc", 9], "arc_s 9.0: training leaves it out of the animation"),
+        (["minicubes", "--spp", 0], "spp 0: must be an integer from 1"),
+        (["minicubes", "--before", 257], "before 257: must be from 0 to 256 frames (choose fewer"),
+        (["minicubes", "--before=-1"], "before -1: must be from 0 to 256 frames"),
     ],
 )
 def test_refusals(refused, arguments, text) -> None:
@@ -331,12 +335,12 @@ def test_a_scene_file_is_a_scene(wamnet, refused, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ((), "scene is cornell: it is static, and without a range of camera or lights all its frames show"),
+        ((), "scene 'cornell': is static, and without a range of camera or lights all its frames show"),
         (
             ("--yaw=-9:9", "--arc", 1),
-            "argument is --arc: it has no meaning for a scene file, which is static",
+            "argument '--arc': has no meaning for a scene file, which is static",
         ),
-        (("--yaw=-9:9", "--set", "size=1"), "option for the scene is size: a scene file has no parameters"),
+        (("--yaw=-9:9", "--set", "size=1"), "option for the scene 'size': a scene file has no parameters"),
     ],
 )
 def test_refusals_of_a_scene_file(wamnet, refused, arguments, text) -> None:
@@ -348,7 +352,5 @@ def test_refusals_of_a_scene_file(wamnet, refused, arguments, text) -> None:
 def test_another_request_overwrites_nothing(refused, wamnet) -> None:
     """One line with the difference and the way out."""
     wamnet("dataset", *TINY, "-o", "a")
-    text = (
-        "output folder is a: it holds another data set: seed 0 (now 1); choose another with -o, or the same"
-    )
+    text = "output folder 'a': holds another data set: seed 0 (now 1) (choose another with -o, or the same"
     assert text in refused("dataset", *TINY, "--seed", 1, "-o", "a")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.files import dataset_files, exr
-from wamnet.kernels.blender import session
+from wamnet.models.blender import session
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,23 +88,23 @@ def test_it_is_checked_resumed_and_learned(wamnet, blend, blender, tmp_path, mon
     assert trained.status == 0, trained.err
     # Another file of that name is another data set.
     blend.write_bytes(b"BLENDER changed")
-    assert "it holds another data set: sha256" in wamnet(*command).err
+    assert "holds another data set: sha256" in wamnet(*command).err
 
 
 def test_refusals(wamnet, refused, blend, blender, monkeypatch):
     by = ("dataset", "--from-blender", blend, "--blender", blender)
-    assert "SCENE: it has no meaning with --from-blender" in refused(*by, "minicubes")
-    assert "--size: it has no meaning with --from-blender" in refused(*by, "--size", 12)
-    assert "--yaw: it has no meaning" in refused(*by, "--yaw=-1:1")
-    assert "--percent: it has no meaning without --from-blender" in refused(
+    assert "SCENE': has no meaning with --from-blender" in refused(*by, "minicubes")
+    assert "--size': has no meaning with --from-blender" in refused(*by, "--size", 12)
+    assert "'--yaw': has no meaning" in refused(*by, "--yaw=-1:1")
+    assert "'--percent': has no meaning without --from-blender" in refused(
         "dataset", "cornell", "--percent", 9
     )
-    assert "the film has 10 frames" in refused(*by, "--frames", 12)
+    assert "the animation has 10 frames" in refused(*by, "--frames", 12)
     assert "none.blend" in refused("dataset", "--from-blender", "none.blend")
-    assert "no such program" in refused("dataset", "--from-blender", blend, "--blender", "none")
+    assert "not found" in refused("dataset", "--from-blender", blend, "--blender", "none")
     monkeypatch.setenv("BLENDER_FAULT", "refuse")
     told = refused(*by)
-    assert f"Blender file is {blend}: its scene has no camera; change it in Blender" in told
+    assert f"Blender file '{blend}': its scene has no camera (change it in Blender" in told
 
 
 def test_a_machine_without_blender_says_what_to_install(monkeypatch):

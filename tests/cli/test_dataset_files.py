@@ -12,8 +12,9 @@ import pytest
 
 from wamnet.cli.files import dataset_files as files
 from wamnet.cli.files.alone import LOCK
-from wamnet.kernels.run import frame_plan
-from wamnet.kernels.run.frame_plan import Request, carry_out, plan
+from wamnet.kernels.run.before import carry_out
+from wamnet.models.data import frame_plan
+from wamnet.models.data.frame_plan import Request, plan
 from wamnet.refimpl.errors import InputError
 
 REQUEST = Request("cornell", frames=2, test_frames=1, size_px=6, spp=2)
@@ -133,7 +134,7 @@ def test_damage_is_found_and_mended(tmp_path, whole) -> None:
     third.unlink()
     wrong = files.verify(tmp_path, files.read_manifest(tmp_path))
     assert list(wrong.values()) == ["damaged", "damaged", "missing"]
-    with pytest.raises(InputError, match=r"3 of its pictures .*, first train/00000-noisy.exr: damaged; make"):
+    with pytest.raises(InputError, match=r"3 of its images .*, first train/00000-noisy.exr: damaged \(make"):
         files.read_pairs(tmp_path)
     assert len(files.read_pairs(tmp_path, "test")) == 1
     with contextlib.suppress(Killed), files.Store.open(tmp_path, REQUEST, plan(REQUEST)) as store:
@@ -182,7 +183,7 @@ def test_other_bytes_are_told(tmp_path, whole) -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"spp": 3}, r"it holds another data set: spp 2 \(now 3\); choose another with -o"),
+        ({"spp": 3}, r"holds another data set: spp 2 \(now 3\) \(choose another with -o"),
         ({"scene": "empty", "seed": 5}, r"scene cornell \(now empty\), seed 0 \(now 5\)"),
     ],
 )
@@ -225,7 +226,7 @@ def test_links_in_a_data_set_are_refused_before_anything_changes(tmp_path, name)
     link.unlink(missing_ok=True)
     link.symlink_to(victim if link.suffix == "" else victim / "thesis.txt")
     before = content(tmp_path)
-    with pytest.raises(InputError, match=r"it is a symbolic link|one of the files that wamnet makes"):
+    with pytest.raises(InputError, match=r"is a symbolic link|one of the files that wamnet writes"):
         make(folder)
     assert content(tmp_path) == before
     link.unlink()
@@ -242,7 +243,7 @@ def test_other_files_in_the_unfinished_folder_are_refused(tmp_path, name) -> Non
         mine.write_text("precious")
     else:
         mine.symlink_to(tmp_path)
-    with pytest.raises(InputError, match="it is not one of the files that wamnet makes there; move it"):
+    with pytest.raises(InputError, match=r"is not one of the files that wamnet writes there \(move it"):
         make(tmp_path / "a")
     assert mine.exists()
 
@@ -253,7 +254,7 @@ def test_a_manifest_that_is_a_link_is_refused(tmp_path) -> None:
         pass
     (tmp_path / "a" / files.MANIFEST).rename(tmp_path / "m.json")
     (tmp_path / "a" / files.MANIFEST).symlink_to(tmp_path / "m.json")
-    with pytest.raises(InputError, match=r"manifest\.json: it is not one of the files"):
+    with pytest.raises(InputError, match=r"manifest\.json': is not one of the files"):
         make(tmp_path / "a")
 
 
@@ -277,7 +278,7 @@ def test_a_pipe_is_no_picture(tmp_path) -> None:
     os.mkfifo(path)
     found = files.verify(tmp_path / "a", files.read_manifest(tmp_path / "a"))
     assert found == {"train/00000-noisy.exr": "missing"}
-    with pytest.raises(InputError, match="it is not a regular file"):
+    with pytest.raises(InputError, match="not a regular file"):
         files.sum_of(path)
 
 
@@ -289,7 +290,7 @@ def test_a_folder_with_a_picture_s_name_is_refused_before_anything_is_made(tmp_p
     path.mkdir()
     (path / "mine").write_text("kept")
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(InputError, match=r"picture is .*noisy\.exr: it is a folder; move it, or"):
+    with pytest.raises(InputError, match=r"picture '.*noisy\.exr': is a folder \(move it, or"):
         make(tmp_path / "a")
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -297,13 +298,13 @@ def test_a_folder_with_a_picture_s_name_is_refused_before_anything_is_made(tmp_p
 def test_folders_that_are_something_else(tmp_path) -> None:
     """A file, a folder with files, a folder in which another process works."""
     (tmp_path / "file").write_text("kept")
-    with pytest.raises(InputError, match="it is a file; choose another with -o"):
+    with pytest.raises(InputError, match=r"is a file \(choose another with -o"):
         make(tmp_path / "file")
-    with pytest.raises(InputError, match="it holds something else; choose a new or empty one"):
+    with pytest.raises(InputError, match=r"holds something else \(choose a new or empty one"):
         make(tmp_path)
     with (
         files.Store.open(tmp_path / "a", REQUEST, plan(REQUEST)),
-        pytest.raises(InputError, match="another process is making a data set there; wait for it"),
+        pytest.raises(InputError, match=r"another process is making a data set there \(wait for it"),
     ):
         make(tmp_path / "a")
     assert make(tmp_path / "a")[0] == 18
@@ -328,8 +329,8 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("{", "[", "manifest is .*: it is not a manifest of a data set, or damaged; restore it, or make"),
-        ("wamnet-dataset-2", "wamnet-dataset-9", "schema is wamnet-dataset-9: it must be wamnet-dataset-2"),
+        ("{", "[", r"manifest '.*': is not a manifest of a data set, or damaged \(restore it, or make"),
+        ("wamnet-dataset-2", "wamnet-dataset-9", "schema 'wamnet-dataset-9': must be wamnet-dataset-2"),
         ('"schema"', '"schemes"', "or damaged"),
         ('"frames": [', '"pictures": [', "or damaged"),
         ("train/00000-noisy.exr", "../../00000-noisy.exr", "or damaged"),
@@ -353,5 +354,5 @@ def test_manifests_that_are_none(tmp_path, old, new, text) -> None:
 
 def test_a_folder_without_a_manifest(tmp_path) -> None:
     """And the way to one."""
-    with pytest.raises(InputError, match=r"it has no manifest.json; make one: wamnet dataset"):
+    with pytest.raises(InputError, match=r"has no manifest.json \(make one: wamnet dataset"):
         files.read_manifest(tmp_path)

@@ -16,8 +16,9 @@ from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from wamnet.cli.files import dataset_files as files
-from wamnet.kernels.run import frame_plan
-from wamnet.kernels.run.frame_plan import Request, Task, carry_out, plan
+from wamnet.kernels.run.before import carry_out
+from wamnet.models.data import frame_plan
+from wamnet.models.data.frame_plan import Request, Task, plan
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 

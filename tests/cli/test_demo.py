@@ -16,8 +16,8 @@ from wamnet.cli.files import dataset_files, exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
 from wamnet.cli.reports import machine, runs
-from wamnet.compiler.model_file import load_model
 from wamnet.compiler.variants import plan_model
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.network.denoise import denoise
 
@@ -156,7 +156,7 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
     def never(*_args: object, **_options: object) -> None:
         raise AssertionError("this was done before")
 
-    monkeypatch.setattr("wamnet.kernels.run.frame_plan.render_frame", never)
+    monkeypatch.setattr("wamnet.kernels.run.before.render_frame", never)
     monkeypatch.setattr("wamnet.refimpl.network.train.train_step", never)
     monkeypatch.setattr("wamnet.kernels.run.trainer.Run.enqueue", never)
     results = demo.carry_out(demo.for_this_machine(demo.QUICK), folder)
@@ -251,11 +251,11 @@ def test_a_scene_file_is_shown_from_views(wamnet, tmp_path) -> None:
 
 def test_refusals(refused, tmp_path) -> None:
     """A file in the folder's place; an invalid size; a scene that is not there."""
-    assert "did you mean cornell?" in refused("demo", "--scene", "cornel")
-    assert "scene file is none.json: it cannot be read" in refused("demo", "--scene", "none.json")
+    assert "did you mean 'cornell'?" in refused("demo", "--scene", "cornel")
+    assert "scene file 'none.json': not found" in refused("demo", "--scene", "none.json")
     (tmp_path / "a").write_text("hello")
-    assert "output folder is a: it is a file; choose another with -o" in refused("demo", "-o", "a")
-    assert "width is 0: it must be an integer" in refused("demo", "--size", 0)
+    assert "output folder 'a': is a file (choose another with -o" in refused("demo", "-o", "a")
+    assert "width 0: must be an integer" in refused("demo", "--size", 0)
 
 
 def test_the_machine_is_described() -> None:
@@ -270,14 +270,15 @@ def test_the_machine_is_described() -> None:
 def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
     """Results of another plan and other files are not mixed with this one's; nor are two sizes."""
     shutil.copytree(finished, tmp_path / "out")
-    text = "output folder is out: it holds results of another plan; choose another with -o"
+    text = "output folder 'out': holds results of another plan (choose another with -o"
     assert text in refused("demo", "--size", 16, "-o", "out")
     with demo.begun(demo.for_this_machine(demo.QUICK), tmp_path / "out"):
         assert "another process is making a demonstration there" in refused("demo", "--quick", "-o", "out")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "noisy.exr").write_text("precious")
-    assert "it holds files that are not the demo's" in refused("demo", "--quick", "-o", "mine")
-    assert "--size is 16: --quick has a size of its own" in refused("demo", "--quick", "--size", 16)
+    text = "output folder 'mine': holds files that are not the demo's"
+    assert text in refused("demo", "--quick", "-o", "mine")
+    assert "--size 16: cannot be combined with --quick" in refused("demo", "--quick", "--size", 16)
 
 
 @pytest.mark.parametrize("quick", [True, False])

@@ -11,8 +11,8 @@ import pytest
 from wamnet.cli.commands import animate
 from wamnet.cli.common.domain import Watch
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.kernels.run.trainer import facts_of, with_domain
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
@@ -24,7 +24,7 @@ LEARNED = 10
 SIZE = (13, 12)
 """Width and height of all frames, in pixels."""
 
-BEYOND = "outside of the model's domain: distance "
+BEYOND = "outside the model's domain: distance "
 
 
 def shot(time: float, scene: str = "minicubes") -> Frame:
@@ -74,7 +74,7 @@ def test_one_sentence_says_all(wamnet, here) -> None:
     assert f"distance {found.distance:.3g}, threshold {found.threshold:.3g} (1 in 11 frames" in line
     assert f"farthest off is the {found.statistic} of {found.channel}: {found.value:.3g}, in" in line
     assert line.endswith(
-        "; it shows cornell, and the model has learned only minicubes: expect a poor picture"
+        "; it shows cornell, but the model was trained only on minicubes: expect a poor image"
     )
     assert outcome.out.count("it shows cornell") == 1
 
@@ -82,8 +82,8 @@ def test_one_sentence_says_all(wamnet, here) -> None:
 def test_a_foreign_frame_outside_is_refused(wamnet, refused, here) -> None:
     """Normals of another sign: nothing is written, and the way out works."""
     line = refused("denoise", "m.safetensors", "flipped.exr")
-    assert "flipped.exr: distance from the model's domain is " in line
-    assert "of another program's frame it reads color, normal; farthest off is the mean of normal" in line
+    assert "flipped.exr: distance from the model's domain 2" in line
+    assert "of this frame it reads color, normal; farthest off is the mean of normal" in line
     assert "give --anyway" in line
     outcome = wamnet("denoise", "m.safetensors", "flipped.exr", "--anyway")
     assert outcome.status == 0
@@ -103,7 +103,7 @@ def test_an_animation_counts_its_pictures(wamnet, here) -> None:
     short = ("--seconds", 0.4, "--fps", 5, "--size", 13, "--feature-spp", 0)
     assert "outside" not in wamnet("animate", "m.safetensors", *short, "--start", 3, "-o", "own").out
     outcome = wamnet("animate", "m.safetensors", *short, "--scene", "cornell", "-o", "other")
-    assert "other: 2 of 2 pictures are outside of the model's domain; the farthest is 0000" in outcome.out
+    assert "other: 2 of 2 frames are outside the model's domain; the farthest is 0000" in outcome.out
     assert "png: distance " in outcome.out
 
 

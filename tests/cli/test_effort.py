@@ -30,7 +30,7 @@ def started(wamnet, capsys, monkeypatch):
         return capsys.readouterr().out
 
     monkeypatch.setattr(render_frame, "render_frame", stop)
-    monkeypatch.setattr("wamnet.kernels.run.frame_plan.carry_out", stop)
+    monkeypatch.setattr("wamnet.kernels.run.before.carry_out", stop)
     monkeypatch.setattr("wamnet.compiler.scenes.lower_scene.lower_scene", stop)
     return run
 
@@ -80,7 +80,7 @@ def test_benchmarks_say_it_too(wamnet, capsys, monkeypatch):
         (("--size", 8), ""),
         (
             ("--size", 8, "--sizes", "16,32", "--budget", 1000),
-            "1 contender and pictures of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
+            "1 contender and images of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
             "of memory at most, compilation left out; Ctrl-C ends it\n",
         ),
     ]:

@@ -41,8 +41,8 @@ def test_a_base_installation_prints_what_to_install(tmp_path, name) -> None:
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
     line = (
-        f"wamnet: error: Python package '{name}' is missing: the command needs it; "
-        "install it: pip install 'wamnet[full]'\n"
+        f"wamnet: error: Python package '{name}': missing, and needed for the command "
+        "(install it: pip install 'wamnet[full]')\n"
     )
     assert (done.returncode, done.stderr) == (2, line) or (name[0] == "w" and "Traceback" in done.stderr)
 

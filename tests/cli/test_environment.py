@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.files.exr import write_frame
-from wamnet.compiler.model_file import save_model
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window

@@ -79,31 +79,31 @@ def test_help_names_every_target():
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--target", "abacus"], "--target is abacus: must be one of opencl, glsl"),
+        (["--target", "abacus"], "--target 'abacus': unknown (choose one of opencl, glsl"),
         (
             ["--target", "c", "--weights", "texture"],
-            "--weights is texture: target c has weights in: buffer, inline",
+            "--weights 'texture': is not available for target c (choose one of buffer, inline",
         ),
-        (["--target", "c", "--time", "2"], "--time is 2.0: there is no scene; name one with --scene"),
-        (["--target", "c", "--max-depth", "2"], "--max-depth is 2: there is no scene"),
-        (["--target", "c", "--moving", "time"], "--moving is time: there is no scene"),
-        (["--target", "c", "--fps", "5"], "--fps is 5.0: nothing moves; add --moving time"),
+        (["--target", "c", "--time", "2"], "--time 2.0: there is no scene (name one with --scene"),
+        (["--target", "c", "--max-depth", "2"], "--max-depth 2: there is no scene"),
+        (["--target", "c", "--moving", "time"], "--moving 'time': there is no scene"),
+        (["--target", "c", "--fps", "5"], "--fps 5.0: nothing moves (add --moving time"),
         (
             ["--target", "c", "--scene", "minicubes", "--moving", "camera", "--seconds", "2"],
-            "--seconds is 2.0: time does not move; add it to --moving",
+            "--seconds 2.0: time does not move (add it to --moving",
         ),
         (
             ["--target", "c", "--scene", "minicubes", "--moving", "tide"],
-            "what moves is tide: it must be one of time, camera",
+            "--moving 'tide': unknown (did you mean 'time'? choose one of time, camera",
         ),
-        (["--target", "html", "--moving", "time"], "--moving is time: a web page has its own"),
-        (["--target", "html", "--weights", "inline"], "--weights is inline: a web page has its own"),
-        (["--target", "html", "--schedule", "plain"], "--schedule is plain: a web page has its own"),
+        (["--target", "html", "--moving", "time"], "--moving 'time': a web page has its own"),
+        (["--target", "html", "--weights", "inline"], "--weights 'inline': a web page has its own"),
+        (["--target", "html", "--schedule", "plain"], "--schedule 'plain': a web page has its own"),
         (
             ["--target", "wgsl", "--schedule", "tile8"],
-            "--schedule is tile8: target wgsl with weights in place",
+            "--schedule 'tile8': is not available for target wgsl with --weights",
         ),
-        (["--target", "c", "-o", "noisy.exr"], "output folder is noisy.exr: it is a file"),
+        (["--target", "c", "-o", "noisy.exr"], "output folder 'noisy.exr': is a file"),
     ],
 )
 def test_refusals(refused, samples, tmp_path, arguments, told):

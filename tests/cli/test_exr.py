@@ -96,7 +96,7 @@ def test_a_frame_that_does_not_fit_the_memory_is_refused_before_its_pixels(
     path = tmp_path / "a.exr"
     exr.write_frame(path, Frame({"color": np.zeros((4, 5, 3), np.float32)}))
     monkeypatch.setattr(reading, "_free_bytes", lambda: exr.EXR_BYTES * 60 - 1)
-    with pytest.raises(InputError, match=r"input file is .*a\.exr: it would take 0 MiB of memory"):
+    with pytest.raises(InputError, match=r"input file '.*a\.exr': it would take 0 MiB of memory"):
         exr.read_frame(path)
     monkeypatch.setattr(reading, "_free_bytes", lambda: exr.EXR_BYTES * 60)
     assert exr.read_frame(path).width == 5
@@ -217,14 +217,14 @@ def test_parts_that_do_not_coincide_are_refused(tmp_path: Path) -> None:
     ]
     OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
     with pytest.raises(
-        InputError, match=r"data windows is .*: all parts must have the same; export full frames"
+        InputError, match=r"data windows '.*': all parts must have the same \(export full frames"
     ):
         exr.read_frame(tmp_path / "a.exr")
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
     """It is named."""
-    with pytest.raises(InputError, match=r"input file is .*none\.exr: it does not exist"):
+    with pytest.raises(InputError, match=r"input file '.*none\.exr': not found"):
         exr.read_frame(tmp_path / "none.exr")
 
 
@@ -232,7 +232,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 def test_a_file_that_is_no_exr(tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]) -> None:
     """Empty, or text; the library's own messages do not reach the terminal."""
     (tmp_path / "a.exr").write_bytes(content)
-    with pytest.raises(InputError, match=r"input file is .*a\.exr: it is not an OpenEXR image"):
+    with pytest.raises(InputError, match=r"input file '.*a\.exr': is not an OpenEXR image"):
         exr.read_frame(tmp_path / "a.exr")
     assert capfd.readouterr() == ("", "")
 
@@ -242,7 +242,7 @@ def test_a_file_cut_short(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
     path = tmp_path / "a.exr"
     exr.write_frame(path, random_frame(30, 30))
     path.write_bytes(path.read_bytes()[:-300])
-    with pytest.raises(InputError, match="its pixels cannot be read"):
+    with pytest.raises(InputError, match="pixels that cannot be read"):
         exr.read_frame(path)
     assert capfd.readouterr() == ("", "")
 
@@ -250,7 +250,7 @@ def test_a_file_cut_short(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
 def test_no_known_layer(tmp_path: Path) -> None:
     """The message lists the channels; an incomplete colour is not a layer."""
     path = write(tmp_path / "a.exr", {"G": plane(1), "R": plane(1), "mask.A": plane(1)})
-    with pytest.raises(InputError, match=r"list of channels is G, R, mask\.A: no known layer is among them"):
+    with pytest.raises(InputError, match=r"list of channels 'G, R, mask\.A': no known layer is among them"):
         exr.read_frame(path)
 
 
@@ -258,7 +258,7 @@ def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
     """Left and right eye: no guess."""
     channels = rgb(1, 2, 3, prefix="left.albedo.") | rgb(1, 2, 3, prefix="right.albedo.")
     with pytest.raises(
-        InputError, match=r"layers is left\.albedo, right\.albedo: each of them could be albedo"
+        InputError, match=r"layers 'left\.albedo, right\.albedo': each of them could be albedo"
     ):
         exr.read_frame(write(tmp_path / "a.exr", channels))
 
@@ -266,7 +266,7 @@ def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
 def test_integer_pixels(tmp_path: Path) -> None:
     """Object identifiers are not colour."""
     path = write(tmp_path / "a.exr", {name: plane(1, np.uint32) for name in "RGB"})
-    with pytest.raises(InputError, match="pixels of color is uint32: they must be half or float"):
+    with pytest.raises(InputError, match="pixels of color 'uint32': must be half or float"):
         exr.read_frame(path)
 
 
@@ -276,7 +276,7 @@ def test_pixels_that_are_not_finite(tmp_path: Path) -> None:
     channels["G"][1, 2] = np.nan
     channels["B"][0, 1] = np.inf
     path = write(tmp_path / "a.exr", channels)
-    text = r"a\.exr: layer 'color' at x=1, y=0 \(first of 2 such pixels\) is inf: every pixel must be finite"
+    text = r"a\.exr: layer 'color' at x=1, y=0 \(first of 2 such pixels\) inf: every pixel must be finite"
     with pytest.raises(InputError, match=text):
         exr.read_frame(path)
 
@@ -323,7 +323,7 @@ def test_luminance_is_no_depth(tmp_path: Path, names: str, layers: set[str] | No
     channels = {name: np.ones((2, 3), np.float32) for name in names}
     OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "a.exr"))
     if layers is None:
-        with pytest.raises(InputError, match="list of channels is Y: no known layer"):
+        with pytest.raises(InputError, match="list of channels 'Y': no known layer"):
             exr.read_frame(tmp_path / "a.exr")
     else:
         assert set(exr.read_frame(tmp_path / "a.exr").layers) == layers
@@ -402,13 +402,13 @@ def test_a_file_of_ours_gets_a_layer_without_a_prefix(tmp_path: Path) -> None:
 def test_one_of_several_view_layers_is_read_by_its_name(tmp_path: Path) -> None:
     given = blender_like("front", "back")
     path = write(tmp_path / "in.exr", dict(given))
-    with pytest.raises(InputError, match=r"back.Combined, front.Combined: each of them could be color"):
+    with pytest.raises(InputError, match=r"back.Combined, front.Combined': each of them could be color"):
         exr.read_frame(path)
     for name in ("front", "back"):
         read = exr.read_frame(path, view_layer=name)["color"]
         assert (read[..., 0] == given[f"{name}.Combined.R"]).all()
         assert exr.write_denoised(tmp_path / "out.exr", path, read, name, keep=True) == f"{name}.wamnet"
-    with pytest.raises(InputError, match=r"view layer is left: neither .*; there are back, front; "):
+    with pytest.raises(InputError, match=r"view layer 'left': neither .*; there are back, front \("):
         exr.read_frame(path, view_layer="left")
     with pytest.raises(InputError, match="no colour is among them"):
         exr.write_denoised(tmp_path / "out.exr", write(tmp_path / "n.exr", {"Z": plane(1.0)}), read)

@@ -66,12 +66,12 @@ def test_views_and_parts(tmp_path: Path, parts: list[RawPart], chosen: str, laye
 @pytest.mark.parametrize(
     ("parts", "rule"),
     [
-        ([RawPart(planes(1), name="a"), RawPart(planes(5), name="b")], "R, G, B of part 'a', .*'b': each of"),
+        ([RawPart(planes(1), name="a"), RawPart(planes(5), name="b")], "R, G, B of part 'a', .*: each of"),
         ([RawPart(planes(1), name="a"), RawPart(planes(5), name="a")], "each of them could be color"),
-        ([RawPart(planes(1) | planes(5, names="r"))], "channels is R, r, G, B: color has these twice"),
-        ([RawPart(planes(1, "Albedo.") | planes(5, "albedo."))], "Albedo, albedo: each of them could be"),
+        ([RawPart(planes(1) | planes(5, names="r"))], "channels 'R, r, G, B': color has these twice"),
+        ([RawPart(planes(1, "Albedo.") | planes(5, "albedo."))], "Albedo, albedo': each of them could be"),
         ([RawPart(planes(1, "N.") | planes(5, "N.", "XYZ"))], "normal has these twice"),
-        ([RawPart(planes(1) | planes(1, "left."), VIEWS)], "channels is .*left.*: color has these twice"),
+        ([RawPart(planes(1) | planes(1, "left."), VIEWS)], "channels '.*left.*': color has these twice"),
     ],
 )  # fmt: skip
 def test_two_things_of_one_name(tmp_path: Path, parts: list[RawPart], rule: str) -> None:
@@ -224,12 +224,12 @@ def test_rec_709_is_not_converted(tmp_path: Path, extra: bytes) -> None:
 @pytest.mark.parametrize(
     ("extra", "rule"),
     [
-        (chromaticities(*(0.0,) * 8), "chromaticities is invalid: they must span a colour space"),
-        (chromaticities(*(0.3, 0.3) * 4), "chromaticities is invalid: they must span a colour space"),
-        (chromaticities(*(float("nan"),) * 8), "chromaticities is invalid"),
+        (chromaticities(*(0.0,) * 8), "chromaticities: must span a colour space"),
+        (chromaticities(*(0.3, 0.3) * 4), "chromaticities: must span a colour space"),
+        (chromaticities(*(float("nan"),) * 8), "chromaticities: must"),
         (chromaticities(1.0), "chromaticities has 1 numbers instead of 8"),
-        (interop("srgb_rec709_scene"), "colorInteropID is srgb_rec709_scene: the colour spaces"),
-        (interop("lin_ap0_scene") + chromaticities(*AP1), "chromaticities is .*colorInteropID is lin_ap0"),
+        (interop("srgb_rec709_scene"), "colorInteropID 'srgb_rec709_scene': the colour spaces"),
+        (interop("lin_ap0_scene") + chromaticities(*AP1), "chromaticities '.*colorInteropID is lin_ap0"),
     ],
 )  # fmt: skip
 def test_colour_spaces_that_cannot_be(tmp_path: Path, extra: bytes, rule: str) -> None:
@@ -284,20 +284,20 @@ def deep(path: Path) -> None:
 @pytest.mark.parametrize(
     ("write", "rule"),
     [
-        (deep, "its pixels are deep: they have several samples each; flatten it"),
-        (lambda path: write_raw(path, RawPart(planes(1), compression=77)), "its pixels cannot be read"),
-        (lambda path: write_raw(path, RawPart(planes(1), sampling=2)), "they are subsampled"),
+        (deep, r"its pixels are deep: they have several samples each \(flatten it"),
+        (lambda path: write_raw(path, RawPart(planes(1), compression=77)), "pixels that cannot be read"),
+        (lambda path: write_raw(path, RawPart(planes(1), sampling=2)), "are subsampled"),
         (
             lambda path: write_raw(path, RawPart(dict.fromkeys(("Y", "RY", "BY"), planes(1)["R"]))),
-            "its colour is stored as luminance and chroma; export R, G, B",
+            r"its colour is stored as luminance and chroma \(export R, G, B",
         ),
         (
             lambda path: write_raw(path, RawPart(planes(1), floats("whiteLuminance", "float", 1, 2))),
-            "attributes is damaged: .*whiteLuminance has 2 numbers instead of 1",
+            "attributes 'damaged': .*whiteLuminance has 2 numbers instead of 1",
         ),
         (
             lambda path: write_raw(path, RawPart({n: p.astype(np.uint32) for n, p in planes(1).items()})),
-            "pixels of color is uint32: they must be half or float",
+            "pixels of color 'uint32': must be half or float",
         ),
     ],
 )

@@ -50,14 +50,14 @@ def test_text_in_no_encoding(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "rule"),
     [
-        (b"", "it is not an OpenEXR image"),
-        (b"hello", "it is not an OpenEXR image"),
+        (b"", "is not an OpenEXR image"),
+        (b"hello", "is not an OpenEXR image"),
         (b"\x76\x2f\x31\x01", "its header is damaged"),
-        (b"\x76\x2f\x31\x01\x03\0\0\0\0", "it is OpenEXR version 3, and version 2 is read"),
-        (START + b"\0", "it has no pixels"),
+        (b"\x76\x2f\x31\x01\x03\0\0\0\0", "is OpenEXR version 3, and version 2 is read"),
+        (START + b"\0", "has no pixels"),
         (START + b"name", "a name is missing, or does not end"),
         (START + attribute("a", "int", b"abcd")[:-1], "attribute a ends behind the file"),
-        (START + attribute("a", "int", b"abcd") * 2 + b"\0", "attributes is a: they appear"),
+        (START + attribute("a", "int", b"abcd") * 2 + b"\0", "attributes 'a': appear"),
     ],
 )  # fmt: skip
 def test_each_cause_has_its_message(tmp_path: Path, content: bytes, rule: str) -> None:

@@ -111,14 +111,14 @@ def test_chunks_about_colours(tmp_path: Path, chunks: list[bytes], levels, note:
 @pytest.mark.parametrize(
     ("chunks", "levels", "rule"),
     [
-        ([], {"levels": (1, 2, 3), "depth": 16}, "bits per channel is 16: a PNG must have 8 bits"),
-        ([], {"levels": (1,), "depth": 16}, "bits per channel is 16"),
-        ([gamma(1.0), gamma(0.5)], {}, "chunk is gAMA: it appears twice"),
-        ([chunk(b"NEWS", b"")], {}, "chunk is NEWS: no reader may ignore it"),
-        ([chunk(b"cICP", bytes([9, 16, 0, 1]))], {}, "cICP is 9, 16, 0, 1: only 1, 13, 0, 1 is read: sRGB"),
-        ([chunk(b"iCCP", b"icc\0\0" + zlib.compress(b"no profile"))], {}, "iCCP is invalid: it is not a"),
-        ([gamma(0.0)], {}, "gAMA or cHRM is invalid"),
-        ([chromaticities(*(0.0,) * 8)], {}, "gAMA or cHRM is invalid"),
+        ([], {"levels": (1, 2, 3), "depth": 16}, "bits per channel 16: a PNG must have 8 bits"),
+        ([], {"levels": (1,), "depth": 16}, "bits per channel 16"),
+        ([gamma(1.0), gamma(0.5)], {}, "chunk 'gAMA': appears twice"),
+        ([chunk(b"NEWS", b"")], {}, "chunk 'NEWS': no reader may ignore it"),
+        ([chunk(b"cICP", bytes([9, 16, 0, 1]))], {}, "cICP '9, 16, 0, 1': only 1, 13, 0, 1 is read: sRGB"),
+        ([chunk(b"iCCP", b"icc\0\0" + zlib.compress(b"no profile"))], {}, "iCCP: is not a"),
+        ([gamma(0.0)], {}, "gAMA or cHRM: must define"),
+        ([chromaticities(*(0.0,) * 8)], {}, "gAMA or cHRM: must define"),
     ],
 )  # fmt: skip
 def test_pngs_that_cannot_be_read_as_they_are(tmp_path: Path, chunks: list[bytes], levels, rule: str) -> None:
@@ -155,7 +155,7 @@ def test_a_png_that_does_not_fit_the_memory_is_refused_before_its_pixels(tmp_pat
     """A few bytes may stand for any size: what the header says is compared with what is free."""
     write_png(tmp_path / "a.png", np.zeros((40, 30, 3)))
     monkeypatch.setattr(reading, "_free_bytes", lambda: images.PNG_BYTES * 1200 - 1)
-    with pytest.raises(InputError, match=r"size of .*a\.png is 30 x 40: it would take 0 MiB"):
+    with pytest.raises(InputError, match=r"size of .*a\.png '30 x 40': it would take 0 MiB"):
         read_png(tmp_path / "a.png")
     monkeypatch.setattr(reading, "_free_bytes", lambda: images.PNG_BYTES * 1200)
     assert read_png(tmp_path / "a.png").shape == (40, 30, 3)
@@ -163,14 +163,14 @@ def test_a_png_that_does_not_fit_the_memory_is_refused_before_its_pixels(tmp_pat
 
 def test_missing_and_broken_pngs(tmp_path: Path) -> None:
     """Not there; no PNG; cut short."""
-    with pytest.raises(InputError, match=r"input file is .*none\.png: it does not exist"):
+    with pytest.raises(InputError, match=r"input file '.*none\.png': not found"):
         read_png(tmp_path / "none.png")
     (tmp_path / "a.png").write_bytes(b"hello")
-    with pytest.raises(InputError, match="it is not a PNG"):
+    with pytest.raises(InputError, match="is not a PNG"):
         read_png(tmp_path / "a.png")
     write_png(tmp_path / "a.png", np.random.default_rng(0).random((40, 40, 3)))
     (tmp_path / "a.png").write_bytes((tmp_path / "a.png").read_bytes()[:-2000])
-    with pytest.raises(InputError, match=r"its pixels cannot be read \(.*truncated"):
+    with pytest.raises(InputError, match=r"pixels that cannot be read: .*truncated"):
         read_png(tmp_path / "a.png")
 
 
@@ -189,5 +189,5 @@ def test_exr_and_png_in_both_forms(tmp_path: Path) -> None:
 
 def test_another_kind_of_file(tmp_path: Path) -> None:
     """The suffix decides."""
-    with pytest.raises(InputError, match=r"a\.jpg: its name must end in \.exr or \.png; convert it"):
+    with pytest.raises(InputError, match=r"a\.jpg': must end in \.exr or \.png \(convert it"):
         read_image(tmp_path / "a.jpg")

@@ -25,7 +25,7 @@ def test_a_network_becomes_a_kernel_with_a_certificate(wamnet, tmp_path):
 
 def test_a_border_that_differs_is_said(wamnet, refused):
     told = refused("import", FOLDER / "same.onnx")
-    assert "(Conv) is margins 1, 1, 1, 1, constant" in told
+    assert "(Conv) 'margins 1, 1, 1, 1, constant'" in told
     outcome = wamnet("import", FOLDER / "same.onnx", "--border", "zero", "-o", "same.safetensors")
     assert "1 pixels and more from the image's edge the model is the network" in outcome.out
 
@@ -39,7 +39,7 @@ def test_a_range_that_is_none_is_refused(refused, text):
 def test_other_commands_refuse_it(wamnet, refused):
     assert wamnet("import", FOLDER / "pixels.onnx", "-o", "p.safetensors").status == 0
     told = refused("tune", "p.safetensors")
-    assert "it was imported and reads x, not the features of a frame" in told
+    assert "was imported and reads x, not the features of a frame" in told
     told = refused("compile", "p.safetensors", "--target", "c", "--max-ms", "1")
     assert "limits are measured on frames" in told
     told = refused("export", "p.safetensors", "--target", "c", "--scene", "minicubes")

@@ -13,8 +13,8 @@ import pytest
 from wamnet import models
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_model, save_model
 from wamnet.compiler.scenes.lower_encode import feature_rays
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scenes
@@ -33,19 +33,19 @@ def test_numbers_must_be_finite(refused, here, value) -> None:
     """A time, a parameter, an exposure; said before anything is rendered or overwritten."""
     (here / "minicubes.exr").write_text("precious")
     small = ["minicubes", "--width", 4, "--height", 3]
-    assert "--time is " in refused("render", *small, f"--time={value}")
-    assert f"--set is albedo={value}: all numbers must be finite" in refused(
+    assert "--time " in refused("render", *small, f"--time={value}")
+    assert f"--set 'albedo={value}': must have finite numbers" in refused(
         "render", *small, "--set", f"albedo={value}"
     )
-    assert "all numbers must be finite" in refused("scene", "minicubes", "--set", f"warm=1,{value},1")
+    assert "must have finite numbers" in refused("scene", "minicubes", "--set", f"warm=1,{value},1")
     for command in (["render", *small, "-o", "a.png"], ["compare", "noisy.exr", "reference.exr"]):
         line = refused(*command, f"--exposure={value}")
-        assert "it must be from -64 to 64 stops" in line
+        assert "must be from -64 to 64 stops" in line
 
 
 def test_exposures_end_somewhere(wamnet, refused, here) -> None:
     """At 64 stops either way."""
-    assert "--exposure is 65.0: it must be from -64 to 64 stops" in refused(
+    assert "--exposure 65.0: must be from -64 to 64 stops" in refused(
         "compare", "noisy.exr", "reference.exr", "--exposure", 65
     )
     assert wamnet("compare", "noisy.exr", "reference.exr", "--exposure", 64).status == 0
@@ -55,17 +55,17 @@ def test_a_folder_is_no_input(refused, here) -> None:
     """It is said that it is one, for frames, pictures and scenes."""
     (here / "dir.exr").mkdir()
     (here / "dir").mkdir()
-    text = "it is a folder; give the name of a file in it"
-    assert f"input file is dir.exr: {text}" in refused("denoise", "model.safetensors", "dir.exr")
-    assert f"input file is dir: {text}" in refused("compare", "dir", "noisy.exr")
-    assert "it is a folder" in refused("denoise", "dir", "noisy.exr")
-    assert "whose name ends in .json" in refused("render", "dir")
+    text = "is a folder (give the name of a file in it"
+    assert f"input file 'dir.exr': {text}" in refused("denoise", "model.safetensors", "dir.exr")
+    assert f"input file 'dir': {text}" in refused("compare", "dir", "noisy.exr")
+    assert "is a folder" in refused("denoise", "dir", "noisy.exr")
+    assert "is neither a canonical scene nor a scene file" in refused("render", "dir")
 
 
 def test_a_frame_is_no_scene(refused, here) -> None:
     """The way out names the suffix of scene files."""
     line = refused("render", "noisy.exr", "-o", "a.exr")
-    assert "scene is noisy.exr: neither a canonical scene nor a scene file, whose name ends in .json" in line
+    assert "scene 'noisy.exr': is neither a canonical scene nor a scene file (choose one of" in line
 
 
 def test_a_checkpoint_is_no_model(wamnet, refused, here) -> None:
@@ -73,7 +73,7 @@ def test_a_checkpoint_is_no_model(wamnet, refused, here) -> None:
     pair = ["-i", "noisy.exr", "-t", "reference.exr", "--features", "color", "--steps", 2]
     assert wamnet("train", *pair, "-o", "m.safetensors").status == 0
     text = (
-        "m.checkpoint.safetensors: it is a checkpoint of training, not a model; give the model beside it: m."
+        "m.checkpoint.safetensors': is a checkpoint of training, not a model (give the model next to it: m."
     )
     assert text in refused("denoise", "m.checkpoint.safetensors", "noisy.exr")
     assert text in refused("compile", "m.checkpoint.safetensors", "--target", "glsl")
@@ -84,11 +84,11 @@ def test_a_missing_layer_names_the_file(refused, here) -> None:
     exr.write_frame(here / "flat.exr", Frame({"color": np.zeros((12, 13, 3))}))
     line = refused("denoise", "model.safetensors", "flat.exr")
     assert (
-        "flat.exr: list of layers is color: normal must be among them, because the model was trained" in line
+        "flat.exr: list of layers 'color': normal must be among them, because the model was trained" in line
     )
     assert "features" not in line
     line = refused("train", "-i", "flat.exr", "-t", "reference.exr", "--features", "color,normal")
-    assert "flat.exr: list of layers is color: normal must be among them" in line
+    assert "flat.exr: list of layers 'color': normal must be among them" in line
     assert "--features" in line
 
 
@@ -102,7 +102,7 @@ def test_a_name_that_no_file_system_takes(refused, here, monkeypatch, command) -
     monkeypatch.setattr("wamnet.kernels.run.denoise_on.denoise_on", never)
     monkeypatch.setattr("wamnet.kernels.run.render_frame.render_parallel", never)
     line = refused(*command, "-o", "n" * 300 + ".exr")
-    assert "cannot be written (File name too long)" in line
+    assert "cannot be written: File name too long (" in line
 
 
 def test_the_longest_name_is_written(wamnet, here) -> None:
@@ -127,12 +127,12 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         assert inputs.load_model(Path(name)).features == ("color", "normal")
     (tmp_path / "cubes").mkdir()
     assert inputs.model_path(Path("cubes")) == tmp_path / "along" / "cubes.safetensors"
-    assert "cubes/ is a folder, and no model" in capsys.readouterr().err
+    assert "cubes/ is a folder, not a model" in capsys.readouterr().err
     (tmp_path / "cubes").rmdir()
     (tmp_path / "cubes").touch()
     assert inputs.model_path(Path("cubes")) == Path("cubes")
     assert inputs.model_path(Path("cubes.safetensors")) == Path("cubes.safetensors")
-    text = "model is spheres: there is no such file, and wamnet ships no model of this name; give .* of cubes"
+    text = r"model 'spheres': not found \(.*cubes, or give a \.safetensors file"
     with pytest.raises(InputError, match=text):
         inputs.model_path(Path("spheres"))
 
@@ -144,11 +144,11 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         ({"scene": "cornell"}, {}, []),
         ({"scene": "cornell"}, {"scene": "cornell", "spp": "1"}, []),
         ({"scene": "cornell, empty"}, {"scene": "empty", "spp": "1"}, []),
-        ({"scene": "cornell"}, {"scene": "empty", "spp": "1"}, ["it shows empty, and the model has learned"]),
+        ({"scene": "cornell"}, {"scene": "empty", "spp": "1"}, ["it shows empty, but the model was trained"]),
         (
             {"scene": "empty", "feature_spp": "16"},
             {"scene": "empty", "spp": "1"},
-            ["its features are of --feature-spp 1, those that the model learned from of 16"],
+            ["its features are of --feature-spp 1, those of the training of 16"],
         ),
         # Four rays that are spread stand for sixteen at random, but not the other way round.
         (
@@ -159,19 +159,19 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         (
             {"scene": "empty", "feature_spp": "16"},
             {"scene": "empty", "spp": "1", "feature_spp": "3", "feature_sampler": "net"},
-            ["its features are of --feature-spp 3, those that the model learned from of 16"],
+            ["its features are of --feature-spp 3, those of the training of 16"],
         ),
         (
             {"scene": "empty", "feature_spp": "4", "feature_sampler": "net"},
             {"scene": "empty", "spp": "1", "feature_spp": "4"},
-            ["its features are of --feature-spp 4 at random, those that the model learned from of 4"],
+            ["its features are of --feature-spp 4 at random, those of the training of 4"],
         ),
         (
             {"scene": "empty"},
             {"scene": "cornell", "spp": "1", "feature_spp": "4"},
             [
                 "it shows cornell",
-                "its features are of --feature-spp 4, those that the model learned from of 1",
+                "its features are of --feature-spp 4, those of the training of 1",
             ],
         ),
     ],
@@ -223,7 +223,7 @@ def test_frames_outside_of_the_ranges_of_the_training(samples, shown, told) -> N
     learned = {"trained_on_scene": "minicubes", "trained_on_ranges": RANGES.to_json()}
     own = {"scene": "minicubes", "lights": json.dumps([scenes.WARM, scenes.COOL])}
     found = inputs.unlike_training(replace(model, info=learned), {**own, **shown})
-    assert found == [f"outside of what the model has learned: {', '.join(told)}; expect errors"][: len(told)]
+    assert found == [f"outside the training ranges: {', '.join(told)}; expect errors"][: len(told)]
     assert inputs.unlike_training(model, {**own, **shown}) == [], "a model without ranges says nothing"
     other = inputs.unlike_training(replace(model, info=learned), {**own, **shown, "scene": "cornell"})
     assert [text.split(",")[0] for text in other] == ["it shows cornell"], "ranges are of its own scenes"
@@ -233,7 +233,7 @@ def test_ranges_that_are_none_are_refused(refused, here) -> None:
     model = load_model(here / "model.safetensors")
     save_model(here / "odd.safetensors", replace(model, info={"trained_on_ranges": "{"}))
     said = refused("denoise", "odd.safetensors", "noisy.exr")
-    assert "ranges is {: no JSON that can be taken" in said
+    assert "ranges '{': is not acceptable JSON" in said
     assert "make the data set" in said
 
 
@@ -246,8 +246,8 @@ def test_a_frame_outside_of_the_ranges_is_denoised_with_a_warning(wamnet, here) 
         assert wamnet(*small, "--yaw", yaw, "-o", "frame.exr").status == 0
         outcome = wamnet("denoise", "narrow.safetensors", "frame.exr")
         assert outcome.status == 0
-        warned = [line for line in outcome.out.splitlines() if "outside of what" in line]
-        wanted = [f"frame.exr: outside of what the model has learned: {text}; expect errors" for text in told]
+        warned = [line for line in outcome.out.splitlines() if "outside the training" in line]
+        wanted = [f"frame.exr: outside the training ranges: {text}; expect errors" for text in told]
         assert warned == wanted
 
 
@@ -256,5 +256,5 @@ def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> No
     save_model(here / "other.safetensors", replace(model, info={"trained_on_scene": "cornell"}))
     outcome = wamnet("denoise", "other.safetensors", "noisy.exr")
     assert outcome.status == 0
-    assert "noisy.exr: it shows minicubes, and the model has learned only cornell" in outcome.out
+    assert "noisy.exr: it shows minicubes, but the model was trained only on cornell" in outcome.out
     assert (here / "denoised.png").exists()

@@ -110,6 +110,18 @@ def test_wrong_options_are_one_line(refused, arguments, text) -> None:
     assert text in refused(*arguments)
 
 
+@pytest.mark.parametrize(("command", "distribution"), module.DISTRIBUTIONS.items())
+def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, distribution) -> None:
+    """Where they are not installed; the list of commands has them where they are."""
+    assert command in wamnet().out
+    monkeypatch.setattr(module, "entry_points", lambda group: [])
+    assert command not in wamnet().out
+    assert refused(command, "check", "1") == (
+        f"wamnet: error: command '{command}': distribution {distribution} is not installed "
+        f"(install it: pip install {distribution})\n"
+    )
+
+
 def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
     """A full disk is not a bug."""
 
@@ -159,9 +171,7 @@ def test_as_a_process(tmp_path) -> None:
     done = run_process("render", "nowhere", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
-    assert done.stderr.startswith(
-        "wamnet: error: scene is nowhere: no canonical scene has this name; known are"
-    )
+    assert done.stderr.startswith("wamnet: error: scene 'nowhere': unknown (choose one of")
     assert run_process("--version", cwd=tmp_path).returncode == 0
 
 
@@ -206,7 +216,7 @@ def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
         raise MemoryError
 
     monkeypatch.setattr(module, "application", lambda _: fail)
-    assert "the memory does not suffice; use smaller frames" in refused("render")
+    assert "out of memory (use smaller frames" in refused("render")
 
 
 def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
@@ -223,9 +233,7 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
     command = [sys.executable, "run.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 2
-    assert done.stderr.startswith(
-        "wamnet: error: workers is 2: one of these processes was ended from outside"
-    )
+    assert done.stderr.startswith("wamnet: error: workers 2: one of these processes was ended from outside")
     assert done.stderr.count("\n") == 1
 
 

@@ -12,7 +12,7 @@ from wamnet.refimpl.errors import InputError
 
 @pytest.mark.parametrize(("package", "install"), [((), r"'wamnet\[full\]'"), (("no-such",), "no-such")])
 def test_a_missing_package_is_named_with_the_command_that_installs_it(package, install) -> None:
-    text = f"'no_such_package' is missing: it is needed to fly; install it: pip install {install}"
+    text = rf"'no_such_package': missing, and needed to fly \(install it: pip install {install}"
     with pytest.raises(InputError, match=text):
         need("no_such_package", "to fly", *package)
 

@@ -10,8 +10,8 @@ import pytest
 
 from wamnet.cli.commands import train
 from wamnet.cli.files import exr
-from wamnet.compiler.model_file import load_checkpoint, load_model
 from wamnet.kernels import train_on
+from wamnet.models.model_file import load_checkpoint, load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import train as reference
@@ -68,7 +68,7 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
     kept = []
     monkeypatch.setattr(train, "CHECKPOINT_INTERVAL_S", -1.0)
     monkeypatch.setattr(
-        "wamnet.compiler.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
+        "wamnet.models.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
     )
     frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
     recipe = train.choose_recipe("best", None, {"features": ("color",), "steps": 4})
@@ -79,17 +79,17 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--steps", "0"], "recipe: steps is 0"),
-        (["--seed", "-1"], "recipe: seed is -1"),
+        (["--steps", "0"], "recipe: steps 0"),
+        (["--seed", "-1"], "recipe: seed -1"),
         (["--features", "colour"], "colour"),
         (
             ["-i", "noisy.exr"],
-            "number of targets is 1: each --input needs its --target, and there are 2 inputs",
+            "number of targets 1: each --input needs its --target, and there are 2 inputs",
         ),
-        (["-o", "m.pt"], "output file is m.pt: its name must end in .safetensors"),
-        (["-o", "no/m.safetensors"], "output folder is no: it does not exist"),
-        (["--resume"], "wamnet-checkpoint file is model.checkpoint.safetensors: it cannot be read"),
-        (["-i", "none.exr", "-t", "noisy.exr"], "input file is none.exr: it does not exist"),
+        (["-o", "m.pt"], "output file 'm.pt': must end in .safetensors"),
+        (["-o", "no/m.safetensors"], "output folder 'no': not found"),
+        (["--resume"], "wamnet-checkpoint file 'model.checkpoint.safetensors': not found"),
+        (["-i", "none.exr", "-t", "noisy.exr"], "input file 'none.exr': not found"),
         (["--preset", "long"], "Invalid value for '--preset'"),
     ],
 )
@@ -102,7 +102,7 @@ def test_refusals_of_frames(refused, pair, tmp_path) -> None:
     """Sizes that differ, a layer that the features need, a pixel that is not finite."""
     color = np.zeros((3, 2, 3), np.float32)
     exr.write_frame(tmp_path / "small.exr", Frame({"color": color}))
-    assert "sizes of noisy and reference frame is 13x12 and 2x3" in refused(
+    assert "sizes of noisy and reference frame '13x12 and 2x3" in refused(
         "train", "-i", "noisy.exr", "-t", "small.exr", "--features", "color"
     )
     assert "normal" in refused("train", "-i", "small.exr", "-t", "small.exr", "--features", "color,normal")
@@ -112,7 +112,7 @@ def test_refusals_of_frames(refused, pair, tmp_path) -> None:
     color[1, 0, 2] = np.nan
     channels = {name: np.ascontiguousarray(color[:, :, i]) for i, name in enumerate("RGB")}
     OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "nan.exr"))
-    text = "nan.exr: layer 'color' at x=0, y=1 (first of 1 such pixel) is nan: every pixel must be finite"
+    text = "nan.exr: layer 'color' at x=0, y=1 (first of 1 such pixel) nan: every pixel must be finite"
     assert text in refused("train", "-i", "nan.exr", "-t", "small.exr")
 
 
@@ -130,31 +130,31 @@ def test_training_on_a_data_set(wamnet, refused, tmp_path) -> None:
     ]
     assert wamnet("train", *named, *options, "-o", "b.safetensors").status == 0
     assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
-    text = "--dataset is set: the frames come from there; leave out --dataset, or -i and -t"
+    text = "--dataset 'set': cannot be combined with -i and -t (choose one of them"
     assert text in refused("train", "--dataset", "set", *named)
-    assert "list of frames is empty: training needs frames; give -i and -t, or --dataset" in refused("train")
+    assert "training frames: missing (give -i and -t, or --dataset" in refused("train")
     (tmp_path / "set/train/00001-target.exr").write_bytes(b"x")
-    text = "data set is set: 1 of its pictures are not as manifest.json says, first train/00001-target.exr"
+    text = "data set 'set': 1 of its images do not match manifest.json, first train/00001-target.exr"
     assert text in refused("train", "--dataset", "set")
-    assert "data set is none: it has no manifest.json" in refused("train", "--dataset", "none")
+    assert "data set 'none': has no manifest.json" in refused("train", "--dataset", "none")
 
 
 def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> None:
     """What was begun with one network and one set of frames is not finished with others."""
     assert wamnet("train", *pair, "--steps", 2).status == 0
-    assert "changed parts of the recipe is features" in refused(
+    assert "changed parts of the recipe 'features" in refused(
         "train", *pair[:4], "--resume", "--features", "color"
     )
     swapped = ["-i", "reference.exr", "-t", "noisy.exr"]
-    assert "digest of the training frames is" in refused("train", *swapped, "--resume", "--steps", 3)
-    assert "steps is 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
+    assert "digest of the training frames" in refused("train", *swapped, "--resume", "--steps", 3)
+    assert "steps 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
 
 
 def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
     """It resumes, or is replaced, only on request."""
     assert wamnet("train", *pair, "--steps", 2).status == 0
     line = refused("train", *pair, "--steps", 3)
-    assert "checkpoint is model.checkpoint.safetensors: it is there from an earlier run" in line
+    assert "checkpoint 'model.checkpoint.safetensors': belongs to an earlier run" in line
     assert "--resume" in line
     assert "--restart" in line
     assert wamnet("train", *pair, "--steps", 3, "--restart").status == 0
@@ -165,7 +165,7 @@ def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
 def test_resuming_has_its_own_recipe(wamnet, refused, pair) -> None:
     """A preset is refused; another number of steps is told to give another model."""
     assert wamnet("train", *pair, "--steps", 2).status == 0
-    text = "--preset is paper: with --resume the checkpoint's own recipe counts"
+    text = "--preset 'paper': cannot be combined with --resume"
     assert text in refused("train", *pair[:4], "--resume", "--preset", "paper")
     outcome = wamnet("train", *pair[:4], "--resume", "--steps", 3)
     assert "became one of 3: another model than with 3 from the start" in outcome.out
@@ -201,10 +201,10 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     want = reference.train(recipe, [frames], network=network)
     got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")
     assert all((a == b).all() for a, b in zip(got.parameters, want.parameters, strict=True))
-    text = "--from is full.safetensors: a resumed run continues from its checkpoint; leave it out"
+    text = "--from 'full.safetensors': a resumed run continues from its checkpoint (leave it out"
     assert text in refused("train", *pair[:4], "--resume", "-o", "cut.safetensors", *more[:2])
     others = (*pair[:4], "--features", "color", *more[:2], "-o", "x.safetensors")
-    assert "widths, omegas and activation of the first network is " in refused("train", *others)
+    assert "widths, omegas and activation of the first network (" in refused("train", *others)
 
 
 def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> None:
@@ -217,9 +217,9 @@ def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> 
     assert wamnet("compile", "m.safetensors", "--target", "opencl", "-o", "kernel").status == 0
     assert wamnet("certify", "kernel/denoise.certificate.json").status == 0
     assert wamnet("denoise", "m.safetensors", "noisy.exr", "-o", "p.png", "--executor", "opencl").status == 0
-    text = "activation is tanh: not a known activation; use one of sine, relu"
+    text = "activation 'tanh': unknown (choose one of sine, relu"
     assert text in refused("train", *pair, "--activation", "tanh", "-o", "x.safetensors")
-    text = "--variant is rank4: it chooses what --activation does; leave out --activation"
+    text = "--variant 'rank4': it chooses what --activation does (leave out --activation"
     more = ("--from", "m.safetensors", "--variant", "rank4", "--activation", "sine", "-o", "x.safetensors")
     assert text in refused("train", *pair[:4], *more)
 
@@ -279,7 +279,7 @@ def test_a_model_is_rounded_on_frames(wamnet, refused, pair, tmp_path) -> None:
     again = ("train", *pair[:4], "--from", "w.safetensors", "--whole")
     assert "the model is one of integers" in refused(*again)
     further = ("train", *pair[:4], "--from", "w.safetensors", "--steps", 2)
-    assert "first network is of integers: training moves floats" in refused(*further)
+    assert "first network: is an integer network, and training needs floats" in refused(*further)
 
 
 def test_integers_from_the_start_and_resumed(wamnet, refused, pair, tmp_path) -> None:
@@ -297,7 +297,7 @@ def test_integers_from_the_start_and_resumed(wamnet, refused, pair, tmp_path) ->
     assert outcome.status == 130
     assert wamnet("train", *pair[:4], "--resume", "-o", "parts.safetensors").status == 0
     assert (tmp_path / "parts.safetensors").read_bytes() == (tmp_path / "all.safetensors").read_bytes()
-    text = "--variant is whole8: a resumed run keeps the checkpoint's; leave it out"
+    text = "--variant 'whole8': a resumed run keeps the checkpoint's (leave it out"
     assert text in refused("train", *pair[:4], "--resume", "--whole", "-o", "parts.safetensors")
 
 
@@ -330,11 +330,11 @@ def test_a_narrower_network_is_trained_and_rounded(wamnet, pair, tmp_path, execu
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--whole", "--rank", "4"], "recipe: rank is 4: a network of integers has sines, and no rank"),
-        (["--whole", "--activation", "relu"], "recipe: activation is relu: a network of integers has sines"),
-        (["--whole", "--variant", "whole10"], "--variant is whole10: --whole is short for whole8"),
-        (["--variant", "whole9"], "variant is whole9: there are whole8, whole10"),
-        (["--variant", "window8+whole8"], "--variant is window8+whole8: it is cut from a trained model"),
+        (["--whole", "--rank", "4"], "recipe: rank 4: integer networks have sines, and no rank"),
+        (["--whole", "--activation", "relu"], "recipe: activation 'relu': integer networks have sines"),
+        (["--whole", "--variant", "whole10"], "--variant 'whole10': --whole is short for whole8"),
+        (["--variant", "whole9"], "variant 'whole9': there are whole8, whole10"),
+        (["--variant", "window8+whole8"], "--variant 'window8+whole8': is cut from a trained model"),
     ],
 )
 def test_refusals_of_integers(refused, pair, options, text) -> None:

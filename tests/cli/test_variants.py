@@ -13,10 +13,10 @@ from wamnet.cli.commands.choose import Request, check_request
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
-from wamnet.compiler.model_file import load_model
 from wamnet.kernels import cache, denoise_on, open_executor
 from wamnet.kernels.run import measure_curve
 from wamnet.kernels.run.curve import Curve, Point
+from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 
@@ -122,30 +122,30 @@ def test_a_curve_is_measured_once_and_kept(wamnet, here, monkeypatch) -> None:
 
 
 REFUSED = {
-    "variant is rank: 'rank' is not an approximation": (*COMPILE, "--variant", "rank"),
-    "variant is window9: the window has 4 x 4 taps": (*COMPILE, "--variant", "window9"),
-    "--variant is full: --max-ms chooses a variant itself": (*COMPILE, "--variant", "full", "--max-ms", 3),
-    "list of options is --size: a choice needs --max-error": (*COMPILE, "--size", 64),
-    "--curve is curve.json: its points are measured already": (
+    "variant 'rank': 'rank' is not an approximation": (*COMPILE, "--variant", "rank"),
+    "variant 'window9': the window has 4 x 4 taps": (*COMPILE, "--variant", "window9"),
+    "--variant 'full': --max-ms chooses a variant itself": (*COMPILE, "--variant", "full", "--max-ms", 3),
+    "list of options '--size': a choice needs --max-error": (*COMPILE, "--size", 64),
+    "--curve 'curve.json': its points are measured already": (
         *(*COMPILE, "--max-ms", 3, "--curve", "curve.json", "--size", 64),
     ),
-    "--size is 8: it must be from 16 to 4096": (*COMPILE, "--max-ms", 3, "--size", 8),
-    "--max-error is nan: it must be finite": (*COMPILE, "--max-error", "nan", "--curve", "curve.json"),
-    "--frames is missing: errors are measured on frames": (*COMPILE, "--max-error", 0.1),
+    "--size 8: must be from 16 to 4096": (*COMPILE, "--max-ms", 3, "--size", 8),
+    "--max-error nan: must be finite": (*COMPILE, "--max-error", "nan", "--curve", "curve.json"),
+    "--frames: missing": (*COMPILE, "--max-error", 0.1),
     "no point of the curve keeps it; the nearest is window3": (
         *(*COMPILE, "--max-ms", 3, "--curve", "curve.json"),
     ),
-    "curve.json: profile is ieee: this one is for native": (
+    "curve.json: profile 'ieee': this one is for native": (
         *(*COMPILE, "--profile", "native", "--max-ms", 3, "--curve", "curve.json"),
     ),
-    "curve file is none.json: it cannot be read": (*COMPILE, "--max-ms", 3, "--curve", "none.json"),
-    "rank is 2: the variant is window3": (
+    "curve file 'none.json': not found": (*COMPILE, "--max-ms", 3, "--curve", "none.json"),
+    "rank 2: the variant is window3": (
         *("denoise", "model.safetensors", "noisy.exr", "--rank", 2, "--variant", "window3"),
     ),
-    "--variant is window3: it is cut from a trained model": (
+    "--variant 'window3': is cut from a trained model": (
         *("train", "-i", "noisy.exr", "-t", "reference.exr", "--variant", "window3"),
     ),
-    "--variant is window3: it chooses what --rank does": (
+    "--variant 'window3': it chooses what --rank does": (
         *("train", "-i", "noisy.exr", "-t", "reference.exr", "--from", "model.safetensors"),
         *("--variant", "window3", "--rank", 2),
     ),
@@ -171,12 +171,12 @@ def test_a_sine_is_not_trained(refused, here, monkeypatch) -> None:
     polynomial = sine.POLYNOMIALS[sine.DEGREE]
     monkeypatch.setattr(sine, "POLYNOMIALS", {7: polynomial, sine.DEGREE: polynomial})
     line = refused(*AGAIN, "--variant", "sine7")
-    assert "--variant is sine7: the degree of a sine is chosen when a kernel is compiled, not trained" in line
+    assert "--variant 'sine7': the degree of a sine is chosen when a kernel is compiled, not trained" in line
 
 
 def test_halves_are_not_trained(refused, here) -> None:
     line = refused(*AGAIN, "--variant", "half16")
-    assert "--variant is half16: weights are rounded to halves when a kernel is compiled, not trained" in line
+    assert "--variant 'half16': weights are rounded to halves when a kernel is compiled, not trained" in line
 
 
 def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) -> None:
@@ -185,11 +185,11 @@ def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) 
         == 0
     )
     line = refused(*COMPILE, "--max-error", 0.1, "--frames", "s")
-    assert "--frames is s: it has no test frames" in line
+    assert "--frames 's': has no test frames" in line
 
 
 def test_sizes_that_are_the_ends_of_the_range_are_allowed() -> None:
     for size in (choose.SMALLEST_PX, choose.LARGEST_PX):
         check_request(Request(max_ms=1.0, size=size), None)
-    with pytest.raises(InputError, match="--size is 4097"):
+    with pytest.raises(InputError, match="--size 4097"):
         check_request(Request(max_ms=1.0, size=choose.LARGEST_PX + 1), None)

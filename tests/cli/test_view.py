@@ -16,7 +16,7 @@ import pytest
 
 from wamnet.cli.commands import view
 from wamnet.cli.reports import webpage
-from wamnet.compiler.model_file import load_model, save_model
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 
 
@@ -120,12 +120,12 @@ def test_no_browser_where_none_is_wanted(wamnet, here, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--port", "70000"], "--port is 70000: it must be from 0 to 65535"),
-        (["-o", "page.txt"], "its name must end in .html or .htm"),
-        (["-o", "missing/page.html"], "it does not exist"),
-        (["--scene", "nowhere", "-o", "page.html"], "no canonical scene has this name"),
+        (["--port", "70000"], "--port 70000: must be from 0 to 65535"),
+        (["-o", "page.txt"], "must end in .html or .htm"),
+        (["-o", "missing/page.html"], "not found"),
+        (["--scene", "nowhere", "-o", "page.html"], "unknown"),
         (["--set", "time=2", "-o", "page.html"], "a page shows all times of a canonical scene"),
-        (["--set", "warm=2", "-o", "page.html"], "minicubes wants three numbers with commas"),
+        (["--set", "warm=2", "-o", "page.html"], "scene minicubes needs three numbers with commas"),
         (["--fast", "nothing.safetensors", "-o", "page.html"], "nothing.safetensors"),
     ],
 )
@@ -139,7 +139,7 @@ def test_a_port_that_is_taken_is_refused(refused, here, monkeypatch):
         taken.bind((view.HOST, 0))
         taken.listen()
         line = refused("view", "model.safetensors", "--port", taken.getsockname()[1])
-    assert "it cannot be had (Address already in use); choose another, or 0" in line
+    assert "cannot be opened: Address already in use (choose another, or 0" in line
 
 
 @pytest.mark.parametrize("learned", ["minicubes, cornell", "mine"])
@@ -148,7 +148,7 @@ def test_a_model_of_no_single_canonical_scene_needs_a_name(refused, here, learne
     several = replace(model, info={"trained_on_scene": learned})
     save_model(here / "several.safetensors", several)
     line = refused("view", "several.safetensors", "-o", "page.html")
-    assert f"scene that the model was trained on is {learned}: " in line
+    assert f"scene that the model was trained on '{learned}': " in line
     assert "name one with --scene" in line
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from base64 import b64decode
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -35,7 +36,7 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.kernels.run import page as P
 from wamnet.refimpl.light import scenes
@@ -322,6 +323,46 @@ def test_ready_is_what_has_drawn(chromium, path):
         assert [drawn for text, drawn in heard if text.startswith("Ready")] == [True]
         said = [text for text, _ in heard]
         assert said.index("Checking the network on this device.") < said.index("Drawing the first picture.")
+
+
+POSTER = """(() => {
+  const canvas = document.getElementById("poster-picture");
+  const { width, height } = canvas;
+  const box = document.getElementById("poster").getBoundingClientRect();
+  const view = document.getElementById("picture").getBoundingClientRect();
+  const pixels = [...canvas.getContext("2d").getImageData(0, 0, width, height).data];
+  return { width, pixels, apart: Math.abs(box.top - view.top) + Math.abs(box.bottom - view.bottom) };
+})()"""
+"""The poster's pixels, and how far it is from the place of the picture."""
+
+
+HOLD = """
+const later = window.requestAnimationFrame.bind(window);
+const waiting = [];
+window.requestAnimationFrame = (action) => waiting.push(action);
+window.release = () => {
+  window.requestAnimationFrame = later;
+  waiting.forEach(later);
+};
+"""
+"""No frame comes before the test releases them: nothing is drawn, and nothing finishes compiling."""
+
+
+def test_a_poster_shows_what_happens_until_a_picture_is_drawn(chromium, path, data):
+    """The reference's picture of the page's check, on the canvas, and the status with its progress."""
+    with chromium.tab(path, HOLD, **NO_MOTION) as tab:
+        found = tab.page.evaluate(POSTER)
+        assert (found["width"], found["apart"]) == (P.CHECK_PX, 0)
+        expected = np.frombuffer(b64decode(data["variants"][0]["check"]["expected"]), "<f8")
+        shown = np.reshape(found["pixels"], (-1, 4))[:, :3].ravel()
+        assert np.max(np.abs(shown - np.clip(255 * expected, 0, 255))) <= 0.5  # rounded to 8 bits
+        assert tab.text("poster-text") == tab.text("status") != ""
+        for name in ("#poster", "#poster-progress"):
+            assert tab.page.locator(name).is_visible()
+        tab.page.evaluate("release()")
+        tab.page.evaluate("wamnet.ready")
+        assert not tab.page.locator("#poster").is_visible()
+        assert tab.said == []
 
 
 def test_it_plays_where_motion_is_welcome(chromium, path):

@@ -143,5 +143,5 @@ def test_a_network_of_integers_is_alone(model, kit):
     floats = kit.network([dataset.n_inputs(FEATURES, model.window), 6, 3], (3.0, 3.0))
     assert [one.name for one in P.networks_of(model)] == ["full"]
     for pair in ((model, replace(model, siren=floats)), (replace(model, siren=floats), model)):
-        with pytest.raises(InputError, match="a network of integers cannot be cut to a rank"):
+        with pytest.raises(InputError, match="an integer network cannot be cut to a rank"):
             P.networks_of(*pair)

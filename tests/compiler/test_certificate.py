@@ -102,7 +102,7 @@ def test_certificates_of_all_schedules_hold(tmp_path, target, schedule):
 
 @pytest.mark.parametrize(
     ("target", "profile"),
-    [("opencl", "exact"), ("c", "exact"), ("opencl", "native"), ("cuda", "native"), ("c", "ieee-sine7")],
+    [("opencl", "native"), ("cuda", "native"), ("c", "ieee-sine7")],
 )
 def test_certificates_of_all_profiles_hold(tmp_path, target, profile):
     """The checker knows every sine of which something is promised."""
@@ -355,12 +355,12 @@ def test_a_changed_step_is_refused_by_name(path, changed, place, value, match):
         ({"step": 0.5, "count": 54}, "W0: counts and steps are integers"),
         ({"step": "6", "count": 54}, "W0: counts and steps are integers"),
         ({"step": 5, "count": 54}, "digest of the program in the certificate"),
-        ({"step": 6, "count": 0}, "it must be a whole certificate"),
-        ({"step": -6, "count": 54}, "it must be a whole certificate"),
-        ({"step": 10**40, "count": 54}, "it must be a whole certificate"),
-        ({"step": 6, "count": 53}, "it must be a whole certificate"),
-        ({"step": 6}, "it must be a whole certificate"),
-        (54, "it must be a whole certificate"),
+        ({"step": 6, "count": 0}, "must be a complete certificate"),
+        ({"step": -6, "count": 54}, "must be a complete certificate"),
+        ({"step": 10**40, "count": 54}, "must be a complete certificate"),
+        ({"step": 6, "count": 53}, "must be a complete certificate"),
+        ({"step": 6}, "must be a complete certificate"),
+        (54, "must be a complete certificate"),
     ],
 )
 def test_places_of_no_weights_are_refused(path, changed, columns, match):
@@ -511,20 +511,24 @@ def test_other_weights_of_the_same_form_have_other_numbers(path, tmp_path):
 
 @pytest.mark.parametrize("cut", [0, 1, 40, 400, -2])
 def test_a_truncated_file_is_no_certificate(path, changed, cut):
-    with pytest.raises(InputError, match="no JSON that can be taken"):
+    with pytest.raises(InputError, match="is not acceptable JSON"):
         checker.check(changed(denoise_certificate_json=path.read_bytes()[:cut]))
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\x00", b"[]", b"{}", b"null", b'{"schema": 1}', b"[" * 100000])
 def test_garbage_is_no_certificate(changed, data):
-    with pytest.raises((InputError, checker.Refused), match=r"must be|promises|no JSON|earlier version"):
+    with pytest.raises(
+        (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
+    ):
         checker.check(changed(denoise_certificate_json=data))
 
 
 def test_any_key_left_out_is_told(path, changed):
     held = certificate_of(path)
     for name in held:
-        with pytest.raises((InputError, checker.Refused), match=r"must be|promises|no JSON|earlier version"):
+        with pytest.raises(
+            (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
+        ):
             checker.check(changed(denoise_certificate_json={k: v for k, v in held.items() if k != name}))
 
 

@@ -22,9 +22,8 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.weights import layout, pack
-from wamnet.compiler.languages.glsl_inlined import GLSLInlined
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.schedules.emit_tiled import refused_by_vectors
+from wamnet.compiler.schedules.tile import refused_by_vectors
 from wamnet.compiler.targets import DENOISERS
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
@@ -186,10 +185,10 @@ def test_two_writers_at_once_leave_whole_files(tmp_path):
 
 def test_unknown_target_and_profile():
     with pytest.raises(
-        CompileError, match="target 'abacus' does not exist; there are: numpy, opencl, opengl, c"
+        CompileError, match=r"target 'abacus': unknown \(choose one of numpy, opencl, opengl, c"
     ):
         compile_program(lower(model()), "abacus")
-    with pytest.raises(CompileError, match="profile 'fast' does not exist; there are: ieee, exact, native"):
+    with pytest.raises(CompileError, match=r"profile 'fast': unknown \(choose one of ieee, native"):
         compile_program(lower(model()), "opencl", "fast")
 
 
@@ -274,12 +273,9 @@ def test_too_many_output_channels_for_a_fragment():
 
 def test_a_schedule_that_writes_fewer_channels_gives_way():
     """A language may have one form with several results and one without; no target has both yet."""
-    dialect = GLSLInlined()
-    dialect.max_output_channels = 4
     w = np.ones((5, 5), np.float32)
-    assert "it writes 5 channels, of at most 4" in refused_by_vectors(
-        gathered(lambda x: x @ w, channels=5), dialect
-    )
+    reason = refused_by_vectors(gathered(lambda x: x @ w, channels=5), 4)
+    assert "it writes 5 channels, of at most 4" in reason
 
 
 @pytest.mark.parametrize("channels", [1, 4, 5, 8, 11])
@@ -290,7 +286,7 @@ def test_a_fragment_writes_four_channels_a_buffer(channels):
     for number, name in enumerate(names):
         assert f"layout(location = {number}) out vec4 {name};" in source
         assert f"    {name} = vec4(0.0, 0.0, 0.0, 1.0);" in source
-        assert f"{name}[i] = v" in source
+        assert f"{name}[0] = v" in source or f"{name}[i] = v" in source
     assert source.count("layout(") == len(names)
 
 

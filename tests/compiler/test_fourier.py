@@ -15,12 +15,14 @@ from wamnet.compiler.core.enclosure import round_up
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.kernel.kernel import FLOAT, Let, parts
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds, spectra
-from wamnet.compiler.schedules import emit_fourier, fourier
-from wamnet.compiler.schedules.c_fourier import CFourier
-from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.schedules.opencl_fourier import OPENCL_FOURIER, OpenCLFourier
+from wamnet.compiler.schedules import fft, fourier, schedules
+from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -28,7 +30,7 @@ from wamnet.refimpl.network.denoise import denoise_pixel
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
-FFT32 = OPENCL_FOURIER[0]
+FFT32 = schedule_named("opencl", "fft32")
 CONTRACT = sine_contract("ieee", "opencl")
 
 
@@ -340,15 +342,15 @@ def test_private_bytes_are_those_of_its_arrays() -> None:
     sizes = dict(re.findall(r"#define ([A-Z_]+) (\d+)", source))
     sizes |= {"OUT": "21", "STRIDE": "66"}
     body = source[source.index("__kernel") :]
-    found = re.findall(r"vector (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
+    found = re.findall(r"float16 (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
     kept = [
         f"({a}) * ({b or 1})"
         for name, a, b in found
         if "real" not in name and "imaginary" not in name and name != "sum"
     ]
     numbers = [eval(re.sub("[A-Z_]+", lambda word: sizes[word[0]], text), {}) for text in kept]
-    # Row, rows, column, mirror, spectra, product, back, sums, and an array between two layers each.
-    assert len(numbers) == 8 + 6
+    # The pixels of a row, rows, columns, spectra, product, back, sums, and an array between two layers each.
+    assert len(numbers) == 7 + 6
     assert FFT32.private_bytes(made) == 64 * sum(numbers)
 
 
@@ -359,9 +361,9 @@ def test_golden_spectra(golden) -> None:
     first, last = network.weights
     function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
-    idea = emit_fourier.IDEA.format(points=4)
-    for dialect in (OpenCLFourier(4), CFourier(4)):
-        tiny = emit_fourier.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
+    idea = "small tiles"
+    for dialect in (OpenCL(), C()):
+        tiny = schedules.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
         golden(f"fft4.denoise{dialect.suffix}", tiny.emit(analysed(traced), ["a tiny kernel"], True))
 
 
@@ -389,9 +391,12 @@ def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) 
 
 def test_operations_are_those_of_the_text() -> None:
     """The count by which a schedule is chosen: 456 sums and products of a transform of 32 numbers."""
-    lines = emit_fourier.codelet(FFT32.dialect, "f", 32, 32, 1)
-    computed = [line for line in lines if "vector t" in line and "from[" not in line]
-    assert sum(line.count(f" {sign} ") for line in computed for sign in "+-*") == 456
+    function = fft.codelet("f", 32, 32, 1, FLOAT.of(16))
+    computed = [let.value for let in function.body if isinstance(let, Let)]
+    operations = ("add", "subtract", "multiply")
+    assert (
+        sum(part.op in operations for value in computed if value.op != "load" for part in parts(value)) == 456
+    )
     one, spectra = FFT32.operations(emitted(paper()))
     assert one == 864 * 2
     assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

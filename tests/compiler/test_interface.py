@@ -8,7 +8,7 @@ import pytest
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.languages import interface
+from wamnet.compiler.kernel import interface
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.languages.glsl_es import GLSLESPacked
-from wamnet.compiler.schedules.emit_packed import WEIGHTS_A_TEXEL, Packed
+from wamnet.compiler.languages.glsl_es import GLSLES
+from wamnet.compiler.schedules.packed import WEIGHTS_A_TEXEL
+from wamnet.compiler.schedules.schedules import Packed
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def program(kit):
 
 
 def test_rows_of_neurons_are_filled_up_to_whole_texels(program):
-    schedule = Packed(GLSLESPacked())
+    schedule = Packed(GLSLES())
     packed, slots = schedule.pack(program), schedule.layout(program)
     assert packed.size % 4 == 0
     for name, array in program.parameters.items():
@@ -35,5 +36,5 @@ def test_a_packed_kernel_says_how_its_texture_is_read(program):
     artifact = compile_program(program, "glsl-es", schedule="packed")
     assert artifact.manifest["schedule"][WEIGHTS_A_TEXEL] == 4
     assert "weight_texture: RGBA32F, 1024 texels wide" in artifact.source
-    assert Packed(GLSLESPacked()).refusal(program) == ""
-    assert Packed(GLSLESPacked()).private_bytes(program) > 0
+    assert Packed(GLSLES()).refusal(program) == ""
+    assert Packed(GLSLES()).private_bytes(program) > 0

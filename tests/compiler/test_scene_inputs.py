@@ -13,7 +13,7 @@ from wamnet.compiler.scenes.host_pass import feature_pass
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import can_move, compile_path
 from wamnet.compiler.scenes.scene_inputs import SceneInputs, lay_out, tables_of, varying
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.light import scenes
@@ -172,7 +172,7 @@ def test_a_kernel_with_inputs_draws_what_the_constant_one_draws(executor_named, 
     assert np.array_equal(found, expected)
     own = compile_path(lower_scene(at("minicubes", 0.05), settings), executor.name, lanes=lanes)
     assert np.array_equal(executor.trace(kernel, part), executor.trace(own, part))
-    with pytest.raises(InputError, match=r"numbers of the scene is float32 of shape \(1,\): must be float32"):
+    with pytest.raises(InputError, match=r"numbers of the scene 'float32 of shape \(1,\)': must be float32"):
         executor.trace(kernel, part, np.zeros(1, np.float32))
 
 

@@ -13,12 +13,10 @@ from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.schedules.c_tiled import C_LADDER
-from wamnet.compiler.schedules.emit_inlined import LARGEST_WEIGHTS
-from wamnet.compiler.schedules.emit_tiled import LARGEST_PRIVATE
-from wamnet.compiler.schedules.opencl_group import OPENCL_GROUPS
-from wamnet.compiler.schedules.opencl_tiled import OPENCL_LADDER
-from wamnet.compiler.targets import TARGETS
+from wamnet.compiler.schedules.inlined import LARGEST_WEIGHTS
+from wamnet.compiler.schedules.schedules import Tile
+from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.targets import TARGETS, schedule_named, target_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -55,7 +53,7 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
         ("opencl", "ieee", "vector16", "clamp"),
         ("opencl", "ieee", "tile16", "zero"),
         ("c", "ieee", "tile16", "zero"),
-        ("c", "exact", "tile4", "clamp"),
+        ("c", "ieee", "tile4", "clamp"),
     ],
 )
 def test_golden_tiles(golden, target, profile, name, border):
@@ -112,14 +110,8 @@ def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
     assert ("group" in found) == (found["name"] == "group")
 
 
-def test_an_exact_program_is_plain():
-    found = compile_program(small(), "opencl", "exact", "group4").manifest["schedule"]
-    assert (found["name"], found["asked"]) == ("plain", "group4")
-    assert found["reason"] == "the order of its sums is not pinned as profile exact states"
-
-
 @given(
-    channels=st.lists(st.integers(1, 9), min_size=1, max_size=3),
+    channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),
     hidden=st.integers(1, 30),
 )
@@ -127,7 +119,7 @@ def test_groups_find_every_weight(channels, size, hidden):
     """Read the array as the kernel's loops do: image, four channels, tap, channel."""
     network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    group = next(s for s in OPENCL_GROUPS if s.name == "group4")
+    group = schedule_named("opencl", "group4")
     packed, layout = group.pack(program), group.layout(program)
     for name, slot in layout.items():
         assert slot.offset % 4 == 0
@@ -182,9 +174,9 @@ OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
 
 def test_unknown_schedule_is_told_with_the_known_ones():
     known = "plain, vector16, tile16, tile8, tile4, fft32, fft32x8, fft32x4, dot16, group, group4, groupdot"
-    with pytest.raises(CompileError, match=f"schedule 'tile3' does not exist for this target; .*: {known}$"):
+    with pytest.raises(CompileError, match=rf"schedule 'tile3': unknown .* choose one of {known}\)$"):
         compile_program(small(), "opencl", schedule="tile3")
-    with pytest.raises(CompileError, match=r"schedule 'tile16' does not exist .*: plain"):
+    with pytest.raises(CompileError, match=r"schedule 'tile16': unknown .*choose one of plain\)"):
         compile_program(small(), "numpy", schedule="tile16")
 
 
@@ -219,7 +211,9 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
 
 
 @given(
-    schedule=st.sampled_from([*OPENCL_LADDER, *C_LADDER]),
+    schedule=st.sampled_from(
+        [s for t in ("opencl", "c") for s in target_named(t).schedules if type(s) is Tile]
+    ),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),
     hidden=st.integers(1, 70),
@@ -256,19 +250,24 @@ def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, h
     assert np.count_nonzero(packed) == used
 
 
-@pytest.mark.parametrize(("target", "array"), [("opencl", "float number"), ("c", r"float v\d+")])
+@pytest.mark.parametrize(
+    ("target", "array"), [("opencl", r"float number|float16 v\d+"), ("c", r"float v\d+")]
+)
 def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
     artifact = compile_program(small(), target, "ieee", "tile16")
     sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
-    arrays = re.findall(rf"(?:float patch_\w+|{array})\[([^]]+)\];", artifact.source)
-    numbers = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for text in arrays]
+    arrays = re.findall(rf"(float patch_\w+|{array})\[([^]]+)\];", artifact.source)
+    counts = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for _, text in arrays]
+    numbers = [
+        16 * n if kind.startswith("float16") else n for (kind, _), n in zip(arrays, counts, strict=True)
+    ]
     assert len(numbers) == 2 + 4
     assert artifact.manifest["private_bytes"] == 4 * sum(numbers)
 
 
-def test_only_profiles_that_allow_it_let_products_be_fused_in_c():
-    """PRO-1, PRO-11: the tiled header says so itself, whatever the compiler's default is."""
-    for profile, word in (("ieee", "fast"), ("native", "fast"), ("exact", "off")):
-        source = compile_program(small(), "c", profile, "tile8").source
+def test_products_may_be_fused_in_tiles_of_c_only():
+    """KER-16, KER-22: the header states it, whatever the compiler's default is."""
+    for schedule, word in (("tile8", "fast"), ("plain", "off")):
+        source = compile_program(small(), "c", schedule=schedule).source
         assert f'#pragma GCC optimize("fp-contract={word}")' in source
         assert f"#pragma STDC FP_CONTRACT {'ON' if word == 'fast' else 'OFF'}" in source

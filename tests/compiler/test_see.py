@@ -12,7 +12,7 @@ from wamnet.compiler.scenes.lower_encode import sees
 from wamnet.compiler.scenes.lower_scene import SEEN, lower_scene, names
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl import rng
 from wamnet.refimpl.errors import CompileError

@@ -303,7 +303,7 @@ def test_degree_that_does_not_exist():
     "name", ["ieee-sine12", "native-sine7", "ieee-sine", "ieee-sine07", "ieee7", "x-sine7"]
 )
 def test_profile_with_a_sine_that_does_not_exist(name):
-    with pytest.raises(CompileError, match=f"profile '{name}' does not exist; .* ieee-sine9, ieee-sine13"):
+    with pytest.raises(CompileError, match=f"profile '{name}': unknown .* ieee-sine9, ieee-sine13"):
         profile_named(name)
 
 

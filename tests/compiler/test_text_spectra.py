@@ -10,14 +10,14 @@ from texts import NAME, changed, parts, unnoticed
 from wamnet.compiler import artifact, targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.proof import checker, spectra_checker
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
-from wamnet.compiler.schedules import emit_fourier
-from wamnet.compiler.schedules.c_fourier import CFourier
-from wamnet.compiler.schedules.opencl_fourier import OpenCLFourier
+from wamnet.compiler.schedules import schedules
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -34,11 +34,11 @@ def model(border="zero", activation="sine", images=("color", "normal", "albedo",
 
 def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
-    dialect = OpenCLFourier(4) if target == "opencl" else CFourier(4)
-    tiny = emit_fourier.Fourier("fft8", emit_fourier.IDEA, dialect, 4, 6, points, tiles)
+    dialect = OpenCL() if target == "opencl" else C()
+    tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
     whole = targets.DENOISERS[target]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(emit_fourier, "COST", 0.0)
+        patch.setattr(schedules, "COST", 0.0)
         patch.setitem(targets.DENOISERS, target, replace(whole, schedules=(*whole.schedules, tiny)))
         made = compile_program(lower(model(**kwargs)), target, schedule="fft8")
     assert made.manifest["schedule"]["name"] == "fft8"
@@ -142,19 +142,19 @@ def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_
     ("old", "new", "why"),
     [
         ("* 0.707106769f", "* 0.70710683f", "never made"),
-        ("vector t18 = t0 - t8;", "vector t18 = t8 - t0;", "never made"),
-        ("to[0] = a + c;", "to[0] = a + d;", "never made"),
+        ("float4 t18 = t0 - t8;", "float4 t18 = t8 - t0;", "never made"),
+        ("* 4] = a + c;", "* 4] = a + d;", "never made"),
         ("real[t][0] -= w2 * b;", "real[t][0] += w2 * b;", "never made"),
         ("real[t][0] += w0 * a;", "real[t][0] += w0 * a; real[t][0] += w0 * a;", "never made"),
         ("real[t][0] += w0 * a;", "real[t][0] += w1 * a;", "never made"),
         ("block * BLOCK + pair", "pair", "never made"),
         ("whole_real[t][1] += real[t][1];", "whole_real[t][1] = real[t][1];", "never made"),
-        ("int apart = opposite != k;", "int apart = 0;", "read before it is written|never made"),
-        ("for (int k = 0; k <= POINTS / 2", "for (int k = 0; k < POINTS / 2", "read before it is written"),
+        ("int apart = opposite != k ? 1 : 0;", "int apart = 0;", "read before it is written|never made"),
+        ("k < POINTS / 2 + 1", "k < POINTS / 2", "read before it is written"),
         (") - 0.5f;", ") - 0.25f;", "never made"),
         ("clamp(left, 0, width - 1)", "clamp(left, 0, width)", "never made|beyond its ends"),
         ("int top = tile_y + dy", "int top = tile_y + 1 + dy", "never made"),
-        ("inside ? ", "row_y == top ? ", "never made"),
+        ("inside ? ", "row == top ? ", "never made"),
         ("tile_y + line < height", "tile_y + line < height - 1", "without a result"),
         ("line < OUT && tile_y + line < height", "line < OUT", "beyond the picture"),
         ("min(tile_x + TILES * OUT, width)", "tile_x + TILES * OUT", "not its own|beyond the picture"),
@@ -217,7 +217,7 @@ def test_tiles_of_other_sizes_are_not_read(opencl):
 
 
 def test_the_operands_of_a_sum_may_be_exchanged(opencl):
-    assert run_text(*changed(opencl, "to[0] = a + c;", "to[0] = c + a;"))
+    assert run_text(*changed(opencl, "* 4] = a + c;", "* 4] = c + a;"))
     assert run_text(*changed(opencl, "real[t][0] += w0 * a;", "real[t][0] = a * w0 + real[t][0];"))
 
 

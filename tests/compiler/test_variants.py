@@ -87,7 +87,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_names_are_refused(name) -> None:
-    with pytest.raises(InputError, match="variant is .*: " + WRONG[name].replace("+", r"\+")):
+    with pytest.raises(InputError, match="variant '.*': " + WRONG[name].replace("+", r"\+")):
         parse(name)
 
 
@@ -349,7 +349,7 @@ def test_integers_have_no_variants(text) -> None:
 
 def test_integers_have_no_rank() -> None:
     whole = vary(parse("whole8"), small()).model
-    with pytest.raises(CompileError, match="rank 2: it rounds sums, and a network of integers does not"):
+    with pytest.raises(CompileError, match="rank 2: rounds sums, and an integer network does not"):
         plan_program(lower(whole), "numpy", rank=2)
 
 

@@ -13,13 +13,14 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Program, Type
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.cuda import CUDA
+from wamnet.compiler.languages.glsl_buffers import Vulkan
+from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import whole
-from wamnet.compiler.schedules.buffers_group import CUDADot, VulkanDot, WGSLDot
-from wamnet.compiler.schedules.c_dot import CDot
-from wamnet.compiler.schedules.emit_dot import Dot, GroupDot
-from wamnet.compiler.schedules.opencl_dot import OpenCLDot
-from wamnet.compiler.schedules.opencl_group import OpenCLGroupDot
+from wamnet.compiler.schedules.schedules import Dot, GroupDot
 from wamnet.compiler.targets import DENOISERS, EXPORTED
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -164,7 +165,7 @@ def smallest(channels) -> Program:
     return analysed(trace(lambda x: forward_whole(net, x), types, gather))
 
 
-@pytest.mark.parametrize("dialect", [CUDADot(), WGSLDot(), VulkanDot(), OpenCLGroupDot()])
+@pytest.mark.parametrize("dialect", [CUDA(), WGSL(), Vulkan(), OpenCL()])
 def test_the_text_of_grouped_dots(golden, dialect) -> None:
     tiny = GroupDot("groupdot", "a tiny group", dialect, 1, (4, 2))
     found = tiny.emit(smallest({"a": 3, "b": 2}), ["a tiny kernel"], False)
@@ -175,7 +176,7 @@ def test_the_text_of_grouped_dots(golden, dialect) -> None:
 def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
     """Read the array as the kernel does: four words at a time, tap by tap, word by word."""
     found, held = smallest(channels), sum(channels.values())
-    tiny = GroupDot("groupdot", "a tiny group", CUDADot(), 1, (4, 2))
+    tiny = GroupDot("groupdot", "a tiny group", CUDA(), 1, (4, 2))
     packed, slots = tiny.pack(found), tiny.layout(found)
     windowed = True
     for name, matrix in found.parameters.items():
@@ -200,13 +201,13 @@ def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
 def test_a_tile_of_words_takes_a_quarter() -> None:
     """Five channels are two words of a pixel; 21 are six, of which four are in the tile at once."""
     for channels, words in (({"a": 3, "b": 2}, 2), ({"a": 4, "b": 17}, 4)):
-        tiny = GroupDot("groupdot", "a tiny group", WGSLDot(), 4, (8, 8))
-        assert tiny.shared_bytes(smallest(channels)) == 4 * words * (8 * 4 + 1) * (8 + 1)
+        tiny = GroupDot("groupdot", "a tiny group", WGSL(), 4, (8, 8))
+        assert tiny.details(smallest(channels))["shared_bytes"] == 4 * words * (8 * 4 + 1) * (8 + 1)
 
 
 def test_the_text_of_dots(golden) -> None:
     found = smallest(CHANNELS)
-    for dialect in (CDot(), OpenCLDot(4)):
+    for dialect in (C(), OpenCL()):
         tiny = Dot("dot4", "a tiny tile", dialect, 4, 2)
         golden(f"dot4.denoise{dialect.suffix}", tiny.emit(found, ["a tiny kernel"], True))
 
@@ -220,7 +221,7 @@ def test_the_bytes_of_dots_are_the_weights() -> None:
             lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, Gather(Window(2, "clamp"), images)
         )
     )
-    dot = Dot("dot4", "a tiny tile", CDot(), 4, 2)
+    dot = Dot("dot4", "a tiny tile", C(), 4, 2)
     packed, slots = dot.pack(found), dot.layout(found)
     assert packed.size == sum(int(np.prod(slot.shape)) for slot in slots.values())
     for name, matrix in found.parameters.items():
@@ -262,7 +263,7 @@ def test_what_bytes_do_not_hold_is_refused(changed, reason) -> None:
     net = changed(network())
     pixel = forward_whole if isinstance(net, Whole) else siren.forward
     found = program(lambda window: pixel(net, window), is_whole=isinstance(net, Whole))
-    assert reason in Dot("dot16", "", CDot(), 16, 14).refusal(found)
-    assert bool(reason) == bool(Dot("dot16", "", CDot(), 16, 14).refusal(found))
-    assert (reason in GroupDot("groupdot", "", WGSLDot(), 4).refusal(found)) or not reason
-    assert bool(reason) == bool(GroupDot("groupdot", "", WGSLDot(), 4).refusal(found))
+    assert reason in Dot("dot16", "", C(), 16, 14).refusal(found)
+    assert bool(reason) == bool(Dot("dot16", "", C(), 16, 14).refusal(found))
+    assert (reason in GroupDot("groupdot", "", WGSL(), 4).refusal(found)) or not reason
+    assert bool(reason) == bool(GroupDot("groupdot", "", WGSL(), 4).refusal(found))

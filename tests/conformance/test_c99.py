@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wamnet.compiler.model_file import load_model, save_model
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.network import domain
 from wamnet.refimpl.network.dataset import channels_of
 from wamnet.spec.conformance import run, vectors

@@ -56,12 +56,12 @@ def test_the_window_of_a_pixel_outside_is_refused(x, y):
     """NumPy took an index of -1 for the last pixel, and raised an error of its own beyond the end."""
     assert "output" in answered("image.window", x=3, y=3)
     refused = answered("image.window", x=x, y=y)["refused"]
-    assert re.match(r"[xy] is -?\d+: the image has the pixels 0 to 3 on this axis; ask for", refused)
+    assert re.match(r"[xy] -?\d+: the image has the pixels 0 to 3 on this axis \(ask for", refused)
 
 
 @pytest.mark.parametrize("image", [[], [[]], [[0, 1]], [[[0.5]]], [[[True]]], 1, "a", [[[0]], [[0], [1]]]])
 def test_the_window_of_no_image_is_refused(image):
-    assert "it must be integers [H][W][C]" in answered("image.window", image=image, x=0, y=0)["refused"]
+    assert "must be integers [H][W][C]" in answered("image.window", image=image, x=0, y=0)["refused"]
 
 
 @pytest.mark.parametrize("value", [True, False, 1.0, 1.5, "1", "0x1p+0", None, [1]])
@@ -80,7 +80,7 @@ def test_the_window_of_no_image_is_refused(image):
 def test_integers_of_a_request_are_integers_of_json(kind, name, value):
     """A seed that was true counted as 1."""
     refused = answered(kind, **{name: value})["refused"]
-    assert refused.startswith(f"{name} is {json.dumps(value)}: it must be an integer of JSON; write it")
+    assert refused.startswith(f"{name} {value!r}: must be an integer of JSON (write it")
 
 
 def test_the_radiance_of_a_whole_path_has_no_light_sample_of_its_last_vertex():
@@ -314,7 +314,7 @@ def test_a_large_variance_excuses_nothing(index):
     ("changes", "text"),
     [
         ({"mean": np.zeros((4, 4, 3))}, r"shapes \(4, 4, 3\) and"),
-        ({"variance": None}, "output variance is None"),
+        ({"variance": None}, "output variance None"),
         ({"spp": 63}, "63 samples per pixel, 64 asked"),
         ({"mean": np.full((16, 16, 3), np.nan)}, "p-value 0 of a block"),
     ],

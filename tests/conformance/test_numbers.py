@@ -51,7 +51,7 @@ def test_arrays_keep_shape_and_kind():
     "value", ["word", None, {}, ["0x1p+0", "a"], "0x", "0xp+1", [[1.5], [1.5, 2.5]], [10**30]]
 )
 def test_what_is_no_number_is_refused(value):
-    with pytest.raises(InputError, match=r"it must be a number|lists must be of one length"):
+    with pytest.raises(InputError, match=r"must be a number|lists must be of one length"):
         from_json(value, "x")
 
 
@@ -101,6 +101,6 @@ def test_a_picture_may_be_a_file(tmp_path):
 def test_other_files_are_refused(tmp_path, monkeypatch, value):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.f32").write_bytes(bytes(24))
-    rule = r"little-endian float32 of its shape|it cannot be read|it must be the stated one, 28"
+    rule = r"little-endian float32 of its shape|cannot be read|not found|must be the stated one, 28"
     with pytest.raises(InputError, match=rule):
         from_file(value, "x")

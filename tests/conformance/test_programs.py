@@ -164,7 +164,7 @@ def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
     ],
 )
 def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command, text):
-    with pytest.raises(InputError, match=rf"^--program is .*: it must answer to hello \({text}.*; see spec"):
+    with pytest.raises(InputError, match=rf"^--program '.*': must answer to hello \({text}.* \(see spec"):
         verdicts(command, ["random.block"], 1.0)
 
 

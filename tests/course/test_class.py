@@ -9,9 +9,9 @@ from pathlib import Path
 import packages
 import pytest
 
-from wamnet.cli.course import table
-from wamnet.cli.course.grading import Limits, grade, grade_class
-from wamnet.cli.course.labs import lab_named
+from wamnet_course import table
+from wamnet_course.grading import Limits, grade, grade_class
+from wamnet_course.labs import lab_named
 
 pytestmark = pytest.mark.needs("programs")
 
@@ -34,7 +34,7 @@ STUDENTS = {
     "imports": ("import no_such_package", "no_such_package", "NumPy and wamnet only"),
     "hostile": ("raise ValueError('\\udcff \\x1b[31m \\x00 \\u202e')", "\\udcff \\x1b[31m \\x00 \\u202e", ""),
     "signals": ("import signal; signal.raise_signal(40)", "an end by signal 40", "crash"),
-    "huge": ("return (np.zeros((1000, 1000, 3)),) * 3", "InputError: result is 96", ""),
+    "huge": ("return (np.zeros((1000, 1000, 3)),) * 3", "InputError: result '96", ""),
     "odd": ("return {'theta': object(), 1: [len]}, 10**5000, (1,) * 9999", "three steps", ""),
 }
 """Bodies of `step`, what is found or expected, and the likeliest mistake."""

@@ -9,12 +9,12 @@ import sys
 import time
 from pathlib import Path
 
-import course as measured
 import packages
 import pytest
 
-from wamnet.cli.course.grading import Limits, grade_class
-from wamnet.cli.course.labs import LABS, lab_named
+import course as measured
+from wamnet_course.grading import Limits, grade_class
+from wamnet_course.labs import LABS, lab_named
 
 pytestmark = pytest.mark.needs("programs")
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-import course as measured
 import pytest
 
-from wamnet.cli.course.frame import Wrong
-from wamnet.cli.course.labs import LABS, lab_named
+import course as measured
 from wamnet.refimpl.errors import InputError
+from wamnet_course.frame import Wrong
+from wamnet_course.labs import LABS, lab_named
 
 SOLUTIONS = Path(__file__).parent / "solutions"
 """Right answers: for these tests, not for students."""
@@ -90,7 +90,7 @@ def test_a_lab_has_many_names(word, name):
 
 def test_an_unknown_lab_is_refused():
     with pytest.raises(
-        InputError, match=r"lab is 13: there is none .* known are lab1, lab2, .* extra3, and all"
+        InputError, match=r"lab '13': there is none .* \(known are lab1, lab2, .* extra3, and all"
     ):
         lab_named("13")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-import course as measured
 import pytest
 
-from wamnet.cli.course.labs import LABS
+import course as measured
+from wamnet_course.labs import LABS
 
 STEP = 6
 """Every sixth wrong answer of a lab is asked."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import cells
@@ -89,18 +90,83 @@ def test_formulas_are_set_and_none_is_left(site):
     assert not any('class="arithmatex"' in text for text in texts)
 
 
+class Torn(HTMLParser):
+    """The marks of figures that no paragraph, item or cell holds."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.held: list[str] = []
+        self.found: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("p", "li", "td"):
+            self.held.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self.held:
+            self.held.remove(tag)
+
+    def handle_comment(self, data: str) -> None:
+        if data.startswith(("=", "/")) and not self.held:
+            self.found.append(data.strip())
+
+
+def test_no_paragraph_is_torn_by_a_mark(site):
+    """A comment at the start of a line ends a paragraph in Markdown."""
+    assert Torn("<p>in</p>\n<!--= a --> 3 <!--/--> of").found == ["= a", "/"]
+    for path in site.rglob("*.html"):
+        assert Torn(path.read_text()).found == [], path
+
+
+MOVED = {
+    "results.html": "summary how-test-frames-differ-from-training-frames how-far-ahead-of-a-general-denoiser "
+    "all-presets-beside-it other-scenes hard-light-mirrors-metal-glass-a-sky the-papers-table-1 "
+    "speed-against-error-all-rows plots-and-pictures the-web-page-before-and-after",
+    "speed.html": "summary the-network speed-against-error training the-path-tracer whole-pictures-in-motion "
+    "rays-for-features what-a-kernel-of-one-scene-saves scenes-of-many-primitives",
+}
+"""Anchors of the two pages before they were split: links from outside still lead to them."""
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_anchors_of_split_pages_remain(site, name):
+    assert set(MOVED[name].split()) <= links.Page((site / name).read_text()).anchors
+
+
+TABS = ["Start", "Learn", "Guide", "API", "Spec", "Results", "Contribute"]
+"""The parts of the site."""
+
+GROUPS = ["Scene & rendering", "Data & network", "Compiler & kernels", "Error bounds", "Conformance"]
+"""The parts of the spec."""
+
+
+def test_the_site_and_the_spec_have_named_parts(site, chromium):
+    with chromium.tab(site / "spec/index.html", viewport={"width": 1400, "height": 900}) as tab:
+        names = [text.strip() for text in tab.page.locator(".md-tabs__link").all_text_contents()]
+        assert names == TABS
+        shown = [text.strip() for text in tab.page.locator(".md-nav label .md-ellipsis").all_text_contents()]
+        assert set(GROUPS) <= set(shown)
+
+
+def test_captions_appear_once(site):
+    for path in site.rglob("*.html"):
+        assert not re.search(r"</figcaption></figure>\s*<p><em>", path.read_text()), path
+
+
 def outside(asked: list[str]) -> list[str]:
     """Return the addresses that are not of the site."""
     return [address for address in asked if not address.startswith(("file:", "data:", "about:"))]
 
 
-CUT = """[...document.querySelectorAll(".highlight code, .output pre")]
+CUT = """[...document.querySelectorAll(".highlight pre code, .output pre, .md-typeset__scrollwrap")]
     .filter((piece) => piece.scrollWidth > piece.clientWidth + 1)
+    .filter((piece) => getComputedStyle(piece).overflowX !== "auto" || piece.closest("[tabindex]") === null)
     .map((piece) => piece.textContent.trim().slice(0, 60))"""
-"""The beginnings of the pieces of code of a page that are wider than what is shown of them."""
+"""The beginnings of the code and tables of a page that are cut, or that the keyboard cannot scroll."""
 
 
-def test_no_page_is_wider_than_a_telephone_and_no_code_is_cut(site, chromium):
+def test_no_page_is_wider_than_a_phone_and_no_code_is_cut(site, chromium):
     """Without a server, 400 pixels wide; and none asks for anything of another host."""
     with chromium.tab(site / "index.html", viewport={"width": 400, "height": 800}) as tab:
         for path in sorted(site.rglob("*.html")):
@@ -183,7 +249,7 @@ def test_scripts_and_styles_name_no_host(tmp_path, name, text, hosts):
 def test_a_cell_shows_what_it_gives():
     text = "```python cell\nx = 2\nprint(x < 3)\n```\n\n```python cell\nshow([[0.0, x / 2]], 'two')\n```\n"
     found = cells.executed(text, "page.md")
-    assert "<pre>True\n</pre>" in found
+    assert '<pre tabindex="0">True\n</pre>' in found
     assert 'alt="two" src="data:image/png;base64,' in found
 
 

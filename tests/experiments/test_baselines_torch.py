@@ -85,7 +85,7 @@ def test_the_generator_depends_on_its_noise():
 
 
 def test_patches_must_halve_evenly():
-    with pytest.raises(InputError, match="side of pix2pix's patches is 96: 6 levels halve it"):
+    with pytest.raises(InputError, match="side of pix2pix's patches 96: 6 levels halve it"):
         make(replace(PIX2PIX, crop=96))
 
 
@@ -288,7 +288,7 @@ def test_pytorch_uses_every_core():
 def test_a_loss_that_is_not_finite_is_told(tmp_path, files):
     made, data = make(DNCNN), fitting.examples(DNCNN, files, tmp_path)
     torch.nn.init.constant_(made.network[0].bias, float("nan"))
-    with pytest.raises(TrainingError, match="loss of dncnn at step 0 is nan: it must stay finite"):
+    with pytest.raises(TrainingError, match="loss of dncnn at step 0 nan: must stay finite"):
         fitting.fit(made, DNCNN, data, data, tmp_path)
 
 
@@ -296,7 +296,7 @@ def test_a_damaged_checkpoint_is_told(tmp_path, files):
     data = fitting.examples(DNCNN, files, tmp_path)
     path = fitting.path_of(tmp_path, DNCNN, data, data).with_suffix(".checkpoint")
     path.write_bytes(b"nothing")
-    with pytest.raises(InputError, match=r"checkpoint is .*: it cannot be read .* remove it"):
+    with pytest.raises(InputError, match=r"checkpoint '.*': cannot be read .* remove it"):
         fitting.fit(make(DNCNN), DNCNN, data, data, tmp_path)
 
 
@@ -338,5 +338,5 @@ def test_shrinking_takes_means():
 
 
 def test_crops_that_do_not_fit_are_refused(tmp_path, files):
-    with pytest.raises(InputError, match="size of the training pictures is 16x16: crops of 32 pixels"):
+    with pytest.raises(InputError, match="size of the training pictures '16x16': crops of 32 pixels"):
         fitting.examples(replace(DNCNN, shrink=4, crop=32), files, tmp_path)

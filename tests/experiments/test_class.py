@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import course
-
-from wamnet.cli.course.labs import lab_named
+from wamnet_course.labs import lab_named
 
 
 def test_a_class_is_graded_and_every_wrong_answer_found(tmp_path) -> None:

@@ -12,7 +12,7 @@ from lab.scores import mean_scores, score
 
 from wamnet.cli.commands.bench_frames import request_for
 from wamnet.cli.common.inputs import load_model
-from wamnet.kernels.run.frame_plan import KINDS, plan
+from wamnet.models.data.frame_plan import KINDS, plan
 from wamnet.refimpl.light.render import render
 from wamnet.refimpl.network.denoise import denoise
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from lab import browsers, in_page
 
-from wamnet.kernels.verify import run
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.cases import chosen, questions
-from wamnet.kernels.verify.judgement import DEVIATES, PASS, UNTESTED, Missing
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.materials import Mirror
 from wamnet.refimpl.light.scene import Quad, Scene
+from wamnet_verify import run
+from wamnet_verify.case import Shot
+from wamnet_verify.cases import chosen, questions
+from wamnet_verify.judgement import DEVIATES, PASS, UNTESTED, Missing
 
 Found = TypeVar("Found")
 """What a function gives."""

@@ -12,7 +12,7 @@ from lab import frames
 from lab.frames import Shot
 
 from wamnet.kernels.run import render_on
-from wamnet.kernels.run.frame_plan import version
+from wamnet.models.data.frame_plan import version
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, USUAL
 from wamnet.refimpl.light import render as driver
@@ -97,7 +97,7 @@ def test_noisy_frame_and_reference_share_no_random_numbers(tmp_path):
 
 
 def test_a_reference_of_one_sample_is_refused(tmp_path):
-    with pytest.raises(InputError, match="samples of a reference is 1: more than 1"):
+    with pytest.raises(InputError, match="samples of a reference 1: more than 1"):
         frames.pairs(tmp_path, [SHOT], 1, "numpy")
 
 

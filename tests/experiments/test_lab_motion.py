@@ -132,5 +132,5 @@ def test_colour_errors_are_refused_for_what_cannot_be_compared():
     with pytest.raises(InputError, match="shape of the picture"):
         colors.color_error(picture, np.zeros((4, 5, 3)))
     for tiles in (0, 5):
-        with pytest.raises(InputError, match=f"tiles is {tiles}"):
+        with pytest.raises(InputError, match=f"tiles {tiles}"):
             colors.tile_means(picture, tiles)

@@ -20,9 +20,9 @@ from wamnet.refimpl.errors import InputError
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"records": []}, "a record needs at least one"),
-        ({"commands": []}, "a record says what made it"),
-        ({"settings": {"scale": "toy"}}, "its numbers mean nothing"),
+        ({"records": []}, "have no records"),
+        ({"commands": []}, "do not state their command"),
+        ({"settings": {"scale": "toy"}}, "are of scale toy and mean nothing"),
         ({"records": [{"configuration": "a", "seed": 0, "values": {"psnr": math.inf}}]}, "must be finite"),
         (
             {"records": [{"configuration": "a", "seed": 0, "values": {"x": [1.0, math.nan]}}]},
@@ -64,12 +64,12 @@ def test_a_result_becomes_a_record(tmp_path, monkeypatch, capsys):
     publish.main([str(results.path), "--name", "kept"])
     assert "kept.json: 1 records" in capsys.readouterr().out
     assert Records(tmp_path)["kept"].of("a", "psnr") == [30.1235]
-    with pytest.raises(InputError, match="give a file, or --run"):
+    with pytest.raises(InputError, match="FILE or --run NAME COMMAND: one of them is needed"):
         publish.main([])
-    with pytest.raises(InputError, match="it must be python experiments"):
+    with pytest.raises(InputError, match="must be python experiments"):
         publish.main(["--run", "x", "rm", "-r", "x"])
     (tmp_path / "broken.json").write_text("{")
-    with pytest.raises(InputError, match="it cannot be read"):
+    with pytest.raises(InputError, match="cannot be read"):
         publish.main([str(tmp_path / "broken.json")])
 
 
@@ -88,7 +88,7 @@ def test_what_a_program_prints_becomes_a_record(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="does not begin with a number"):
         texts.figure(Records(tmp_path), "speed/a,b #2/ms #2:.1f", {})
     (tmp_path / "experiments/x.py").write_text("raise SystemExit(3)")
-    with pytest.raises(InputError, match="it must end with status 0"):
+    with pytest.raises(InputError, match="must end with status 0"):
         publish.main(["--run", "speed", "python", "experiments/x.py"])
 
 
@@ -99,7 +99,7 @@ def test_what_a_command_of_bench_prints_becomes_a_record(tmp_path, monkeypatch):
     found = Records(tmp_path)["speed"]
     assert found.data()["commands"] == [command]
     assert [row["values"]["scene"] for row in found.records()] == ["empty", "furnace"]
-    with pytest.raises(InputError, match="it must end with status 0"):
+    with pytest.raises(InputError, match="must end with status 0"):
         publish.main(["--run", "speed", "wamnet", "bench", "render", "--by", "nobody"])
 
 

@@ -58,12 +58,12 @@ def test_a_mean_has_a_spread(results):
 
 
 def test_another_experiment_s_file_is_refused(results):
-    with pytest.raises(InputError, match="it belongs to test with settings"):
+    with pytest.raises(InputError, match="belongs to test with settings"):
         Results.open(results.path, "test", {"size": 16})
-    with pytest.raises(InputError, match="it belongs to test"):
+    with pytest.raises(InputError, match="belongs to test"):
         Results.open(results.path, "other", {"size": 8})
     results.path.write_text("{")
-    with pytest.raises(InputError, match="it is not a file of results"):
+    with pytest.raises(InputError, match="is not a file of results"):
         Results.open(results.path, "test", {"size": 8})
 
 
@@ -101,7 +101,7 @@ def test_a_file_of_the_older_form_goes_on(results):
     results.put("a", 0, {"psnr": 30.0})
     assert results.data()["schema"] == "wamnet-experiment-2"
     results.path.write_text(json.dumps({**data, "schema": "wamnet-experiment-3"}))
-    with pytest.raises(InputError, match="it is not a file of results"):
+    with pytest.raises(InputError, match="is not a file of results"):
         results.records()
 
 
@@ -132,7 +132,7 @@ def test_figures_are_pictures(tmp_path):
     figures.curves(tmp_path / "curves.png", {"a": [(1, [2.0, 3.0])], "b": [(1, [1.0])]}, ("x", "y"))
     for name in ("sheet.png", "curves.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match=r"pictures in each row is \[1, 2\]"):
+    with pytest.raises(InputError, match=r"pictures in each row \[1, 2\]"):
         figures.sheet(tmp_path / "x.png", [("", [("", image)]), ("", [("", image), ("", image)])])
 
 

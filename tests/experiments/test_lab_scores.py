@@ -129,7 +129,7 @@ def test_flip_of_the_authors_pair():
 
 
 def test_flip_refuses_what_is_not_encoded():
-    with pytest.raises(InputError, match=r"range of the picture is 0.* to 1.*: FLIP takes display-encoded"):
+    with pytest.raises(InputError, match=r"range of the picture '0.* to 1.*': FLIP takes display-encoded"):
         scores.flip(REFERENCE, PICTURE)
     with pytest.raises(InputError, match="range of its reference"):
         scores.flip(PICTURE, REFERENCE)
@@ -161,5 +161,5 @@ def test_a_ladder_is_measured_and_must_fall():
     found = scores.ladder(renders)
     assert found.spp == (2, 8)
     assert found.mse[1] == metrics.mse(encoding.to_display(clean + 0.05), encoding.to_display(clean))
-    with pytest.raises(InputError, match=r"errors of renders is .* must fall as the samples rise"):
+    with pytest.raises(InputError, match=r"errors of renders .* must fall as the samples rise"):
         scores.ladder({2: renders[8], 8: renders[2]})

@@ -61,16 +61,40 @@ def test_tables_and_figures_are_filled_in(kept):
 
 
 @pytest.mark.parametrize(
+    ("text", "made"),
+    [
+        ("It has\n<!--= seeds -->3<!--/-->, no more.\n", "It has <!--= seeds -->3<!--/-->,\nno more.\n"),
+        ("* It has\n  <!--= seeds -->3<!--/-->\n", "* It has <!--= seeds -->3<!--/-->\n"),
+        ("> Of\n> <!--= seeds -->3<!--/--> seeds", "> Of <!--= seeds -->3<!--/-->\n> seeds"),
+        (
+            "of\n<!--= seeds -->3<!--/--> <!--= seeds -->3<!--/--> two",
+            "of <!--= seeds -->3<!--/--> <!--= seeds -->3<!--/-->\ntwo",
+        ),
+    ],
+)
+def test_no_line_begins_with_a_mark(kept, text, made):
+    """Markdown would end the paragraph there."""
+    assert filler(kept).text(text) == made
+    assert filler(kept).text(made) == made
+
+
+@pytest.mark.parametrize("start", ["", "> ", "* ", "1. ", "  "])
+def test_a_paragraph_that_begins_with_a_mark_is_refused(kept, start):
+    with pytest.raises(InputError, match=r"ends its paragraph \(begin with a word\)"):
+        filler(kept).text(f"Text.\n\n{start}<!--= seeds -->3<!--/--> seeds.\n")
+
+
+@pytest.mark.parametrize(
     ("text", "match"),
     [
         ("<!-- table: none -->\n<!-- end -->", "no function of that name"),
         ("<!--= study/a/ssim:.1f -->0<!--/-->", "has no such value"),
         ("<!--= study/b/psnr:.1f -->0<!--/-->", "has no such value"),
         ("<!--= study@scipy -->0<!--/-->", "does not know that package"),
-        ("<!--= psnr -->0<!--/-->", "it must be record/configuration/value:format"),
+        ("<!--= psnr -->0<!--/-->", "must be record/configuration/value:format"),
         ("<!-- table: all -->\nno end", "has a beginning and an end"),
         ("<!--= study/a/psnr:.1f -->0", "has a beginning and an end"),
-        ("<!--= other/a/psnr:.1f -->0<!--/-->", "record is other: it is not there"),
+        ("<!--= other/a/psnr:.1f -->0<!--/-->", "record 'other': not found"),
     ],
 )
 def test_marks_that_lead_nowhere_are_refused(kept, text, match):
@@ -99,7 +123,7 @@ def test_plots_are_the_same_bytes_and_say_what_they_show(kept, tmp_path):
         plots.bars(axis, {"a": (30.0, 29.0, 31.0)}, "dB")
         return figure
 
-    plot = plots.Plot(draw, ("study",), "A plot.")
+    plot = plots.Plot(draw, ("study",))
     path = tmp_path / plots.IMAGES / "one.svg"
     path.parent.mkdir(parents=True)
     ((target, made),) = plots.stale(kept, {"one": plot}, tmp_path)
@@ -115,10 +139,10 @@ def test_plots_are_the_same_bytes_and_say_what_they_show(kept, tmp_path):
 
 def test_a_plot_without_a_record_must_wait_for_one(tmp_path):
     (tmp_path / "pending.txt").write_text("study | python experiments/study.py | a minute\n")
-    plot = plots.Plot(lambda found: None, ("study",), "")
+    plot = plots.Plot(lambda found: None, ("study",))
     assert not plots.ready(plot, Records(tmp_path), tmp_path)
     (tmp_path / "pending.txt").write_text("# nothing\n")
-    with pytest.raises(Missing, match="it is not there"):
+    with pytest.raises(Missing, match="record 'study': not found"):
         plots.ready(plot, Records(tmp_path), tmp_path)
     (tmp_path / "pending.txt").write_text("study, no command\n")
     with pytest.raises(InputError, match="an entry has 3 parts"):

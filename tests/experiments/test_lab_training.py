@@ -44,7 +44,7 @@ def test_other_recipes_and_data_have_other_files(tmp_path, pairs):
 @pytest.mark.parametrize("done", [3, 6])
 def test_an_interrupted_training_goes_on(tmp_path, pairs, done):
     from wamnet.cli.commands.train import checkpoint_path
-    from wamnet.compiler.model_file import save_checkpoint
+    from wamnet.models.model_file import save_checkpoint
 
     path = training.path_of(tmp_path, RECIPE, pairs, "numpy")
     save_checkpoint(checkpoint_path(path), train(RECIPE, pairs, until=done))

@@ -66,7 +66,9 @@ def test_colours_drawn_for_pixels_are_lamps_colours(networks):
     """Saturations in the range, brightness the lamps' own: float32's rounding is 1e-6 at most."""
     torch = needed("torch")
     lamps = importlib.import_module("lamps")
-    colors = networks.drawn_colors(300, torch.Generator().manual_seed(1)).numpy().astype(np.float64)
+    colors = (
+        networks.drawn_colors(300, torch.Generator().manual_seed(1), lamps.COLORS).numpy().astype(np.float64)
+    )
     low, high = lamps.COLORS.saturation
     for k, light in enumerate(canonical("minicubes").lights):
         assert np.abs(colors[:, k].sum(axis=-1) / sum(light.color) - 1.0).max() <= 1e-6

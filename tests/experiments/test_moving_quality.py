@@ -6,7 +6,7 @@ import moving_quality
 import pytest
 from lab import printed
 
-from wamnet.kernels.run.frame_plan import TRAIN
+from wamnet.models.data.frame_plan import TRAIN
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 
@@ -16,7 +16,7 @@ def test_a_row_for_each_kind_of_picture(tmp_path, capsys, executor_named, monkey
     def missing(scene, size):
         raise ExecutorUnavailable("blender: not here")
 
-    monkeypatch.setitem(moving_quality.PEERS, "cycles", missing)
+    monkeypatch.setitem(moving_quality.table.makers, "cycles", missing)
     executor_named("opencl")
     folders = ("--cache", str(tmp_path / "lab"), "-o", str(tmp_path / "out"))
     moving_quality.main(["--scale", "toy", "--moments", "2", "--seeds", "0", "--peers", "cycles", *folders])

@@ -224,8 +224,8 @@ def test_a_mutant_that_cannot_be_imported_fails_each_case():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["sphere.py:*:comparison"], "not of 6; "),
-        (["sphere.py:no such"], "not of 0; the name of a module"),
+        (["sphere.py:*:comparison"], "not of 6 ("),
+        (["sphere.py:no such"], "not of 0 (the name of a module"),
         ([BEHIND, "-k", "no-such-case"], "no case fits"),
     ],
 )

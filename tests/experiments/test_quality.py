@@ -14,7 +14,7 @@ from lab.results import Results
 from lab.sets import SETS
 
 import models
-from wamnet.compiler.model_file import load_model
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
@@ -92,7 +92,7 @@ def test_the_whole_way(tmp_path, capsys):
     quality.main(options)
     text = (tmp_path / "quality.md").read_text()
     assert capsys.readouterr().out.strip().endswith(text.strip())
-    assert "## cornell, inside of the ranges" in text
+    assert "## cornell, inside the training range" in text
     assert "| input, 1 spp |" in text
     data = json.loads((tmp_path / "quality.json").read_text())
     found = {(r["configuration"], r["seed"]) for r in data["records"]}
@@ -167,16 +167,17 @@ def test_gaps_are_to_the_best_peer_with_the_same_features(tmp_path):
             kept.put(f"cornell, test: {row}", seed, {"psnr": number, "per_frame": {"psnr": [number] * 3}})
     lines = quality.ahead(kept, "cornell", "test", list(values)).splitlines()
     assert lines == [
-        "* wamnet, best, features of 1 ray: 1.50 [1.50, 1.50] dB ahead of "
-        "Open Image Denoise, high, features of 1 ray.",
-        "* wamnet, best, 16 rays: 3.50 [3.50, 3.50] dB ahead of Open Image Denoise, high, clean, 16 rays.",
+        "* wamnet, preset `best`, features of 1 ray: 1.50 [1.50, 1.50] dB ahead of "
+        "Open Image Denoise, high, noisy features (1 ray).",
+        "* wamnet, preset `best`, features of 16 rays: 3.50 [3.50, 3.50] dB ahead of "
+        "Open Image Denoise, high, features of 16 rays.",
     ]
 
 
 def test_an_unknown_row_is_refused(tmp_path):
-    with pytest.raises(InputError, match="row is best-9: there is none of this name; use some of input"):
+    with pytest.raises(InputError, match=r"row 'best-9': unknown \(choose some of input"):
         quality.main(["--only", "best-9", "-o", str(tmp_path / "none")])
-    with pytest.raises(InputError, match="set is attic: there is none of this name; use some of minicubes"):
+    with pytest.raises(InputError, match=r"set 'attic': unknown \(choose some of minicubes"):
         quality.main(["--sets", "attic", "-o", str(tmp_path / "none")])
     assert not (tmp_path / "none").exists()
 

@@ -6,7 +6,7 @@ import hashlib
 
 import pytest
 import rewrite
-from lab import plots, records, shown, texts
+from lab import gallery, plots, records, shown, texts
 from lab.records import Records, checked
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -20,9 +20,8 @@ LARGEST_BYTES = 2_000_000
 MOVING = "front.webp"
 """The moving image at the top of README.md, which experiments/front.py makes."""
 
-OTHERS = ("web-page", "page-", "front")
-"""Beginnings of the names of pictures without a record: docs/site takes those of the web page, and a command
-of its own makes the one on the first page."""
+OTHERS = ("web-page", "front")
+"""Beginnings of the names of pictures without a record: of the web page, and on the first page."""
 
 
 def test_texts_are_what_the_records_give():
@@ -34,7 +33,7 @@ def test_texts_are_what_the_records_give():
 
 
 def test_plots_are_what_the_records_give():
-    stale = [path.name for path, _ in plots.stale(Records(), shown.PLOTS)]
+    stale = [path.name for path, _ in plots.stale(Records(), gallery.PLOTS)]
     assert not stale, f"{stale}: run python experiments/rewrite.py, and look at them"
 
 
@@ -51,7 +50,7 @@ def test_what_is_pending_is_not_there_and_is_waited_for():
     assert not there, f"pending.txt: {there} are there; remove the lines"
     filler = texts.Filler(kept, shown.TABLES, shown.FIGURES)
     assert not list(texts.stale(filler))
-    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
     idle = sorted(set(waiting) - filler.missing - drawn)
     assert not idle, f"pending.txt: no text waits for {idle}; remove the lines"
 
@@ -60,7 +59,7 @@ def test_every_record_is_shown():
     kept = Records()
     filler = texts.Filler(Counting(kept.folder), shown.TABLES, shown.FIGURES)
     list(texts.stale(filler))
-    drawn = {name for plot in shown.PLOTS.values() for name in plot.records}
+    drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
     idle = sorted(set(kept.names()) - Counting.asked - drawn)
     assert not idle, f"no text shows the records {idle}: show them or remove them"
 
@@ -74,10 +73,6 @@ class Counting(Records):
         self.asked.add(name)
         return super().__getitem__(name)
 
-    def names(self):
-        """Hide the names: a page that lists all pictures asks for all records."""
-        return []
-
 
 def test_pictures_are_small_and_come_from_records():
     images = records.ROOT / plots.IMAGES
@@ -89,11 +84,13 @@ def test_pictures_are_small_and_come_from_records():
     for path in found:
         place = path.relative_to(records.ROOT).as_posix()
         if path.suffix == ".svg":
-            assert path.stem in shown.PLOTS, f"{place}: no function of lab/shown.py draws it"
+            assert path.stem in gallery.PLOTS, f"{place}: no function of lab/gallery.py draws it"
         elif not path.name.startswith(OTHERS):
             digest = hashlib.sha256(path.read_bytes()).hexdigest()
             assert named.get(place) == digest, f"{place}: no record names it; publish it with --picture"
     assert not [place for place in named if not (records.ROOT / place).exists()]
+    text = "".join(path.read_text() for path in texts.documents())
+    assert not [path.name for path in found if f"images/{path.name}" not in text], "no document shows these"
 
 
 def test_the_command_names_what_differs(tmp_path, monkeypatch, capsys):

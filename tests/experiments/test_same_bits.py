@@ -13,7 +13,7 @@ import same_bits
 from lab import browsers, same
 from same_bits import FULL, WHOLE, Way
 
-from wamnet.compiler.model_file import save_model
+from wamnet.models.model_file import save_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window, n_inputs
 from wamnet.refimpl.network.denoise import Model

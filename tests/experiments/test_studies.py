@@ -17,7 +17,7 @@ from lab import frames, training
 from lab.ground import PLANS, Ground, left_to_render, together, told
 from lab.results import Results
 
-from wamnet.kernels.run.geometry import ALIKE, Shown, compare
+from wamnet.models.data.geometry import ALIKE, Shown, compare
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import TURN_SECONDS, canonical
 from wamnet.refimpl.light.variation import AT_REST, saturation_of

@@ -17,7 +17,7 @@ from lab.results import Results
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.kernels import open_executor
-from wamnet.kernels.run import geometry
+from wamnet.models.data import geometry
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 
@@ -128,9 +128,7 @@ def test_no_test_frame_has_the_geometry_of_another(scale):
 def test_frames_that_are_alike_are_refused():
     split = rows.split_of(TINY)
     turned = replace(split.train[0], time=split.train[0].time + rows.TURN_SECONDS / 4)
-    with pytest.raises(
-        InputError, match=r"test frame is test frame 0 .*: normals and depths are those of tr"
-    ):
+    with pytest.raises(InputError, match=r"test frame 'test frame 0 .*: normals and depths are those of tr"):
         rows.compared(replace(split, test=(turned,)))
 
 
@@ -162,7 +160,7 @@ def test_records_of_other_settings_are_refused(made, monkeypatch):
     _, arguments = made
     other = {**TINY.paper, "steps": 3}
     monkeypatch.setitem(table1.SCALES, "toy", replace(TINY, paper=other))
-    with pytest.raises(InputError, match=r"record of wamnet, seed 0 is .*: it was made with .*\"steps\": 2"):
+    with pytest.raises(InputError, match=r"record of wamnet, seed 0 '.*': was made with .*\"steps\": 2"):
         table1.main([*arguments, "--seeds", "0", "--only", "wamnet"])
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import verified
 
-from wamnet.kernels.verify import judgement, renderers, run
-from wamnet.kernels.verify.cases import chosen
-from wamnet.kernels.verify.judgement import Missing
+from wamnet_verify import judgement, renderers, run
+from wamnet_verify.cases import chosen
+from wamnet_verify.judgement import Missing
 
 
 class Half:

@@ -21,8 +21,8 @@ import onnxruntime
 from graphs import graph
 from numpy.typing import NDArray
 
-from wamnet.compiler.importing.graph import Graph, read
-from wamnet.compiler.importing.network import Found, import_network
+from wamnet.models.importing.graph import Graph, read
+from wamnet.models.importing.network import Found, import_network
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network.imported import evaluate
 

@@ -20,10 +20,10 @@ from random import Random
 from faults import members
 from targets import CommandRefused, Good, Target
 
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.judgement import Missing
-from wamnet.kernels.verify.renderers import NPZ, ByCommand
 from wamnet.refimpl.light.scenes import empty
+from wamnet_verify.case import Shot
+from wamnet_verify.judgement import Missing
+from wamnet_verify.renderers import NPZ, ByCommand
 
 STRANGER = 54321
 """A user without an entry in the system's list."""

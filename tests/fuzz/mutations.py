@@ -69,7 +69,7 @@ TEXTS = (
         "é",
         "numpy",
     ),
-    *("c", "exact", "window2", "rank1", "minicubes", "--help", "-h", "-o", "--seed", "--size", "--time"),
+    *("c", "native", "window2", "rank1", "minicubes", "--help", "-h", "-o", "--seed", "--size", "--time"),
 )
 """Words of a command line that programs have stumbled over; a byte that is not UTF-8 comes as a surrogate."""
 

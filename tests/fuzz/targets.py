@@ -24,18 +24,17 @@ from PIL import Image, ImageCms
 
 from wamnet.cli.commands import demo
 from wamnet.cli.common import inputs as cli_inputs
-from wamnet.cli.course import frame, wire
 from wamnet.cli.files import dataset_files, exr, images
 from wamnet.cli.main import main
 from wamnet.compiler import artifact, variants
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Node, Program, Type
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.importing.network import import_network
-from wamnet.compiler.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.compiler.proof import checker
 from wamnet.kernels import cache
 from wamnet.kernels.run import curve
+from wamnet.models.importing.network import import_network
+from wamnet.models.model_file import load_checkpoint, save_checkpoint, save_model
 from wamnet.refimpl.errors import WamnetError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import scene, variation
@@ -45,6 +44,7 @@ from wamnet.refimpl.network import denoise, siren, train
 from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
 from wamnet.refimpl.reading import parse_json
 from wamnet.spec.conformance import case, report
+from wamnet_course import frame, wire
 
 STUDENTS = [
     json.dumps(message).encode()
@@ -61,7 +61,7 @@ VECTORS = Path(case.__file__).parents[1] / "vectors"
 """Where the vectors lie in a source tree; an installed package has them elsewhere."""
 
 
-NETWORKS = Path(__file__).parents[1] / "compiler/networks"
+NETWORKS = Path(__file__).parents[1] / "models/networks"
 """Where networks of other programs are."""
 
 

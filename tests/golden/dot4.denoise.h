@@ -11,8 +11,6 @@
 #if defined(__cplusplus)
 #define restrict __restrict /* what compilers of C++ call it */
 #endif
-#define WINDOW_SIZE 2
-#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 /* A product may be fused with a sum: the bound holds either way. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
@@ -20,8 +18,10 @@
 #else
 #pragma STDC FP_CONTRACT ON
 #endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 #define PIXELS 2 /* neighbours in a row that a work item computes */
-#define LANES 4 /* numbers in a vector */
+#define LANES 4 /* components of a vector */
 #define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 #if defined(__clang__)
 #define WAMNET_UNROLL _Pragma("unroll")
@@ -103,8 +103,8 @@ static inline void wamnet_floats(float *to, const wamnet_sums *from)
 }
 #endif
 
-/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written to
-   `result`, the whole picture's array. */
+/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_a,
     const float *restrict image_b,
@@ -150,39 +150,37 @@ static inline void wamnet_pixel(
 
     /* the images around the pixels: what lies beyond the border is filled in here */
     uint8_t patch_a[WINDOW_SIZE * PATCH_WIDTH * 3 + 3];
-    uint8_t patch_b[WINDOW_SIZE * PATCH_WIDTH * 1 + 3];
+    uint8_t patch_b[WINDOW_SIZE * PATCH_WIDTH + 3];
     int left = x - WINDOW_CENTRE;
     int top = y - WINDOW_CENTRE;
-    bool within = left >= 0 && left + PATCH_WIDTH <= width && top >= 0 && top + WINDOW_SIZE <= height;
+    bool within = 0 <= left && left + PATCH_WIDTH <= width && 0 <= top && top + WINDOW_SIZE <= height;
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(top + dy, 0, height - 1);
-        uint8_t *to_a = patch_a + dy * PATCH_WIDTH * 3;
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 3; ++i) {
-                to_a[i] = (uint8_t)((int32_t)(image_a[(row * width + left) * 3 + i]) + 128);
+                patch_a[dy * PATCH_WIDTH * 3 + i] = (uint8_t)((int32_t)image_a[(row * width + left) * 3 + i] + 128);
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
-                bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+                bool inside = row == top + dy && column == left + dx;
                 for (int c = 0; c < 3; ++c) {
-                    to_a[dx * 3 + c] = (uint8_t)((int32_t)(inside ? image_a[(row * width + column) * 3 + c] : 0.0f) + 128);
+                    patch_a[dy * PATCH_WIDTH * 3 + dx * 3 + c] = (uint8_t)((int32_t)(inside ? image_a[(row * width + column) * 3 + c] : 0.0f) + 128);
                 }
             }
         }
-        uint8_t *to_b = patch_b + dy * PATCH_WIDTH * 1;
         if (within) {
-            for (int i = 0; i < PATCH_WIDTH * 1; ++i) {
-                to_b[i] = (uint8_t)((int32_t)(image_b[(row * width + left) * 1 + i]) + 128);
+            for (int i = 0; i < PATCH_WIDTH; ++i) {
+                patch_b[dy * PATCH_WIDTH + i] = (uint8_t)((int32_t)image_b[(row * width + left) * 1 + i] + 128);
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
-                bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+                bool inside = row == top + dy && column == left + dx;
                 for (int c = 0; c < 1; ++c) {
-                    to_b[dx * 1 + c] = (uint8_t)((int32_t)(inside ? image_b[(row * width + column) * 1 + c] : 0.0f) + 128);
+                    patch_b[dy * PATCH_WIDTH + dx + c] = (uint8_t)((int32_t)(inside ? image_b[(row * width + column) * 1 + c] : 0.0f) + 128);
                 }
             }
         }
@@ -191,55 +189,50 @@ static inline void wamnet_pixel(
         patch_a[WINDOW_SIZE * PATCH_WIDTH * 3 + i] = 0;
     }
     for (int i = 0; i < 3; ++i) {
-        patch_b[WINDOW_SIZE * PATCH_WIDTH * 1 + i] = 0;
+        patch_b[WINDOW_SIZE * PATCH_WIDTH + i] = 0;
     }
 
     /* %1: affine map W0 from 16 to 3 */
-    float v1[PIXELS * 1 * LANES];
+    float v1[PIXELS * LANES];
     {
-        const float *w = weights;
         wamnet_sums sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_start(&sum[p][0], weights + 24 + (0) * LANES);
+            wamnet_start(&sum[p][0], weights + 6 * LANES);
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const uint8_t *row = patch_a + dy * PATCH_WIDTH * 3;
             for (int i = 0; i < 2; ++i) {
                 wamnet_bytes w0;
-                wamnet_weights(&w0, w + 0 * LANES);
-                w += 1 * LANES;
+                wamnet_weights(&w0, weights + (dy * 2 + i) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    wamnet_dot(&sum[p][0], &w0, row + p * 3 + 4 * i);
+                    wamnet_dot(&sum[p][0], &w0, patch_a + (dy * PATCH_WIDTH + p) * 3 + 4 * i);
                 }
             }
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const uint8_t *row = patch_b + dy * PATCH_WIDTH * 1;
             for (int i = 0; i < 1; ++i) {
                 wamnet_bytes w0;
-                wamnet_weights(&w0, w + 0 * LANES);
-                w += 1 * LANES;
+                wamnet_weights(&w0, weights + (dy + 4 + i) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    wamnet_dot(&sum[p][0], &w0, row + p * 1 + 4 * i);
+                    wamnet_dot(&sum[p][0], &w0, patch_b + dy * PATCH_WIDTH + p + 4 * i);
                 }
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_floats(v1 + (p * 1 + 0) * LANES, &sum[p][0]);
+            wamnet_floats(v1 + (p) * LANES, &sum[p][0]);
         }
     }
 
     /* %2 to %49: elementwise on 3 numbers */
-    float v49[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
+    float v49[PIXELS * LANES];
+    for (int i = 0; i < PIXELS * LANES; ++i) {
         int32_t t2 = (int32_t)v1[i];
         uint32_t t3 = (uint32_t)t2;
-        uint32_t t5 = (uint32_t)weights[28 + i % (1 * LANES)];
-        uint32_t t8 = (uint32_t)weights[32 + i % (1 * LANES)];
+        uint32_t t5 = (uint32_t)weights[28 + i % LANES];
+        uint32_t t8 = (uint32_t)weights[32 + i % LANES];
         uint32_t t9 = t3 * t5 + t8;
         uint32_t t11 = t9 >> 22u;
         uint32_t t13 = t11 & 1u;
@@ -268,39 +261,37 @@ static inline void wamnet_pixel(
     }
 
     /* %50: affine map W1 from 3 to 3 */
-    float v50[PIXELS * 1 * LANES];
-    uint8_t bytes49[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
-        bytes49[i] = (uint8_t)((int32_t)(v49[i]) + 128);
-    }
+    float v50[PIXELS * LANES];
     {
-        const float *w = weights + 36;
         wamnet_sums sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_start(&sum[p][0], weights + 40 + (0) * LANES);
+            wamnet_start(&sum[p][0], weights + 10 * LANES);
+        }
+        uint8_t bytes49[PIXELS * LANES];
+        for (int i = 0; i < PIXELS * LANES; ++i) {
+            bytes49[i] = (uint8_t)((int32_t)v49[i] + 128);
         }
         for (int i = 0; i < 1; ++i) {
             wamnet_bytes w0;
-            wamnet_weights(&w0, w + 0 * LANES);
-            w += 1 * LANES;
+            wamnet_weights(&w0, weights + (9 + i) * LANES);
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                wamnet_dot(&sum[p][0], &w0, bytes49 + p * 1 * LANES + 4 * i);
+                wamnet_dot(&sum[p][0], &w0, bytes49 + p * LANES + 4 * i);
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_floats(v50 + (p * 1 + 0) * LANES, &sum[p][0]);
+            wamnet_floats(v50 + (p) * LANES, &sum[p][0]);
         }
     }
 
     /* %51 to %67: elementwise on 3 numbers */
-    float v67[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
+    float v67[PIXELS * LANES];
+    for (int i = 0; i < PIXELS * LANES; ++i) {
         int32_t t51 = (int32_t)v50[i];
-        int32_t t53 = (int32_t)weights[44 + i % (1 * LANES)];
-        int32_t t56 = (int32_t)weights[48 + i % (1 * LANES)];
+        int32_t t53 = (int32_t)weights[44 + i % LANES];
+        int32_t t56 = (int32_t)weights[48 + i % LANES];
         int32_t t57 = t51 * t53 + t56;
         int32_t t59 = 0 > t57 ? 0 : t57;
         int32_t t61 = 16777216 < t59 ? 16777216 : t59;
@@ -314,7 +305,7 @@ static inline void wamnet_pixel(
     /* output color */
     for (int p = 0; p < PIXELS && x + p < width; ++p) {
         for (int i = 0; i < 3; ++i) {
-            result[(y * width + x + p) * 3 + i] = v67[p * 1 * LANES + i];
+            result[(y * width + x + p) * 3 + i] = v67[p * LANES + i];
         }
     }
 }

@@ -1,17 +1,19 @@
 /*
  * a tiny kernel
  */
-typedef float4 vector;
-typedef int4 mask;
-#define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
-#define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(a) __builtin_elementwise_floor(a)
 #endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
 #endif
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
 #endif
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
@@ -19,80 +21,78 @@ typedef int4 mask;
 #define OUT (POINTS - WINDOW_SIZE + 1) /* rows and columns of a tile's pixels */
 #define TILES 1 /* neighbours in a row that a work item computes */
 #define PIXELS 2 /* pixels of a row that go through the layers together */
-#define LANES 4 /* numbers in a vector */
+#define LANES 4 /* components of a vector */
 #define PAIRS 2 /* of channels */
 #define BLOCK 2 /* pairs whose products are added up by themselves */
 #define INPUTS 1 /* vectors that hold the pairs of all tiles */
 #define NEURONS 1 /* pairs of vectors of neurons */
 #define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
-void forward(const vector *from, int step, vector *to, int leap)
+void forward(const float4 *from, int step, float4 *to, int leap)
 {
-    vector t0 = from[0 * step];
-    vector t1 = from[0 * step + 1];
-    vector t2 = from[2 * step];
-    vector t3 = from[2 * step + 1];
-    vector t4 = from[4 * step];
-    vector t5 = from[4 * step + 1];
-    vector t6 = from[6 * step];
-    vector t7 = from[6 * step + 1];
-    vector t8 = t0 + t4;
-    vector t9 = t1 + t5;
-    vector t10 = t0 - t4;
-    vector t11 = t1 - t5;
-    vector t12 = t2 + t6;
-    vector t13 = t3 + t7;
-    vector t14 = t2 - t6;
-    vector t15 = t3 - t7;
-    vector t16 = t8 + t12;
-    vector t17 = t9 + t13;
-    vector t18 = t8 - t12;
-    vector t19 = t9 - t13;
-    vector t20 = t10 - t15;
-    vector t21 = t11 + t14;
-    vector t22 = t10 + t15;
-    vector t23 = t11 - t14;
-    to[0 * leap] = t16;
-    to[0 * leap + 1] = t17;
-    to[2 * leap] = t22;
-    to[2 * leap + 1] = t23;
-    to[4 * leap] = t18;
-    to[4 * leap + 1] = t19;
-    to[6 * leap] = t20;
-    to[6 * leap + 1] = t21;
+    float4 t0 = from[0];
+    float4 t1 = from[1];
+    float4 t2 = from[step * 2];
+    float4 t3 = from[step * 2 + 1];
+    float4 t4 = from[step * 4];
+    float4 t5 = from[step * 4 + 1];
+    float4 t6 = from[step * 6];
+    float4 t7 = from[step * 6 + 1];
+    float4 t8 = t0 + t4;
+    float4 t9 = t1 + t5;
+    float4 t10 = t0 - t4;
+    float4 t11 = t1 - t5;
+    float4 t12 = t2 + t6;
+    float4 t13 = t3 + t7;
+    float4 t14 = t2 - t6;
+    float4 t15 = t3 - t7;
+    float4 t16 = t8 + t12;
+    float4 t17 = t9 + t13;
+    float4 t18 = t8 - t12;
+    float4 t19 = t9 - t13;
+    float4 t20 = t10 - t15;
+    float4 t21 = t11 + t14;
+    float4 t22 = t10 + t15;
+    float4 t23 = t11 - t14;
+    to[0] = t16;
+    to[1] = t17;
+    to[leap * 2] = t22;
+    to[leap * 2 + 1] = t23;
+    to[leap * 4] = t18;
+    to[leap * 4 + 1] = t19;
+    to[leap * 6] = t20;
+    to[leap * 6 + 1] = t21;
 }
-void backward(const vector *from, int step, vector *to, int leap)
+void backward(const float4 *from, int step, float4 *to, int leap)
 {
-    vector t0 = from[0 * step];
-    vector t1 = from[0 * step + 1];
-    vector t2 = from[2 * step];
-    vector t3 = from[2 * step + 1];
-    vector t4 = from[4 * step];
-    vector t5 = from[4 * step + 1];
-    vector t6 = from[6 * step];
-    vector t7 = from[6 * step + 1];
-    vector t8 = t0 + t4;
-    vector t9 = t1 + t5;
-    vector t10 = t0 - t4;
-    vector t11 = t1 - t5;
-    vector t12 = t2 + t6;
-    vector t13 = t3 + t7;
-    vector t14 = t2 - t6;
-    vector t15 = t3 - t7;
-    vector t16 = t8 + t12;
-    vector t17 = t9 + t13;
-    vector t18 = t8 - t12;
-    vector t19 = t9 - t13;
-    vector t20 = t10 - t15;
-    vector t21 = t11 + t14;
-    to[0 * leap] = t16;
-    to[0 * leap + 1] = t17;
-    to[2 * leap] = t20;
-    to[2 * leap + 1] = t21;
-    to[4 * leap] = t18;
-    to[4 * leap + 1] = t19;
+    float4 t0 = from[0];
+    float4 t1 = from[1];
+    float4 t2 = from[step * 2];
+    float4 t3 = from[step * 2 + 1];
+    float4 t4 = from[step * 4];
+    float4 t5 = from[step * 4 + 1];
+    float4 t6 = from[step * 6];
+    float4 t7 = from[step * 6 + 1];
+    float4 t8 = t0 + t4;
+    float4 t9 = t1 + t5;
+    float4 t10 = t0 - t4;
+    float4 t11 = t1 - t5;
+    float4 t12 = t2 + t6;
+    float4 t13 = t3 + t7;
+    float4 t14 = t2 - t6;
+    float4 t15 = t3 - t7;
+    float4 t16 = t8 + t12;
+    float4 t17 = t9 + t13;
+    float4 t18 = t8 - t12;
+    float4 t19 = t9 - t13;
+    float4 t20 = t10 - t15;
+    float4 t21 = t11 + t14;
+    to[0] = t16;
+    to[1] = t17;
+    to[leap * 2] = t20;
+    to[leap * 2 + 1] = t21;
+    to[leap * 4] = t18;
+    to[leap * 4 + 1] = t19;
 }
-#define PLACE(lane, i) (((lane) / LANES * POINTS * 2 + (i)) * LANES + (lane) % LANES)
-#define SPECTRUM(lane, f) (((lane) / LANES * POINTS + (f)) * 4 * LANES + (lane) % LANES)
 __kernel void wamnet_denoise(
     __global const float *restrict image_i0,
     __global const float *restrict image_i1,
@@ -106,83 +106,84 @@ __kernel void wamnet_denoise(
     if (tile_x >= width || tile_y >= height) {
         return;
     }
+    __global const float4 *w = (__global const float4 *)weights;
 
     /* rows of the images around the tiles, transformed */
-    union { vector all[INPUTS * POINTS * 2]; float number[INPUTS * POINTS * 2 * LANES]; } row;
-    vector rows[INPUTS * POINTS * STRIDE];
+    union { float4 all[INPUTS * POINTS * 2]; float number[INPUTS * POINTS * 2 * 4]; } gathered;
+    float4 rows[INPUTS * POINTS * STRIDE];
     for (int i = 0; i < INPUTS * POINTS * 2; ++i) {
-        row.all[i] = (vector)(0.0f);
+        gathered.all[i] = (float4)(0.0f);
     }
     for (int dy = 0; dy < POINTS; ++dy) {
         int top = tile_y + dy - WINDOW_CENTRE;
-        int row_y = clamp(top, 0, height - 1);
+        int row = clamp(top, 0, height - 1);
         for (int tile = 0; tile < TILES; ++tile) {
             for (int dx = 0; dx < POINTS; ++dx) {
                 int left = tile_x + tile * OUT + dx - WINDOW_CENTRE;
                 int column = clamp(left, 0, width - 1);
-                bool inside = row_y == top && column == left;
-                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 0] : 0.0f;
-                row.number[PLACE(tile * PAIRS + 1, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 1] : 0.0f;
-                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 1)] = inside ? image_i1[(row_y * width + column) * 1 + 0] : 0.0f;
+                bool inside = row == top && column == left;
+                gathered.number[(tile * PAIRS / LANES * POINTS * 2 + dx * 2) * LANES + tile * PAIRS % LANES] = inside ? image_i0[(row * width + column) * 2 + 0] : 0.0f;
+                gathered.number[((tile * PAIRS + 1) / LANES * POINTS * 2 + dx * 2) * LANES + (tile * PAIRS + 1) % LANES] = inside ? image_i0[(row * width + column) * 2 + 1] : 0.0f;
+                gathered.number[(tile * PAIRS / LANES * POINTS * 2 + dx * 2 + 1) * LANES + tile * PAIRS % LANES] = inside ? image_i1[(row * width + column) * 1 + 0] : 0.0f;
             }
         }
         for (int i = 0; i < INPUTS; ++i) {
-            forward(row.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);
+            forward(gathered.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);
         }
     }
 
     /* columns: transformed, multiplied with the weights' spectra, transformed back */
-    vector column[POINTS * 2];
-    vector mirror[POINTS * 2];
-    union { vector all[INPUTS * POINTS * 4]; float number[INPUTS * POINTS * 4 * LANES]; } spectra;
-    vector product[TILES * 2][POINTS * 2];
-    vector back[TILES * NEURONS * OUT * STRIDE];
-    __global const vector *w = ((__global const vector *)weights);
-    for (int k = 0; k <= POINTS / 2; ++k) {
+    float4 columns[2][POINTS * 2];
+    union { float4 all[INPUTS * POINTS * 4]; float number[INPUTS * POINTS * 4 * 4]; } spectra;
+    float4 product[TILES * 2][POINTS * 2];
+    float4 back[TILES * NEURONS * OUT * STRIDE];
+    for (int k = 0; k < POINTS / 2 + 1; ++k) {
         int opposite = (POINTS - k) % POINTS;
-        int apart = opposite != k;
+        int apart = opposite != k ? 1 : 0;
         for (int i = 0; i < INPUTS; ++i) {
-            forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);
+            forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, columns[0], 1);
             if (opposite != k) {
-                forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+                forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, columns[1], 1);
             }
-            const vector *other = opposite != k ? mirror : column;
             for (int f = 0; f < POINTS; ++f) {
                 int g = (POINTS - f) % POINTS;
-                vector a = column[2 * f], b = column[2 * f + 1];
-                vector c = other[2 * g], d = other[2 * g + 1];
-                vector *to = spectra.all + (i * POINTS + f) * 4;
-                to[0] = a + c;
-                to[1] = b - d;
-                to[2] = b + d;
-                to[3] = c - a;
+                float4 a = columns[0][2 * f];
+                float4 b = columns[0][2 * f + 1];
+                float4 c = columns[apart][2 * g];
+                float4 d = columns[apart][2 * g + 1];
+                spectra.all[(i * POINTS + f) * 4] = a + c;
+                spectra.all[(i * POINTS + f) * 4 + 1] = b - d;
+                spectra.all[(i * POINTS + f) * 4 + 2] = b + d;
+                spectra.all[(i * POINTS + f) * 4 + 3] = c - a;
             }
         }
         for (int q = 0; q < NEURONS; ++q) {
             for (int f = 0; f < POINTS; ++f) {
-                vector real[TILES][2];
-                vector imaginary[TILES][2];
+                float4 real[TILES][2];
+                float4 imaginary[TILES][2];
                 #pragma unroll
                 for (int t = 0; t < TILES; ++t) {
-                    real[t][0] = (vector)(0.0f);
-                    real[t][1] = (vector)(0.0f);
-                    imaginary[t][0] = (vector)(0.0f);
-                    imaginary[t][1] = (vector)(0.0f);
+                    real[t][0] = (float4)(0.0f);
+                    real[t][1] = (float4)(0.0f);
+                    imaginary[t][0] = (float4)(0.0f);
+                    imaginary[t][1] = (float4)(0.0f);
                 }
                 for (int pair = 0; pair < BLOCK; ++pair) {
-                    vector w0 = w[0];
-                    vector w1 = w[1];
-                    vector w2 = w[2];
-                    vector w3 = w[3];
-                    vector w4 = w[4];
-                    vector w5 = w[5];
-                    vector w6 = w[6];
-                    vector w7 = w[7];
-                    w += 8;
+                    float4 w0 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8];
+                    float4 w1 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 1];
+                    float4 w2 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 2];
+                    float4 w3 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 3];
+                    float4 w4 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 4];
+                    float4 w5 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 5];
+                    float4 w6 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 6];
+                    float4 w7 = w[(((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 7];
                     #pragma unroll
                     for (int t = 0; t < TILES; ++t) {
-                        const float *x = spectra.number + SPECTRUM(t * PAIRS + pair, f);
-                        float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];
+                        int at = ((t * PAIRS + pair) / LANES * POINTS + f) * 4 * LANES + (t * PAIRS + pair) % LANES;
+                        float a = spectra.number[at];
+                        float b = spectra.number[at + LANES];
+                        float c = spectra.number[at + LANES * 2];
+                        float d = spectra.number[at + LANES * 3];
                         real[t][0] += w0 * a;
                         real[t][0] -= w2 * b;
                         real[t][0] += w4 * c;
@@ -211,25 +212,22 @@ __kernel void wamnet_denoise(
                 }
             }
             for (int tile = 0; tile < TILES; ++tile) {
-                vector *to = back + (tile * NEURONS + q) * OUT * STRIDE;
-                backward(product[tile * 2], 1, to + 2 * k, POINTS + 1);
+                backward(product[tile * 2], 1, back + (tile * NEURONS + q) * OUT * STRIDE + 2 * k, POINTS + 1);
                 if (opposite != k) {
-                    backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);
+                    backward(product[tile * 2 + 1], 1, back + (tile * NEURONS + q) * OUT * STRIDE + 2 * opposite, POINTS + 1);
                 }
             }
         }
     }
 
     /* rows back, and the other layers */
-    vector sums[2 * PIXELS * NEURONS * 2];
-    /* beyond the tiles */
+    float4 sums[2 * PIXELS * NEURONS * 2];
     for (int i = 0; i < (2 * PIXELS - TILES * OUT) * NEURONS * 2; ++i) {
-        sums[TILES * OUT * NEURONS * 2 + i] = (vector)(0.0f);
+        sums[TILES * OUT * NEURONS * 2 + i] = (float4)(0.0f);
     }
     for (int line = 0; line < OUT && tile_y + line < height; ++line) {
         for (int tile = 0; tile < TILES * NEURONS; ++tile) {
-            int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;
-            backward(back + (tile * OUT + line) * STRIDE, 1, sums + at, NEURONS);
+            backward(back + (tile * OUT + line) * STRIDE, 1, sums + (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2, NEURONS);
         }
         int y = tile_y + line;
         for (int block = 0; block < 2; ++block) {
@@ -237,32 +235,29 @@ __kernel void wamnet_denoise(
             int last = min(tile_x + TILES * OUT, width);
 
             /* %1: the sums, and their bias */
-            union { vector all[PIXELS * 2]; float number[PIXELS * 2 * LANES]; } v1;
-            const vector *from = sums + block * PIXELS * NEURONS * 2;
+            float4 v1[PIXELS * 2];
             for (int p = 0; p < PIXELS; ++p) {
-                v1.all[p * 2 + 0] = from[p * NEURONS * 2 + 0];
-                v1.all[p * 2 + 1] = from[p * NEURONS * 2 + 1];
+                v1[p * 2] = sums[(block * PIXELS + p) * NEURONS * 2];
+                v1[p * 2 + 1] = sums[(block * PIXELS + p) * NEURONS * 2 + 1];
             }
 
             /* %2: elementwise on 5 numbers */
-            union { vector all[PIXELS * 2]; float number[PIXELS * 2 * LANES]; } v2;
+            union { float4 all[PIXELS * 2]; float number[PIXELS * 2 * 4]; } v2;
             for (int i = 0; i < PIXELS * 2; ++i) {
-                vector t2 = sin(v1.all[i]);
+                float4 t2 = sin(v1[i]);
                 v2.all[i] = t2;
             }
 
             /* %3: affine map W1 from 5 to 2 */
-            union { vector all[PIXELS * 1]; float number[PIXELS * 1 * LANES]; } v3;
+            union { float4 all[PIXELS]; float number[PIXELS * 4]; } v3;
             {
-                __global const vector *w = ((__global const vector *)(weights + 768));
-                vector sum[PIXELS][1];
+                float4 sum[PIXELS][1];
                 #pragma unroll
                 for (int p = 0; p < PIXELS; ++p) {
-                    sum[p][0] = (vector)(0.0f);
+                    sum[p][0] = (float4)(0.0f);
                 }
                 for (int i = 0; i < 5; ++i) {
-                    vector w0 = w[0];
-                    w += 1;
+                    float4 w0 = w[192 + i];
                     #pragma unroll
                     for (int p = 0; p < PIXELS; ++p) {
                         float value = v2.number[p * 2 * LANES + i];
@@ -271,14 +266,14 @@ __kernel void wamnet_denoise(
                 }
                 #pragma unroll
                 for (int p = 0; p < PIXELS; ++p) {
-                    v3.all[p * 1 + 0] = sum[p][0];
+                    v3.all[p] = sum[p][0];
                 }
             }
 
             /* output color */
             for (int p = 0; p < PIXELS && x + p < last; ++p) {
                 for (int i = 0; i < 2; ++i) {
-                    result[(y * width + x + p) * 2 + i] = v3.number[p * 1 * LANES + i];
+                    result[(y * width + x + p) * 2 + i] = v3.number[p * LANES + i];
                 }
             }
         }

@@ -71,7 +71,7 @@ static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *w
 #define OUT (POINTS - WINDOW_SIZE + 1) /* rows and columns of a tile's pixels */
 #define TILES 1 /* neighbours in a row that a work item computes */
 #define PIXELS 2 /* pixels of a row that go through the layers together */
-#define LANES 4 /* numbers in a vector */
+#define LANES 4 /* components of a vector */
 #define PAIRS 2 /* of channels */
 #define BLOCK 2 /* pairs whose products are added up by themselves */
 #define INPUTS 1 /* vectors that hold the pairs of all tiles */
@@ -79,14 +79,14 @@ static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *w
 #define STRIDE (2 * (POINTS + 1)) /* vectors from row to row: not a multiple of 4096 bytes */
 static void wamnet_forward(const wamnet_vector *from, int step, wamnet_vector *to, int leap)
 {
-    wamnet_vector t0 = from[0 * step];
-    wamnet_vector t1 = from[0 * step + 1];
-    wamnet_vector t2 = from[2 * step];
-    wamnet_vector t3 = from[2 * step + 1];
-    wamnet_vector t4 = from[4 * step];
-    wamnet_vector t5 = from[4 * step + 1];
-    wamnet_vector t6 = from[6 * step];
-    wamnet_vector t7 = from[6 * step + 1];
+    wamnet_vector t0 = from[0];
+    wamnet_vector t1 = from[1];
+    wamnet_vector t2 = from[step * 2];
+    wamnet_vector t3 = from[step * 2 + 1];
+    wamnet_vector t4 = from[step * 4];
+    wamnet_vector t5 = from[step * 4 + 1];
+    wamnet_vector t6 = from[step * 6];
+    wamnet_vector t7 = from[step * 6 + 1];
     wamnet_vector t8 = t0 + t4;
     wamnet_vector t9 = t1 + t5;
     wamnet_vector t10 = t0 - t4;
@@ -103,25 +103,25 @@ static void wamnet_forward(const wamnet_vector *from, int step, wamnet_vector *t
     wamnet_vector t21 = t11 + t14;
     wamnet_vector t22 = t10 + t15;
     wamnet_vector t23 = t11 - t14;
-    to[0 * leap] = t16;
-    to[0 * leap + 1] = t17;
-    to[2 * leap] = t22;
-    to[2 * leap + 1] = t23;
-    to[4 * leap] = t18;
-    to[4 * leap + 1] = t19;
-    to[6 * leap] = t20;
-    to[6 * leap + 1] = t21;
+    to[0] = t16;
+    to[1] = t17;
+    to[leap * 2] = t22;
+    to[leap * 2 + 1] = t23;
+    to[leap * 4] = t18;
+    to[leap * 4 + 1] = t19;
+    to[leap * 6] = t20;
+    to[leap * 6 + 1] = t21;
 }
 static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *to, int leap)
 {
-    wamnet_vector t0 = from[0 * step];
-    wamnet_vector t1 = from[0 * step + 1];
-    wamnet_vector t2 = from[2 * step];
-    wamnet_vector t3 = from[2 * step + 1];
-    wamnet_vector t4 = from[4 * step];
-    wamnet_vector t5 = from[4 * step + 1];
-    wamnet_vector t6 = from[6 * step];
-    wamnet_vector t7 = from[6 * step + 1];
+    wamnet_vector t0 = from[0];
+    wamnet_vector t1 = from[1];
+    wamnet_vector t2 = from[step * 2];
+    wamnet_vector t3 = from[step * 2 + 1];
+    wamnet_vector t4 = from[step * 4];
+    wamnet_vector t5 = from[step * 4 + 1];
+    wamnet_vector t6 = from[step * 6];
+    wamnet_vector t7 = from[step * 6 + 1];
     wamnet_vector t8 = t0 + t4;
     wamnet_vector t9 = t1 + t5;
     wamnet_vector t10 = t0 - t4;
@@ -136,17 +136,15 @@ static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *
     wamnet_vector t19 = t9 - t13;
     wamnet_vector t20 = t10 - t15;
     wamnet_vector t21 = t11 + t14;
-    to[0 * leap] = t16;
-    to[0 * leap + 1] = t17;
-    to[2 * leap] = t20;
-    to[2 * leap + 1] = t21;
-    to[4 * leap] = t18;
-    to[4 * leap + 1] = t19;
+    to[0] = t16;
+    to[1] = t17;
+    to[leap * 2] = t20;
+    to[leap * 2 + 1] = t21;
+    to[leap * 4] = t18;
+    to[leap * 4 + 1] = t19;
 }
-#define PLACE(lane, i) (((lane) / LANES * POINTS * 2 + (i)) * LANES + (lane) % LANES)
-#define SPECTRUM(lane, f) (((lane) / LANES * POINTS + (f)) * 4 * LANES + (lane) % LANES)
-/* TILES * OUT x OUT pixels from (tile_x, tile_y) on, or to the picture's end: their channels are written
-   to `result`, the whole picture's array. */
+/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -191,54 +189,52 @@ static inline void wamnet_pixel(
     (void)weights;
 
     /* rows of the images around the tiles, transformed */
-    union { wamnet_vector all[INPUTS * POINTS * 2]; float number[INPUTS * POINTS * 2 * LANES]; } row;
+    float gathered[INPUTS * POINTS * 2 * LANES];
     wamnet_vector rows[INPUTS * POINTS * STRIDE];
     for (int i = 0; i < INPUTS * POINTS * 2; ++i) {
-        row.all[i] = (wamnet_vector){0};
+        *(wamnet_vector *)(gathered + (i) * LANES) = (wamnet_vector){0};
     }
     for (int dy = 0; dy < POINTS; ++dy) {
         int top = tile_y + dy - WINDOW_CENTRE;
-        int row_y = wamnet_clamp(top, 0, height - 1);
+        int row = wamnet_clamp(top, 0, height - 1);
         for (int tile = 0; tile < TILES; ++tile) {
             for (int dx = 0; dx < POINTS; ++dx) {
                 int left = tile_x + tile * OUT + dx - WINDOW_CENTRE;
                 int column = wamnet_clamp(left, 0, width - 1);
-                bool inside = row_y == top && column == left;
-                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 0] : 0.0f;
-                row.number[PLACE(tile * PAIRS + 1, dx * 2 + 0)] = inside ? image_i0[(row_y * width + column) * 2 + 1] : 0.0f;
-                row.number[PLACE(tile * PAIRS + 0, dx * 2 + 1)] = inside ? image_i1[(row_y * width + column) * 1 + 0] : 0.0f;
+                bool inside = row == top && column == left;
+                gathered[(tile * PAIRS / LANES * POINTS * 2 + dx * 2) * LANES + tile * PAIRS % LANES] = inside ? image_i0[(row * width + column) * 2 + 0] : 0.0f;
+                gathered[((tile * PAIRS + 1) / LANES * POINTS * 2 + dx * 2) * LANES + (tile * PAIRS + 1) % LANES] = inside ? image_i0[(row * width + column) * 2 + 1] : 0.0f;
+                gathered[(tile * PAIRS / LANES * POINTS * 2 + dx * 2 + 1) * LANES + tile * PAIRS % LANES] = inside ? image_i1[(row * width + column) * 1 + 0] : 0.0f;
             }
         }
         for (int i = 0; i < INPUTS; ++i) {
-            wamnet_forward(row.all + i * POINTS * 2, 1, rows + (i * POINTS + dy) * STRIDE, 1);
+            wamnet_forward((wamnet_vector *)(gathered + i * POINTS * 2 * LANES), 1, rows + (i * POINTS + dy) * STRIDE, 1);
         }
     }
 
     /* columns: transformed, multiplied with the weights' spectra, transformed back */
-    wamnet_vector column[POINTS * 2];
-    wamnet_vector mirror[POINTS * 2];
-    union { wamnet_vector all[INPUTS * POINTS * 4]; float number[INPUTS * POINTS * 4 * LANES]; } spectra;
+    wamnet_vector columns[2][POINTS * 2];
+    float spectra[INPUTS * POINTS * 4 * LANES];
     wamnet_vector product[TILES * 2][POINTS * 2];
     wamnet_vector back[TILES * NEURONS * OUT * STRIDE];
-    const float *spectrum = weights;
-    for (int k = 0; k <= POINTS / 2; ++k) {
+    for (int k = 0; k < POINTS / 2 + 1; ++k) {
         int opposite = (POINTS - k) % POINTS;
-        int apart = opposite != k;
+        int apart = opposite != k ? 1 : 0;
         for (int i = 0; i < INPUTS; ++i) {
-            wamnet_forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, column, 1);
+            wamnet_forward(rows + i * POINTS * STRIDE + 2 * k, POINTS + 1, columns[0], 1);
             if (opposite != k) {
-                wamnet_forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, mirror, 1);
+                wamnet_forward(rows + i * POINTS * STRIDE + 2 * opposite, POINTS + 1, columns[1], 1);
             }
-            const wamnet_vector *other = opposite != k ? mirror : column;
             for (int f = 0; f < POINTS; ++f) {
                 int g = (POINTS - f) % POINTS;
-                wamnet_vector a = column[2 * f], b = column[2 * f + 1];
-                wamnet_vector c = other[2 * g], d = other[2 * g + 1];
-                wamnet_vector *to = spectra.all + (i * POINTS + f) * 4;
-                to[0] = a + c;
-                to[1] = b - d;
-                to[2] = b + d;
-                to[3] = c - a;
+                wamnet_vector a = columns[0][2 * f];
+                wamnet_vector b = columns[0][2 * f + 1];
+                wamnet_vector c = columns[apart][2 * g];
+                wamnet_vector d = columns[apart][2 * g + 1];
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4) * LANES) = a + c;
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 1) * LANES) = b - d;
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 2) * LANES) = b + d;
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 3) * LANES) = c - a;
             }
         }
         for (int q = 0; q < NEURONS; ++q) {
@@ -253,27 +249,21 @@ static inline void wamnet_pixel(
                     imaginary[t][1] = (wamnet_vector){0};
                 }
                 for (int pair = 0; pair < BLOCK; ++pair) {
-                    wamnet_vector w0;
-                    wamnet_load(&w0, spectrum + 0 * LANES);
-                    wamnet_vector w1;
-                    wamnet_load(&w1, spectrum + 1 * LANES);
-                    wamnet_vector w2;
-                    wamnet_load(&w2, spectrum + 2 * LANES);
-                    wamnet_vector w3;
-                    wamnet_load(&w3, spectrum + 3 * LANES);
-                    wamnet_vector w4;
-                    wamnet_load(&w4, spectrum + 4 * LANES);
-                    wamnet_vector w5;
-                    wamnet_load(&w5, spectrum + 5 * LANES);
-                    wamnet_vector w6;
-                    wamnet_load(&w6, spectrum + 6 * LANES);
-                    wamnet_vector w7;
-                    wamnet_load(&w7, spectrum + 7 * LANES);
-                    spectrum += 8 * LANES;
+                    wamnet_vector w0 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8) * LANES);
+                    wamnet_vector w1 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 1) * LANES);
+                    wamnet_vector w2 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 2) * LANES);
+                    wamnet_vector w3 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 3) * LANES);
+                    wamnet_vector w4 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 4) * LANES);
+                    wamnet_vector w5 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 5) * LANES);
+                    wamnet_vector w6 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 6) * LANES);
+                    wamnet_vector w7 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8 + 7) * LANES);
                     WAMNET_UNROLL
                     for (int t = 0; t < TILES; ++t) {
-                        const float *x = spectra.number + SPECTRUM(t * PAIRS + pair, f);
-                        float a = x[0], b = x[LANES], c = x[2 * LANES], d = x[3 * LANES];
+                        int at = ((t * PAIRS + pair) / LANES * POINTS + f) * 4 * LANES + (t * PAIRS + pair) % LANES;
+                        float a = spectra[at];
+                        float b = spectra[at + LANES];
+                        float c = spectra[at + LANES * 2];
+                        float d = spectra[at + LANES * 3];
                         real[t][0] += w0 * a;
                         real[t][0] -= w2 * b;
                         real[t][0] += w4 * c;
@@ -302,10 +292,9 @@ static inline void wamnet_pixel(
                 }
             }
             for (int tile = 0; tile < TILES; ++tile) {
-                wamnet_vector *to = back + (tile * NEURONS + q) * OUT * STRIDE;
-                wamnet_backward(product[tile * 2], 1, to + 2 * k, POINTS + 1);
+                wamnet_backward(product[tile * 2], 1, back + (tile * NEURONS + q) * OUT * STRIDE + 2 * k, POINTS + 1);
                 if (opposite != k) {
-                    wamnet_backward(product[tile * 2 + 1], 1, to + 2 * opposite, POINTS + 1);
+                    wamnet_backward(product[tile * 2 + 1], 1, back + (tile * NEURONS + q) * OUT * STRIDE + 2 * opposite, POINTS + 1);
                 }
             }
         }
@@ -313,26 +302,23 @@ static inline void wamnet_pixel(
 
     /* rows back, and the other layers */
     wamnet_vector sums[2 * PIXELS * NEURONS * 2];
-    /* beyond the tiles */
     for (int i = 0; i < (2 * PIXELS - TILES * OUT) * NEURONS * 2; ++i) {
         sums[TILES * OUT * NEURONS * 2 + i] = (wamnet_vector){0};
     }
     for (int line = 0; line < OUT && tile_y + line < height; ++line) {
         for (int tile = 0; tile < TILES * NEURONS; ++tile) {
-            int at = (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2;
-            wamnet_backward(back + (tile * OUT + line) * STRIDE, 1, sums + at, NEURONS);
+            wamnet_backward(back + (tile * OUT + line) * STRIDE, 1, sums + (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2, NEURONS);
         }
         int y = tile_y + line;
         for (int block = 0; block < 2; ++block) {
             int x = tile_x + block * PIXELS;
-            int last = tile_x + TILES * OUT < width ? tile_x + TILES * OUT : width;
+            int last = width < tile_x + TILES * OUT ? width : tile_x + TILES * OUT;
 
             /* %1: the sums, and their bias */
             float v1[PIXELS * 2 * LANES];
-            const wamnet_vector *from = sums + block * PIXELS * NEURONS * 2;
             for (int p = 0; p < PIXELS; ++p) {
-                *(wamnet_vector *)(v1 + (p * 2 + 0) * LANES) = from[p * NEURONS * 2 + 0];
-                *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = from[p * NEURONS * 2 + 1];
+                *(wamnet_vector *)(v1 + (p * 2) * LANES) = sums[(block * PIXELS + p) * NEURONS * 2];
+                *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = sums[(block * PIXELS + p) * NEURONS * 2 + 1];
             }
 
             /* %2: elementwise on 5 numbers */
@@ -343,34 +329,31 @@ static inline void wamnet_pixel(
             }
 
             /* %3: affine map W1 from 5 to 2 */
-            float v3[PIXELS * 1 * LANES];
+            float v3[PIXELS * LANES];
             {
-                const float *w = weights + 768;
                 wamnet_vector sum[PIXELS][1];
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    wamnet_clear(&sum[p][0]);
+                    sum[p][0] = (wamnet_vector){0};
                 }
                 for (int i = 0; i < 5; ++i) {
-                    wamnet_vector w0;
-                    wamnet_load(&w0, w + 0 * LANES);
-                    w += 1 * LANES;
+                    wamnet_vector w0 = *(const wamnet_vector *)(weights + (192 + i) * LANES);
                     WAMNET_UNROLL
                     for (int p = 0; p < PIXELS; ++p) {
                         float value = v2[p * 2 * LANES + i];
-                        wamnet_add_product(&sum[p][0], &w0, value);
+                        sum[p][0] += w0 * value;
                     }
                 }
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    *(wamnet_vector *)(v3 + (p * 1 + 0) * LANES) = sum[p][0];
+                    *(wamnet_vector *)(v3 + (p) * LANES) = sum[p][0];
                 }
             }
 
             /* output color */
             for (int p = 0; p < PIXELS && x + p < last; ++p) {
                 for (int i = 0; i < 2; ++i) {
-                    result[(y * width + x + p) * 2 + i] = v3[p * 1 * LANES + i];
+                    result[(y * width + x + p) * 2 + i] = v3[p * LANES + i];
                 }
             }
         }
@@ -387,9 +370,7 @@ static inline void wamnet_pixel(
 #undef OUT
 #undef PAIRS
 #undef PIXELS
-#undef PLACE
 #undef POINTS
-#undef SPECTRUM
 #undef STRIDE
 #undef TILES
 #undef WINDOW_CENTRE

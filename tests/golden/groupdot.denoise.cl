@@ -1,40 +1,57 @@
 /*
  * a tiny kernel
  */
-typedef float4 vector;
-typedef int4 mask;
-#define MINIMUM(a, b) ((vector)(b) < (vector)(a) ? (vector)(b) : (vector)(a))
-#define MAXIMUM(a, b) ((vector)(b) > (vector)(a) ? (vector)(b) : (vector)(a))
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
 #endif
 #endif
 #ifndef FLOOR
 #define FLOOR(a) floor(a)
 #endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif
+int wamnet_packed(float a, float b, float c, float d)
+{
+    uint low = ((uint)(int)a & 255u) | ((uint)(int)b & 255u) << 8;
+    return as_int(low | ((uint)(int)c & 255u) << 16 | (uint)(int)d << 24);
+}
+int4 wamnet_dots(int4 sums, int4 weights, int word)
+{
+#ifdef __opencl_c_integer_dot_product_input_4x8bit_packed
+    int x = dot_acc_sat_4x8packed_ss_int(as_uint(weights.x), as_uint(word), sums.x);
+    int y = dot_acc_sat_4x8packed_ss_int(as_uint(weights.y), as_uint(word), sums.y);
+    int z = dot_acc_sat_4x8packed_ss_int(as_uint(weights.z), as_uint(word), sums.z);
+    int w = dot_acc_sat_4x8packed_ss_int(as_uint(weights.w), as_uint(word), sums.w);
+    return (int4)(x, y, z, w);
+#else
+    return sums + (weights << 24 >> 24) * (word << 24 >> 24) + (weights << 16 >> 24) * (word << 16 >> 24)
+        + (weights << 8 >> 24) * (word << 8 >> 24) + (weights >> 24) * (word >> 24);
+#endif
+}
+float4 wamnet_floats(int4 sums)
+{
+    return (float4)((float)sums.x, (float)sums.y, (float)sums.z, (float)sums.w);
+}
+float4 wamnet_numbers(int4 bits)
+{
+    return as_float4(bits);
+}
+
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
-#define LEAST(kind, a, b) ((kind)(b) < (kind)(a) ? (kind)(b) : (kind)(a))
-#define MOST(kind, a, b) ((kind)(b) > (kind)(a) ? (kind)(b) : (kind)(a))
-#ifdef __has_builtin
-#if __has_builtin(__builtin_convertvector)
-#define CONVERT(a, kind) __builtin_convertvector(a, kind)
-#endif
-#endif
-#ifndef CONVERT
-#define vector float4
-#define CONVERT(a, kind) CONVERTED(a, kind)
-#define CONVERTED(a, kind) convert_##kind(a)
-#endif
 #define GROUP_WIDTH 4 /* items of a group along a row */
 #define GROUP_HEIGHT 2
 #define PIXELS 1 /* pixels of an item, GROUP_WIDTH columns apart */
 #define TILE_WIDTH (GROUP_WIDTH * PIXELS + WINDOW_SIZE - 1) /* all that windows touch */
 #define TILE_HEIGHT (GROUP_HEIGHT + WINDOW_SIZE - 1)
-#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* numbers of a channel */
+#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* values of a channel */
 #define TILE_NUMBERS (PLANE * 2)
-vector elementwise_49(vector v1, vector v4, vector v7)
+float4 elementwise_49(float4 v1, float4 v4, float4 v7)
 {
     int4 t2 = CONVERT(v1, int4);
     uint4 t3 = CONVERT(t2, uint4);
@@ -59,58 +76,31 @@ vector elementwise_49(vector v1, vector v4, vector v7)
     uint4 t33 = t20 * t32;
     uint4 t35 = t33 + 8388608u;
     uint4 t37 = t35 >> 24u;
-    uint4 t39 = LEAST(uint4, t37, 127u);
-    vector t40 = CONVERT(t39, vector);
+    uint4 t39 = (uint4)(127u) < t37 ? (uint4)(127u) : t37;
+    float4 t40 = CONVERT(t39, float4);
     uint4 t42 = t9 >> 23u;
     uint4 t43 = t42 & 1u;
-    vector t44 = CONVERT(t43, vector);
-    vector t46 = 2.0f * t44;
-    vector t48 = 1.0f - t46;
-    vector t49 = t40 * t48;
+    float4 t44 = CONVERT(t43, float4);
+    float4 t46 = 2.0f * t44;
+    float4 t48 = 1.0f - t46;
+    float4 t49 = t40 * t48;
     return t49;
 }
-vector elementwise_67(vector v50, vector v52, vector v55)
+float4 elementwise_67(float4 v50, float4 v52, float4 v55)
 {
     int4 t51 = CONVERT(v50, int4);
     int4 t53 = CONVERT(v52, int4);
     int4 t54 = t51 * t53;
     int4 t56 = CONVERT(v55, int4);
     int4 t57 = t54 + t56;
-    int4 t59 = MOST(int4, t57, 0);
-    int4 t61 = LEAST(int4, t59, 16777216);
+    int4 t59 = (int4)(0) > t57 ? (int4)(0) : t57;
+    int4 t61 = (int4)(16777216) < t59 ? (int4)(16777216) : t59;
     uint4 t62 = CONVERT(t61, uint4);
     uint4 t64 = t62 >> 8u;
-    vector t65 = CONVERT(t64, vector);
-    vector t67 = t65 * 1.52587891e-05f;
+    float4 t65 = CONVERT(t64, float4);
+    float4 t67 = t65 * 1.52587891e-05f;
     return t67;
 }
-int wamnet_packed(float a, float b, float c, float d)
-{
-    uint low = ((uint)(int)a & 255u) | ((uint)(int)b & 255u) << 8;
-    return as_int(low | ((uint)(int)c & 255u) << 16 | (uint)(int)d << 24);
-}
-int4 wamnet_dots(int4 sums, int4 weights, int word)
-{
-#ifdef __opencl_c_integer_dot_product_input_4x8bit_packed
-    int x = dot_acc_sat_4x8packed_ss_int(as_uint(weights.x), as_uint(word), sums.x);
-    int y = dot_acc_sat_4x8packed_ss_int(as_uint(weights.y), as_uint(word), sums.y);
-    int z = dot_acc_sat_4x8packed_ss_int(as_uint(weights.z), as_uint(word), sums.z);
-    int w = dot_acc_sat_4x8packed_ss_int(as_uint(weights.w), as_uint(word), sums.w);
-    return (int4)(x, y, z, w);
-#else
-    return sums + (weights << 24 >> 24) * (word << 24 >> 24) + (weights << 16 >> 24) * (word << 16 >> 24)
-        + (weights << 8 >> 24) * (word << 8 >> 24) + (weights >> 24) * (word >> 24);
-#endif
-}
-vector wamnet_floats(int4 sums)
-{
-    return (vector)((float)sums.x, (float)sums.y, (float)sums.z, (float)sums.w);
-}
-vector wamnet_numbers(int4 bits)
-{
-    return as_float4(bits);
-}
-
 __kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))
 void wamnet_denoise(
     __global const float *restrict image_a,
@@ -132,45 +122,53 @@ void wamnet_denoise(
 
     /* %1: affine map W0 from 20 to 3 */
     int4 s1_0_0 = (int4)(0);
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;
         int row = clamp(tile_row, 0, height - 1);
         int column = clamp(tile_column, 0, width - 1);
         bool inside = row == tile_row && column == tile_column;
-        tile[0 * PLANE + i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
-        tile[1 * PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
+        tile[i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
+        tile[PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int at = (local_y + dy) * TILE_WIDTH + local_x + dx;
-            int from = 0 + (dy * WINDOW_SIZE + dx) * 2;
-            int x0_0 = tile[0 * PLANE + at + 0 * GROUP_WIDTH];
-            { int4 m = w[from + 0 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x0_0); }
-            int x1_0 = tile[1 * PLANE + at + 0 * GROUP_WIDTH];
-            { int4 m = w[from + 1 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x1_0); }
+            int first = (dy * WINDOW_SIZE + dx) * 2;
+            int x0_0 = tile[at];
+            {
+                int4 m = w[first];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x0_0);
+            }
+            int x1_0 = tile[PLANE + at];
+            {
+                int4 m = w[first + 1];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x1_0);
+            }
         }
     }
-    vector v1_0_0 = wamnet_floats(s1_0_0);
+    float4 v1_0_0 = wamnet_floats(s1_0_0);
 
     /* %2 to %49: elementwise on 3 numbers */
-    vector v49_0_0 = elementwise_49(v1_0_0, wamnet_numbers(w[8]), wamnet_numbers(w[9]));
+    float4 v49_0_0 = elementwise_49(v1_0_0, wamnet_numbers(w[8]), wamnet_numbers(w[9]));
 
     /* %50: affine map W1 from 3 to 3 */
     int4 s50_0_0 = (int4)(0);
     int b50_0_0 = wamnet_packed(v49_0_0.x, v49_0_0.y, v49_0_0.z, v49_0_0.w);
-    { int4 m = w[10 + 0]; s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0); }
-    vector v50_0_0 = wamnet_floats(s50_0_0);
+    {
+        int4 m = w[10];
+        s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0);
+    }
+    float4 v50_0_0 = wamnet_floats(s50_0_0);
 
     /* %51 to %67: elementwise on 3 numbers */
-    vector v67_0_0 = elementwise_67(v50_0_0, wamnet_numbers(w[11]), wamnet_numbers(w[12]));
+    float4 v67_0_0 = elementwise_67(v50_0_0, wamnet_numbers(w[11]), wamnet_numbers(w[12]));
 
     /* output color */
-    if (x + 0 * GROUP_WIDTH < width && y < height) {
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 0] = v67_0_0.x;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 1] = v67_0_0.y;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 2] = v67_0_0.z;
+    if (x < width && y < height) {
+        result[(y * width + x) * 3 + 0] = v67_0_0.x;
+        result[(y * width + x) * 3 + 1] = v67_0_0.y;
+        result[(y * width + x) * 3 + 2] = v67_0_0.z;
     }
 }

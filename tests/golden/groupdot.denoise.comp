@@ -14,7 +14,7 @@
 #define PIXELS 1 /* pixels of an item, GROUP_WIDTH columns apart */
 #define TILE_WIDTH (GROUP_WIDTH * PIXELS + WINDOW_SIZE - 1) /* all that windows touch */
 #define TILE_HEIGHT (GROUP_HEIGHT + WINDOW_SIZE - 1)
-#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* numbers of a channel */
+#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* values of a channel */
 #define TILE_NUMBERS (PLANE * 2)
 float elementwise_49_of_one(float v1, float v4, float v7)
 {
@@ -121,25 +121,30 @@ void main()
 
     /* %1: affine map W0 from 20 to 3 */
     ivec4 s1_0_0 = ivec4(0);
-    barrier();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;
         int row = clamp(tile_row, 0, height - 1);
         int column = clamp(tile_column, 0, width - 1);
         bool inside = row == tile_row && column == tile_column;
-        tile[0 * PLANE + i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
-        tile[1 * PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
+        tile[i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
+        tile[PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
     }
     barrier();
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int at = (local_y + dy) * TILE_WIDTH + local_x + dx;
-            int first = 0 + (dy * WINDOW_SIZE + dx) * 2;
-            int x0_0 = tile[0 * PLANE + at + 0 * GROUP_WIDTH];
-            { ivec4 m = w[first + 0 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x0_0); }
-            int x1_0 = tile[1 * PLANE + at + 0 * GROUP_WIDTH];
-            { ivec4 m = w[first + 1 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x1_0); }
+            int first = (dy * WINDOW_SIZE + dx) * 2;
+            int x0_0 = tile[at];
+            {
+                ivec4 m = w[first];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x0_0);
+            }
+            int x1_0 = tile[PLANE + at];
+            {
+                ivec4 m = w[first + 1];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x1_0);
+            }
         }
     }
     vec4 v1_0_0 = wamnet_floats(s1_0_0);
@@ -150,16 +155,19 @@ void main()
     /* %50: affine map W1 from 3 to 3 */
     ivec4 s50_0_0 = ivec4(0);
     int b50_0_0 = wamnet_packed(v49_0_0.x, v49_0_0.y, v49_0_0.z, v49_0_0.w);
-    { ivec4 m = w[10 + 0]; s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0); }
+    {
+        ivec4 m = w[10];
+        s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0);
+    }
     vec4 v50_0_0 = wamnet_floats(s50_0_0);
 
     /* %51 to %67: elementwise on 3 numbers */
     vec4 v67_0_0 = elementwise_67(v50_0_0, wamnet_numbers(w[11]), wamnet_numbers(w[12]));
 
     /* output color */
-    if (x + 0 * GROUP_WIDTH < width && y < height) {
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 0] = v67_0_0.x;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 1] = v67_0_0.y;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 2] = v67_0_0.z;
+    if (x < width && y < height) {
+        result[(y * width + x) * 3 + 0] = v67_0_0.x;
+        result[(y * width + x) * 3 + 1] = v67_0_0.y;
+        result[(y * width + x) * 3 + 2] = v67_0_0.z;
     }
 }

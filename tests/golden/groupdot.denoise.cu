@@ -25,6 +25,30 @@ static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
     a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
 }
 #endif
+#ifndef WAMNET_DOTS
+#define WAMNET_DOTS
+static __device__ inline int wamnet_packed(float a, float b, float c, float d)
+{
+    unsigned int low = ((unsigned int)(int)a & 255u) | ((unsigned int)(int)b & 255u) << 8;
+    return (int)(low | ((unsigned int)(int)c & 255u) << 16 | (unsigned int)(int)d << 24);
+}
+static __device__ inline int4 wamnet_dots(int4 sums, int4 weights, int word)
+{
+    int x = __dp4a(weights.x, word, sums.x), y = __dp4a(weights.y, word, sums.y);
+    int z = __dp4a(weights.z, word, sums.z), w = __dp4a(weights.w, word, sums.w);
+    return make_int4(x, y, z, w);
+}
+static __device__ inline wamnet_vector wamnet_floats(int4 sums)
+{
+    return wamnet_made((float)sums.x, (float)sums.y, (float)sums.z, (float)sums.w);
+}
+static __device__ inline wamnet_vector wamnet_numbers(int4 bits)
+{
+    float x = __int_as_float(bits.x), y = __int_as_float(bits.y);
+    float z = __int_as_float(bits.z), w = __int_as_float(bits.w);
+    return wamnet_made(x, y, z, w);
+}
+#endif
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 #define GROUP_WIDTH 4 /* items of a group along a row */
@@ -32,7 +56,7 @@ static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
 #define PIXELS 1 /* pixels of an item, GROUP_WIDTH columns apart */
 #define TILE_WIDTH (GROUP_WIDTH * PIXELS + WINDOW_SIZE - 1) /* all that windows touch */
 #define TILE_HEIGHT (GROUP_HEIGHT + WINDOW_SIZE - 1)
-#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* numbers of a channel */
+#define PLANE (TILE_WIDTH * TILE_HEIGHT) /* values of a channel */
 #define TILE_NUMBERS (PLANE * 2)
 static __device__ inline float elementwise_49_of_one(float v1, float v4, float v7)
 {
@@ -92,31 +116,6 @@ static __device__ inline wamnet_vector elementwise_67(wamnet_vector v50, wamnet_
 {
     return wamnet_made(elementwise_67_of_one(v50.x, v52.x, v55.x), elementwise_67_of_one(v50.y, v52.y, v55.y), elementwise_67_of_one(v50.z, v52.z, v55.z), elementwise_67_of_one(v50.w, v52.w, v55.w));
 }
-#ifndef WAMNET_DOTS
-#define WAMNET_DOTS
-static __device__ inline int wamnet_packed(float a, float b, float c, float d)
-{
-    unsigned int low = ((unsigned int)(int)a & 255u) | ((unsigned int)(int)b & 255u) << 8;
-    return (int)(low | ((unsigned int)(int)c & 255u) << 16 | (unsigned int)(int)d << 24);
-}
-static __device__ inline int4 wamnet_dots(int4 sums, int4 weights, int word)
-{
-    int x = __dp4a(weights.x, word, sums.x), y = __dp4a(weights.y, word, sums.y);
-    int z = __dp4a(weights.z, word, sums.z), w = __dp4a(weights.w, word, sums.w);
-    return make_int4(x, y, z, w);
-}
-static __device__ inline wamnet_vector wamnet_floats(int4 sums)
-{
-    return wamnet_made((float)sums.x, (float)sums.y, (float)sums.z, (float)sums.w);
-}
-static __device__ inline wamnet_vector wamnet_numbers(int4 bits)
-{
-    float x = __int_as_float(bits.x), y = __int_as_float(bits.y);
-    float z = __int_as_float(bits.z), w = __int_as_float(bits.w);
-    return wamnet_made(x, y, z, w);
-}
-#endif
-
 extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_denoise(
     const float *__restrict__ image_a,
     const float *__restrict__ image_b,
@@ -137,25 +136,30 @@ extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_
 
     /* %1: affine map W0 from 20 to 3 */
     int4 s1_0_0 = make_int4(0, 0, 0, 0);
-    __syncthreads();
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;
         int row = wamnet_clamp(tile_row, 0, height - 1);
         int column = wamnet_clamp(tile_column, 0, width - 1);
         bool inside = row == tile_row && column == tile_column;
-        tile[0 * PLANE + i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
-        tile[1 * PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
+        tile[i] = wamnet_packed(inside ? image_a[(row * width + column) * 3 + 0] : 0.0f, inside ? image_a[(row * width + column) * 3 + 1] : 0.0f, inside ? image_a[(row * width + column) * 3 + 2] : 0.0f, inside ? image_b[(row * width + column) * 2 + 0] : 0.0f);
+        tile[PLANE + i] = wamnet_packed(inside ? image_b[(row * width + column) * 2 + 1] : 0.0f, 0.0f, 0.0f, 0.0f);
     }
     __syncthreads();
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int at = (local_y + dy) * TILE_WIDTH + local_x + dx;
-            int first = 0 + (dy * WINDOW_SIZE + dx) * 2;
-            int x0_0 = tile[0 * PLANE + at + 0 * GROUP_WIDTH];
-            { int4 m = w[first + 0 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x0_0); }
-            int x1_0 = tile[1 * PLANE + at + 0 * GROUP_WIDTH];
-            { int4 m = w[first + 1 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x1_0); }
+            int first = (dy * WINDOW_SIZE + dx) * 2;
+            int x0_0 = tile[at];
+            {
+                int4 m = w[first];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x0_0);
+            }
+            int x1_0 = tile[PLANE + at];
+            {
+                int4 m = w[first + 1];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x1_0);
+            }
         }
     }
     wamnet_vector v1_0_0 = wamnet_floats(s1_0_0);
@@ -166,16 +170,19 @@ extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_
     /* %50: affine map W1 from 3 to 3 */
     int4 s50_0_0 = make_int4(0, 0, 0, 0);
     int b50_0_0 = wamnet_packed(v49_0_0.x, v49_0_0.y, v49_0_0.z, v49_0_0.w);
-    { int4 m = w[10 + 0]; s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0); }
+    {
+        int4 m = w[10];
+        s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0);
+    }
     wamnet_vector v50_0_0 = wamnet_floats(s50_0_0);
 
     /* %51 to %67: elementwise on 3 numbers */
     wamnet_vector v67_0_0 = elementwise_67(v50_0_0, wamnet_numbers(w[11]), wamnet_numbers(w[12]));
 
     /* output color */
-    if (x + 0 * GROUP_WIDTH < width && y < height) {
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 0] = v67_0_0.x;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 1] = v67_0_0.y;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 2] = v67_0_0.z;
+    if (x < width && y < height) {
+        result[(y * width + x) * 3 + 0] = v67_0_0.x;
+        result[(y * width + x) * 3 + 1] = v67_0_0.y;
+        result[(y * width + x) * 3 + 2] = v67_0_0.z;
     }
 }

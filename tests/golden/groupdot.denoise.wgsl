@@ -9,10 +9,9 @@ const GROUP_HEIGHT: i32 = 2;
 const PIXELS: i32 = 1; /* pixels of an item, GROUP_WIDTH columns apart */
 const TILE_WIDTH: i32 = (GROUP_WIDTH * PIXELS + WINDOW_SIZE - 1); /* all that windows touch */
 const TILE_HEIGHT: i32 = (GROUP_HEIGHT + WINDOW_SIZE - 1);
-const PLANE: i32 = (TILE_WIDTH * TILE_HEIGHT); /* numbers of a channel */
+const PLANE: i32 = (TILE_WIDTH * TILE_HEIGHT); /* values of a channel */
 const TILE_NUMBERS: i32 = (PLANE * 2);
-fn elementwise_49_of_one(v1: f32, v4: f32, v7: f32) -> f32
-{
+fn elementwise_49_of_one(v1: f32, v4: f32, v7: f32) -> f32 {
     let t2: i32 = i32(v1);
     let t3: u32 = u32(t2);
     let t5: u32 = u32(v4);
@@ -46,12 +45,10 @@ fn elementwise_49_of_one(v1: f32, v4: f32, v7: f32) -> f32
     let t49: f32 = t40 * t48;
     return t49;
 }
-fn elementwise_49(v1: vec4<f32>, v4: vec4<f32>, v7: vec4<f32>) -> vec4<f32>
-{
+fn elementwise_49(v1: vec4<f32>, v4: vec4<f32>, v7: vec4<f32>) -> vec4<f32> {
     return vec4<f32>(elementwise_49_of_one(v1.x, v4.x, v7.x), elementwise_49_of_one(v1.y, v4.y, v7.y), elementwise_49_of_one(v1.z, v4.z, v7.z), elementwise_49_of_one(v1.w, v4.w, v7.w));
 }
-fn elementwise_67_of_one(v50: f32, v52: f32, v55: f32) -> f32
-{
+fn elementwise_67_of_one(v50: f32, v52: f32, v55: f32) -> f32 {
     let t51: i32 = i32(v50);
     let t53: i32 = i32(v52);
     let t54: i32 = t51 * t53;
@@ -65,8 +62,7 @@ fn elementwise_67_of_one(v50: f32, v52: f32, v55: f32) -> f32
     let t67: f32 = t65 * 1.52587891e-05f;
     return t67;
 }
-fn elementwise_67(v50: vec4<f32>, v52: vec4<f32>, v55: vec4<f32>) -> vec4<f32>
-{
+fn elementwise_67(v50: vec4<f32>, v52: vec4<f32>, v55: vec4<f32>) -> vec4<f32> {
     return vec4<f32>(elementwise_67_of_one(v50.x, v52.x, v55.x), elementwise_67_of_one(v50.y, v52.y, v55.y), elementwise_67_of_one(v50.z, v52.z, v55.z), elementwise_67_of_one(v50.w, v52.w, v55.w));
 }
 struct Size {
@@ -113,25 +109,30 @@ fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_
 
     /* %1: affine map W0 from 20 to 3 */
     var s1_0_0: vec4<i32> = vec4<i32>(0);
-    workgroupBarrier();
     for (var i: i32 = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         let tile_row: i32 = top + i / TILE_WIDTH;
         let tile_column: i32 = left + i % TILE_WIDTH;
         let row: i32 = clamp(tile_row, 0, height - 1);
         let column: i32 = clamp(tile_column, 0, width - 1);
         let inside: bool = row == tile_row && column == tile_column;
-        tile[0 * PLANE + i] = wamnet_packed(select(0.0f, image_a[(row * width + column) * 3 + 0], inside), select(0.0f, image_a[(row * width + column) * 3 + 1], inside), select(0.0f, image_a[(row * width + column) * 3 + 2], inside), select(0.0f, image_b[(row * width + column) * 2 + 0], inside));
-        tile[1 * PLANE + i] = wamnet_packed(select(0.0f, image_b[(row * width + column) * 2 + 1], inside), 0.0f, 0.0f, 0.0f);
+        tile[i] = wamnet_packed(select(0.0f, image_a[(row * width + column) * 3 + 0], inside), select(0.0f, image_a[(row * width + column) * 3 + 1], inside), select(0.0f, image_a[(row * width + column) * 3 + 2], inside), select(0.0f, image_b[(row * width + column) * 2 + 0], inside));
+        tile[PLANE + i] = wamnet_packed(select(0.0f, image_b[(row * width + column) * 2 + 1], inside), 0.0f, 0.0f, 0.0f);
     }
     workgroupBarrier();
     for (var dy: i32 = 0; dy < WINDOW_SIZE; dy++) {
         for (var dx: i32 = 0; dx < WINDOW_SIZE; dx++) {
             let at: i32 = (local_y + dy) * TILE_WIDTH + local_x + dx;
-            let first: i32 = 0 + (dy * WINDOW_SIZE + dx) * 2;
-            let x0_0: i32 = tile[0 * PLANE + at + 0 * GROUP_WIDTH];
-            { var m: vec4<i32> = w[first + 0 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x0_0); }
-            let x1_0: i32 = tile[1 * PLANE + at + 0 * GROUP_WIDTH];
-            { var m: vec4<i32> = w[first + 1 + 0]; s1_0_0 = wamnet_dots(s1_0_0, m, x1_0); }
+            let first: i32 = (dy * WINDOW_SIZE + dx) * 2;
+            let x0_0: i32 = tile[at];
+            {
+                let m: vec4<i32> = w[first];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x0_0);
+            }
+            let x1_0: i32 = tile[PLANE + at];
+            {
+                let m: vec4<i32> = w[first + 1];
+                s1_0_0 = wamnet_dots(s1_0_0, m, x1_0);
+            }
         }
     }
     var v1_0_0: vec4<f32> = wamnet_floats(s1_0_0);
@@ -142,16 +143,19 @@ fn main(@builtin(local_invocation_id) item_place: vec3<u32>, @builtin(workgroup_
     /* %50: affine map W1 from 3 to 3 */
     var s50_0_0: vec4<i32> = vec4<i32>(0);
     let b50_0_0: i32 = wamnet_packed(v49_0_0.x, v49_0_0.y, v49_0_0.z, v49_0_0.w);
-    { var m: vec4<i32> = w[10 + 0]; s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0); }
+    {
+        let m: vec4<i32> = w[10];
+        s50_0_0 = wamnet_dots(s50_0_0, m, b50_0_0);
+    }
     var v50_0_0: vec4<f32> = wamnet_floats(s50_0_0);
 
     /* %51 to %67: elementwise on 3 numbers */
     var v67_0_0: vec4<f32> = elementwise_67(v50_0_0, wamnet_numbers(w[11]), wamnet_numbers(w[12]));
 
     /* output color */
-    if (x + 0 * GROUP_WIDTH < width && y < height) {
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 0] = v67_0_0.x;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 1] = v67_0_0.y;
-        result[(y * width + x + 0 * GROUP_WIDTH) * 3 + 2] = v67_0_0.z;
+    if (x < width && y < height) {
+        result[(y * width + x) * 3 + 0] = v67_0_0.x;
+        result[(y * width + x) * 3 + 1] = v67_0_0.y;
+        result[(y * width + x) * 3 + 2] = v67_0_0.z;
     }
 }

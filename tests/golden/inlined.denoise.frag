@@ -25,24 +25,9 @@
 #else
 #error the error bound needs `precise`: GL_ARB_gpu_shader5, or #version 400
 #endif
-uniform sampler2D image_i0;
-uniform sampler2D image_i1;
-layout(location = 0) out vec4 result;
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
-vec2 tap_i0(ivec2 at)
-{
-    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_i0, 0) - 1);
-    vec2 texel = texelFetch(image_i0, nearest, 0).rg;
-    return at == nearest ? texel : vec2(0.0f);
-}
-float tap_i1(ivec2 at)
-{
-    ivec2 nearest = clamp(at, ivec2(0), textureSize(image_i1, 0) - 1);
-    float texel = texelFetch(image_i1, nearest, 0).r;
-    return at == nearest ? texel : float(0.0f);
-}
-void elementwise_3(vec4 v1, out vec4 v49)
+vec4 elementwise_49(vec4 v1)
 {
     PRECISE vec4 t3 = v1 * 0.318309873f;
     PRECISE vec4 t5 = t3 + 0.5f;
@@ -72,80 +57,148 @@ void elementwise_3(vec4 v1, out vec4 v49)
     PRECISE vec4 t39 = t15 * t38;
     PRECISE vec4 t40 = t15 + t39;
     PRECISE vec4 t41 = t23 * t40;
-    PRECISE vec4 t42 = min(vec4(t41), vec4(1.0f));
-    PRECISE vec4 t44 = max(vec4(t42), vec4((-1.0f)));
+    PRECISE vec4 t42 = min(t41, vec4(1.0f));
+    PRECISE vec4 t44 = max(t42, vec4(-1.0f));
     PRECISE vec4 t45 = abs(v1);
-    bvec4 t47 = lessThanEqual(vec4(t45), vec4(12800.0f));
+    bvec4 t47 = lessThanEqual(t45, vec4(12800.0f));
     PRECISE vec4 t48 = v1 - v1;
-    PRECISE vec4 t49 = mix(vec4(t48), vec4(t44), t47);
-    v49 = t49;
+    PRECISE vec4 t49 = mix(t48, t44, t47);
+    return t49;
 }
-void elementwise_52(vec4 v50, out vec4 v53)
+vec4 elementwise_53(vec4 v50)
 {
-    PRECISE vec4 t52 = max(vec4(v50), vec4(0.0f));
-    PRECISE vec4 t53 = min(vec4(t52), vec4(1.0f));
-    v53 = t53;
+    PRECISE vec4 t52 = max(v50, vec4(0.0f));
+    PRECISE vec4 t53 = min(t52, vec4(1.0f));
+    return t53;
 }
+uniform sampler2D image_i0;
+uniform sampler2D image_i1;
+layout(location = 0) out vec4 result;
+
 void main()
 {
+    int width = textureSize(image_i0, 0).x;
+    int height = textureSize(image_i0, 0).y;
     int x = int(gl_FragCoord.x);
     int y = int(gl_FragCoord.y);
     result = vec4(0.0, 0.0, 0.0, 1.0);
 
     /* %1: affine map W0 from 12 to 5 */
-    vec4 v1_0 = vec4(-0.03125f, 0.0f, 0.25f, 0.4375f);
-    vec4 v1_1 = vec4(-0.46875f, 0.0f, 0.0f, 0.0f);
-    vec2 i0_1;
-    float i1_1;
-    PRECISE vec4 part1_0, part1_1;
-    i0_1 = tap_i0(ivec2(x, y) + ivec2(-1, -1));
-    part1_0 = mat2x4(-0.03125f, -0.234375f, 0.3125f, 0.390625f, 0.0f, 0.3125f, -0.171875f, -0.296875f) * i0_1;
-    part1_1 = mat2x4(0.234375f, 0.0f, 0.0f, 0.0f, 0.453125f, 0.0f, 0.0f, 0.0f) * i0_1;
-    i0_1 = tap_i0(ivec2(x, y) + ivec2(0, -1));
-    part1_0 += mat2x4(0.4375f, -0.09375f, 0.28125f, -0.25f, -0.46875f, 0.140625f, -0.390625f, -0.484375f) * i0_1;
-    part1_1 += mat2x4(0.21875f, 0.0f, 0.0f, 0.0f, -0.21875f, 0.0f, 0.0f, 0.0f) * i0_1;
-    v1_0 += part1_0;
-    v1_1 += part1_1;
-    i0_1 = tap_i0(ivec2(x, y) + ivec2(-1, 0));
-    part1_0 = mat2x4(0.3125f, -0.421875f, -0.390625f, -0.453125f, 0.4375f, -0.484375f, -0.046875f, -0.234375f) * i0_1;
-    part1_1 = mat2x4(0.421875f, 0.0f, 0.0f, 0.0f, -0.234375f, 0.0f, 0.0f, 0.0f) * i0_1;
-    i0_1 = tap_i0(ivec2(x, y) + ivec2(0, 0));
-    part1_0 += mat2x4(-0.203125f, 0.25f, -0.375f, -0.015625f, 0.359375f, 0.328125f, -0.125f, -0.390625f) * i0_1;
-    part1_1 += mat2x4(-0.34375f, 0.0f, 0.0f, 0.0f, -0.1875f, 0.0f, 0.0f, 0.0f) * i0_1;
-    v1_0 += part1_0;
-    v1_1 += part1_1;
-    i1_1 = tap_i1(ivec2(x, y) + ivec2(-1, -1));
-    part1_0 = vec4(0.25f, -0.25f, -0.0625f, 0.0f) * i1_1;
-    part1_1 = vec4(-0.421875f, 0.0f, 0.0f, 0.0f) * i1_1;
-    i1_1 = tap_i1(ivec2(x, y) + ivec2(0, -1));
-    part1_0 += vec4(-0.359375f, 0.046875f, -0.203125f, 0.25f) * i1_1;
-    part1_1 += vec4(0.03125f, 0.0f, 0.0f, 0.0f) * i1_1;
-    v1_0 += part1_0;
-    v1_1 += part1_1;
-    i1_1 = tap_i1(ivec2(x, y) + ivec2(-1, 0));
-    part1_0 = vec4(-0.265625f, 0.359375f, 0.46875f, -0.015625f) * i1_1;
-    part1_1 = vec4(0.21875f, 0.0f, 0.0f, 0.0f) * i1_1;
-    i1_1 = tap_i1(ivec2(x, y) + ivec2(0, 0));
-    part1_0 += vec4(-0.078125f, 0.03125f, -0.109375f, 0.46875f) * i1_1;
-    part1_1 += vec4(0.46875f, 0.0f, 0.0f, 0.0f) * i1_1;
-    v1_0 += part1_0;
-    v1_1 += part1_1;
+    vec4 v1_0 = vec4((-0.03125f), 0.0f, 0.25f, 0.4375f);
+    vec4 v1_1 = vec4((-0.46875f), 0.0f, 0.0f, 0.0f);
+    {
+        vec4 part1_0 = vec4(0.0f);
+        vec4 part1_1 = vec4(0.0f);
+        {
+            int row = clamp(y - 1, 0, height - 1);
+            int column = clamp(x - 1, 0, width - 1);
+            bool inside = row == y - 1 && column == x - 1;
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
+            part1_0 += vec4((-0.03125f), (-0.234375f), 0.3125f, 0.390625f) * i0.x;
+            part1_1 += vec4(0.234375f, 0.0f, 0.0f, 0.0f) * i0.x;
+            part1_0 += vec4(0.0f, 0.3125f, (-0.171875f), (-0.296875f)) * i0.y;
+            part1_1 += vec4(0.453125f, 0.0f, 0.0f, 0.0f) * i0.y;
+        }
+        {
+            int row = clamp(y - 1, 0, height - 1);
+            int column = clamp(x + 1 - 1, 0, width - 1);
+            bool inside = row == y - 1 && column == x + 1 - 1;
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
+            part1_0 += vec4(0.4375f, (-0.09375f), 0.28125f, (-0.25f)) * i0.x;
+            part1_1 += vec4(0.21875f, 0.0f, 0.0f, 0.0f) * i0.x;
+            part1_0 += vec4((-0.46875f), 0.140625f, (-0.390625f), (-0.484375f)) * i0.y;
+            part1_1 += vec4((-0.21875f), 0.0f, 0.0f, 0.0f) * i0.y;
+        }
+        v1_0 += part1_0;
+        v1_1 += part1_1;
+    }
+    {
+        vec4 part1_0 = vec4(0.0f);
+        vec4 part1_1 = vec4(0.0f);
+        {
+            int row = clamp(y + 1 - 1, 0, height - 1);
+            int column = clamp(x - 1, 0, width - 1);
+            bool inside = row == y + 1 - 1 && column == x - 1;
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
+            part1_0 += vec4(0.3125f, (-0.421875f), (-0.390625f), (-0.453125f)) * i0.x;
+            part1_1 += vec4(0.421875f, 0.0f, 0.0f, 0.0f) * i0.x;
+            part1_0 += vec4(0.4375f, (-0.484375f), (-0.046875f), (-0.234375f)) * i0.y;
+            part1_1 += vec4((-0.234375f), 0.0f, 0.0f, 0.0f) * i0.y;
+        }
+        {
+            int row = clamp(y + 1 - 1, 0, height - 1);
+            int column = clamp(x + 1 - 1, 0, width - 1);
+            bool inside = row == y + 1 - 1 && column == x + 1 - 1;
+            vec2 i0 = inside ? texelFetch(image_i0, ivec2(column, row), 0).rg : vec2(0.0f);
+            part1_0 += vec4((-0.203125f), 0.25f, (-0.375f), (-0.015625f)) * i0.x;
+            part1_1 += vec4((-0.34375f), 0.0f, 0.0f, 0.0f) * i0.x;
+            part1_0 += vec4(0.359375f, 0.328125f, (-0.125f), (-0.390625f)) * i0.y;
+            part1_1 += vec4((-0.1875f), 0.0f, 0.0f, 0.0f) * i0.y;
+        }
+        v1_0 += part1_0;
+        v1_1 += part1_1;
+    }
+    {
+        vec4 part1_0 = vec4(0.0f);
+        vec4 part1_1 = vec4(0.0f);
+        {
+            int row = clamp(y - 1, 0, height - 1);
+            int column = clamp(x - 1, 0, width - 1);
+            bool inside = row == y - 1 && column == x - 1;
+            float i1 = inside ? texelFetch(image_i1, ivec2(column, row), 0)[0] : 0.0f;
+            part1_0 += vec4(0.25f, (-0.25f), (-0.0625f), 0.0f) * i1;
+            part1_1 += vec4((-0.421875f), 0.0f, 0.0f, 0.0f) * i1;
+        }
+        {
+            int row = clamp(y - 1, 0, height - 1);
+            int column = clamp(x + 1 - 1, 0, width - 1);
+            bool inside = row == y - 1 && column == x + 1 - 1;
+            float i1 = inside ? texelFetch(image_i1, ivec2(column, row), 0)[0] : 0.0f;
+            part1_0 += vec4((-0.359375f), 0.046875f, (-0.203125f), 0.25f) * i1;
+            part1_1 += vec4(0.03125f, 0.0f, 0.0f, 0.0f) * i1;
+        }
+        v1_0 += part1_0;
+        v1_1 += part1_1;
+    }
+    {
+        vec4 part1_0 = vec4(0.0f);
+        vec4 part1_1 = vec4(0.0f);
+        {
+            int row = clamp(y + 1 - 1, 0, height - 1);
+            int column = clamp(x - 1, 0, width - 1);
+            bool inside = row == y + 1 - 1 && column == x - 1;
+            float i1 = inside ? texelFetch(image_i1, ivec2(column, row), 0)[0] : 0.0f;
+            part1_0 += vec4((-0.265625f), 0.359375f, 0.46875f, (-0.015625f)) * i1;
+            part1_1 += vec4(0.21875f, 0.0f, 0.0f, 0.0f) * i1;
+        }
+        {
+            int row = clamp(y + 1 - 1, 0, height - 1);
+            int column = clamp(x + 1 - 1, 0, width - 1);
+            bool inside = row == y + 1 - 1 && column == x + 1 - 1;
+            float i1 = inside ? texelFetch(image_i1, ivec2(column, row), 0)[0] : 0.0f;
+            part1_0 += vec4((-0.078125f), 0.03125f, (-0.109375f), 0.46875f) * i1;
+            part1_1 += vec4(0.46875f, 0.0f, 0.0f, 0.0f) * i1;
+        }
+        v1_0 += part1_0;
+        v1_1 += part1_1;
+    }
 
     /* %3 to %49: elementwise on 5 numbers */
-    vec4 v49_0;
-    elementwise_3(v1_0, v49_0);
-    vec4 v49_1;
-    elementwise_3(v1_1, v49_1);
+    vec4 v49_0 = elementwise_49(v1_0);
+    vec4 v49_1 = elementwise_49(v1_1);
 
     /* %50: affine map W1 from 5 to 2 */
     vec4 v50_0 = vec4(0.0f);
-    v50_0 += mat4x4(0.328125f, 0.3125f, 0.0f, 0.0f, -0.25f, -0.0625f, 0.0f, 0.0f, -0.40625f, -0.421875f, 0.0f, 0.0f, -0.203125f, -0.171875f, 0.0f, 0.0f) * v49_0.xyzw;
-    v50_0 += vec4(-0.09375f, 0.09375f, 0.0f, 0.0f) * v49_1.x;
+    v50_0 += vec4(0.328125f, 0.3125f, 0.0f, 0.0f) * v49_0.x;
+    v50_0 += vec4((-0.25f), (-0.0625f), 0.0f, 0.0f) * v49_0.y;
+    v50_0 += vec4((-0.40625f), (-0.421875f), 0.0f, 0.0f) * v49_0.z;
+    v50_0 += vec4((-0.203125f), (-0.171875f), 0.0f, 0.0f) * v49_0.w;
+    v50_0 += vec4((-0.09375f), 0.09375f, 0.0f, 0.0f) * v49_1.x;
 
     /* %52 to %53: elementwise on 2 numbers */
-    vec4 v53_0;
-    elementwise_52(v50_0, v53_0);
+    vec4 v53_0 = elementwise_53(v50_0);
 
     /* output color */
-    result.xy = v53_0.xy;
+    result[0] = v53_0.x;
+    result[1] = v53_0.y;
 }

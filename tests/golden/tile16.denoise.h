@@ -14,8 +14,8 @@
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
- *           wamnet_image does the whole picture, wamnet_pixel 14 neighbours of a row from (x, y) on:
- *           call that from your own loops, for each x that is a multiple of 14
+ *           wamnet_image does the whole picture, wamnet_pixel 14 x 1 pixels from (x, y) on:
+ *           call that from your own loops, for each x that is a multiple of 14 and each y of 1
  *           stack: 14108 bytes at most, without optimisation too
  * weights   W0 (1 x 12 x 16) at 0, b0 (16) at 192, W1 (1 x 5 x 16) at 208; vectors filled up with
  *           zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows of one that
@@ -33,8 +33,6 @@
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
-#define WINDOW_SIZE 2
-#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 /* A product may be fused with a sum: the bound holds either way. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
@@ -42,8 +40,10 @@
 #else
 #pragma STDC FP_CONTRACT ON
 #endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 #define PIXELS 14 /* neighbours in a row that a work item computes */
-#define LANES 16 /* numbers in a vector */
+#define LANES 16 /* components of a vector */
 #define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 #if defined(__clang__)
 #define WAMNET_UNROLL _Pragma("unroll")
@@ -138,8 +138,8 @@ static inline void wamnet_add_product(
 }
 #endif
 
-/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written to
-   `result`, the whole picture's array. */
+/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -185,55 +185,51 @@ static inline void wamnet_pixel(
 
     /* the images around the pixels: what lies beyond the border is filled in here */
     float patch_i0[WINDOW_SIZE * PATCH_WIDTH * 2];
-    float patch_i1[WINDOW_SIZE * PATCH_WIDTH * 1];
+    float patch_i1[WINDOW_SIZE * PATCH_WIDTH];
     int left = x - WINDOW_CENTRE;
     int top = y - WINDOW_CENTRE;
-    bool within = left >= 0 && left + PATCH_WIDTH <= width && top >= 0 && top + WINDOW_SIZE <= height;
+    bool within = 0 <= left && left + PATCH_WIDTH <= width && 0 <= top && top + WINDOW_SIZE <= height;
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(top + dy, 0, height - 1);
-        float *to_i0 = patch_i0 + dy * PATCH_WIDTH * 2;
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 2; ++i) {
-                to_i0[i] = image_i0[(row * width + left) * 2 + i];
+                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[(row * width + left) * 2 + i];
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
-                bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+                bool inside = row == top + dy && column == left + dx;
                 for (int c = 0; c < 2; ++c) {
-                    to_i0[dx * 2 + c] = inside ? image_i0[(row * width + column) * 2 + c] : 0.0f;
+                    patch_i0[dy * PATCH_WIDTH * 2 + dx * 2 + c] = inside ? image_i0[(row * width + column) * 2 + c] : 0.0f;
                 }
             }
         }
-        float *to_i1 = patch_i1 + dy * PATCH_WIDTH * 1;
         if (within) {
-            for (int i = 0; i < PATCH_WIDTH * 1; ++i) {
-                to_i1[i] = image_i1[(row * width + left) * 1 + i];
+            for (int i = 0; i < PATCH_WIDTH; ++i) {
+                patch_i1[dy * PATCH_WIDTH + i] = image_i1[(row * width + left) * 1 + i];
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
-                bool inside = row == y + dy - WINDOW_CENTRE && column == x + dx - WINDOW_CENTRE;
+                bool inside = row == top + dy && column == left + dx;
                 for (int c = 0; c < 1; ++c) {
-                    to_i1[dx * 1 + c] = inside ? image_i1[(row * width + column) * 1 + c] : 0.0f;
+                    patch_i1[dy * PATCH_WIDTH + dx + c] = inside ? image_i1[(row * width + column) * 1 + c] : 0.0f;
                 }
             }
         }
     }
 
     /* %1: affine map W0 from 12 to 5 */
-    float v1[PIXELS * 1 * LANES];
+    float v1[PIXELS * LANES];
     {
-        const float *w = weights;
         wamnet_vector sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_load(&sum[p][0], weights + 192 + (0) * LANES);
+            wamnet_load(&sum[p][0], weights + 12 * LANES);
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const float *row = patch_i0 + dy * PATCH_WIDTH * 2;
             wamnet_vector part[PIXELS][1];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
@@ -241,11 +237,10 @@ static inline void wamnet_pixel(
             }
             for (int i = 0; i < WINDOW_SIZE * 2; ++i) {
                 wamnet_vector w0;
-                wamnet_load(&w0, w + 0 * LANES);
-                w += 1 * LANES;
+                wamnet_load(&w0, weights + (dy * 4 + i) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    float value = row[p * 2 + i];
+                    float value = patch_i0[(dy * PATCH_WIDTH + p) * 2 + i];
                     wamnet_add_product(&part[p][0], &w0, value);
                 }
             }
@@ -255,19 +250,17 @@ static inline void wamnet_pixel(
             }
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const float *row = patch_i1 + dy * PATCH_WIDTH * 1;
             wamnet_vector part[PIXELS][1];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
                 wamnet_clear(&part[p][0]);
             }
-            for (int i = 0; i < WINDOW_SIZE * 1; ++i) {
+            for (int i = 0; i < WINDOW_SIZE; ++i) {
                 wamnet_vector w0;
-                wamnet_load(&w0, w + 0 * LANES);
-                w += 1 * LANES;
+                wamnet_load(&w0, weights + (dy * 2 + 8 + i) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    float value = row[p * 1 + i];
+                    float value = patch_i1[dy * PATCH_WIDTH + p + i];
                     wamnet_add_product(&part[p][0], &w0, value);
                 }
             }
@@ -278,13 +271,13 @@ static inline void wamnet_pixel(
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v1 + (p * 1 + 0) * LANES, &sum[p][0]);
+            wamnet_store(v1 + (p) * LANES, &sum[p][0]);
         }
     }
 
     /* %3 to %49: elementwise on 5 numbers */
-    float v49[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
+    float v49[PIXELS * LANES];
+    for (int i = 0; i < PIXELS * LANES; ++i) {
         float t5 = v1[i] * 0.318309873f + 0.5f;
         float t6 = floorf(t5);
         float t9 = v1[i] - t6 * 3.14160156f;
@@ -312,9 +305,8 @@ static inline void wamnet_pixel(
     }
 
     /* %50: affine map W1 from 5 to 2 */
-    float v50[PIXELS * 1 * LANES];
+    float v50[PIXELS * LANES];
     {
-        const float *w = weights + 208;
         wamnet_vector sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
@@ -322,23 +314,22 @@ static inline void wamnet_pixel(
         }
         for (int i = 0; i < 5; ++i) {
             wamnet_vector w0;
-            wamnet_load(&w0, w + 0 * LANES);
-            w += 1 * LANES;
+            wamnet_load(&w0, weights + (13 + i) * LANES);
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                float value = v49[p * 1 * LANES + i];
+                float value = v49[p * LANES + i];
                 wamnet_add_product(&sum[p][0], &w0, value);
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v50 + (p * 1 + 0) * LANES, &sum[p][0]);
+            wamnet_store(v50 + (p) * LANES, &sum[p][0]);
         }
     }
 
     /* %52 to %53: elementwise on 2 numbers */
-    float v53[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
+    float v53[PIXELS * LANES];
+    for (int i = 0; i < PIXELS * LANES; ++i) {
         float t52 = 0.0f > v50[i] ? 0.0f : v50[i];
         float t53 = 1.0f < t52 ? 1.0f : t52;
         v53[i] = t53;
@@ -347,7 +338,7 @@ static inline void wamnet_pixel(
     /* output color */
     for (int p = 0; p < PIXELS && x + p < width; ++p) {
         for (int i = 0; i < 2; ++i) {
-            result[(y * width + x + p) * 2 + i] = v53[p * 1 * LANES + i];
+            result[(y * width + x + p) * 2 + i] = v53[p * LANES + i];
         }
     }
 }

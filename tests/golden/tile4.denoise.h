@@ -1,21 +1,21 @@
 /*
  * wamnet denoiser, C99. Generated: change the compiler, not this text.
- * program   d85fd24e857516480a7fcd965cfaf43b
+ * program   7e16e82121005387e64379c3ddd150bb
  * images    i0: 2 channels in [-1.0, 1.0]
  *           i1: 1 channels in [-1.0, 1.0]
  * window    2 x 2 pixels, the pixel itself is tap 1
  * border    clamp
  * output    2 channels
- * profile   exact: the same bits on every target: one order of summation, every operation rounded, emitted sine
- * sine      emitted, odd polynomial of degree 11, 0 where the reduced argument is below 9.09495e-13
+ * profile   ieee: any order of summation, fused multiply-add allowed, emitted sine
+ * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  tile4: the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.
- *           wamnet_image does the whole picture, wamnet_pixel 6 neighbours of a row from (x, y) on:
- *           call that from your own loops, for each x that is a multiple of 6
+ *           wamnet_image does the whole picture, wamnet_pixel 6 x 1 pixels from (x, y) on:
+ *           call that from your own loops, for each x that is a multiple of 6 and each y of 1
  *           stack: 9308 bytes at most, without optimisation too
  * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up with zeros;
  *           matrices block by block of neurons: blocks x D_in x neurons; the rows of one that reads
@@ -33,19 +33,17 @@
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
-#define WINDOW_SIZE 2
-#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
-/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
-   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
-   others may ignore both. */
+/* A product may be fused with a sum: the bound holds either way. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=fast")
 #else
-#pragma STDC FP_CONTRACT OFF
+#pragma STDC FP_CONTRACT ON
 #endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 #define PIXELS 6 /* neighbours in a row that a work item computes */
-#define LANES 4 /* numbers in a vector */
+#define LANES 4 /* components of a vector */
 #define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 #if defined(__clang__)
 #define WAMNET_UNROLL _Pragma("unroll")
@@ -140,8 +138,8 @@ static inline void wamnet_add_product(
 }
 #endif
 
-/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written to
-   `result`, the whole picture's array. */
+/* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
+   to `result`, the whole image's array. */
 static inline void wamnet_pixel(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -187,41 +185,35 @@ static inline void wamnet_pixel(
 
     /* the images around the pixels: what lies beyond the border is filled in here */
     float patch_i0[WINDOW_SIZE * PATCH_WIDTH * 2];
-    float patch_i1[WINDOW_SIZE * PATCH_WIDTH * 1];
+    float patch_i1[WINDOW_SIZE * PATCH_WIDTH];
     int left = x - WINDOW_CENTRE;
     int top = y - WINDOW_CENTRE;
-    bool within = left >= 0 && left + PATCH_WIDTH <= width && top >= 0 && top + WINDOW_SIZE <= height;
+    bool within = 0 <= left && left + PATCH_WIDTH <= width && 0 <= top && top + WINDOW_SIZE <= height;
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
         int row = wamnet_clamp(top + dy, 0, height - 1);
-        float *to_i0 = patch_i0 + dy * PATCH_WIDTH * 2;
         if (within) {
             for (int i = 0; i < PATCH_WIDTH * 2; ++i) {
-                float value = image_i0[(row * width + left) * 2 + i];
-                to_i0[i] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+                patch_i0[dy * PATCH_WIDTH * 2 + i] = image_i0[(row * width + left) * 2 + i];
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
                 for (int c = 0; c < 2; ++c) {
-                    float value = image_i0[(row * width + column) * 2 + c];
-                    to_i0[dx * 2 + c] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+                    patch_i0[dy * PATCH_WIDTH * 2 + dx * 2 + c] = image_i0[(row * width + column) * 2 + c];
                 }
             }
         }
-        float *to_i1 = patch_i1 + dy * PATCH_WIDTH * 1;
         if (within) {
-            for (int i = 0; i < PATCH_WIDTH * 1; ++i) {
-                float value = image_i1[(row * width + left) * 1 + i];
-                to_i1[i] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+            for (int i = 0; i < PATCH_WIDTH; ++i) {
+                patch_i1[dy * PATCH_WIDTH + i] = image_i1[(row * width + left) * 1 + i];
             }
         }
         else {
             for (int dx = 0; dx < PATCH_WIDTH; ++dx) {
                 int column = wamnet_clamp(left + dx, 0, width - 1);
                 for (int c = 0; c < 1; ++c) {
-                    float value = image_i1[(row * width + column) * 1 + c];
-                    to_i1[dx * 1 + c] = fabsf(value) < 9.09494702e-13f ? 0.0f : value;
+                    patch_i1[dy * PATCH_WIDTH + dx + c] = image_i1[(row * width + column) * 1 + c];
                 }
             }
         }
@@ -230,15 +222,13 @@ static inline void wamnet_pixel(
     /* %1: affine map W0 from 12 to 5 */
     float v1[PIXELS * 2 * LANES];
     {
-        const float *w = weights;
         wamnet_vector sum[PIXELS][2];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_load(&sum[p][0], weights + 96 + (0) * LANES);
-            wamnet_load(&sum[p][1], weights + 96 + (1) * LANES);
+            wamnet_load(&sum[p][0], weights + 24 * LANES);
+            wamnet_load(&sum[p][1], weights + 25 * LANES);
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const float *row = patch_i0 + dy * PATCH_WIDTH * 2;
             wamnet_vector part[PIXELS][2];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
@@ -247,13 +237,12 @@ static inline void wamnet_pixel(
             }
             for (int i = 0; i < WINDOW_SIZE * 2; ++i) {
                 wamnet_vector w0;
-                wamnet_load(&w0, w + 0 * LANES);
+                wamnet_load(&w0, weights + (dy * 4 * 2 + i * 2) * LANES);
                 wamnet_vector w1;
-                wamnet_load(&w1, w + 1 * LANES);
-                w += 2 * LANES;
+                wamnet_load(&w1, weights + (dy * 4 * 2 + i * 2 + 1) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    float value = row[p * 2 + i];
+                    float value = patch_i0[(dy * PATCH_WIDTH + p) * 2 + i];
                     wamnet_add_product(&part[p][0], &w0, value);
                     wamnet_add_product(&part[p][1], &w1, value);
                 }
@@ -265,22 +254,20 @@ static inline void wamnet_pixel(
             }
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-            const float *row = patch_i1 + dy * PATCH_WIDTH * 1;
             wamnet_vector part[PIXELS][2];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
                 wamnet_clear(&part[p][0]);
                 wamnet_clear(&part[p][1]);
             }
-            for (int i = 0; i < WINDOW_SIZE * 1; ++i) {
+            for (int i = 0; i < WINDOW_SIZE; ++i) {
                 wamnet_vector w0;
-                wamnet_load(&w0, w + 0 * LANES);
+                wamnet_load(&w0, weights + ((dy * 2 + 8) * 2 + i * 2) * LANES);
                 wamnet_vector w1;
-                wamnet_load(&w1, w + 1 * LANES);
-                w += 2 * LANES;
+                wamnet_load(&w1, weights + ((dy * 2 + 8) * 2 + i * 2 + 1) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    float value = row[p * 1 + i];
+                    float value = patch_i1[dy * PATCH_WIDTH + p + i];
                     wamnet_add_product(&part[p][0], &w0, value);
                     wamnet_add_product(&part[p][1], &w1, value);
                 }
@@ -293,45 +280,43 @@ static inline void wamnet_pixel(
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v1 + (p * 2 + 0) * LANES, &sum[p][0]);
+            wamnet_store(v1 + (p * 2) * LANES, &sum[p][0]);
             wamnet_store(v1 + (p * 2 + 1) * LANES, &sum[p][1]);
         }
     }
 
-    /* %3 to %50: elementwise on 5 numbers */
-    float v50[PIXELS * 2 * LANES];
+    /* %3 to %49: elementwise on 5 numbers */
+    float v49[PIXELS * 2 * LANES];
     for (int i = 0; i < PIXELS * 2 * LANES; ++i) {
         float t5 = v1[i] * 0.318309873f + 0.5f;
         float t6 = floorf(t5);
         float t9 = v1[i] - t6 * 3.14160156f;
         float t12 = t9 - t6 * (-8.9071691e-06f);
         float t15 = t12 - t6 * (-1.74122761e-09f);
-        float t16 = fabsf(t15);
-        float t18 = t16 * 1.09951163e+12f;
-        float t19 = floorf(t18);
-        float t21 = 1.0f < t19 ? 1.0f : t19;
-        float t22 = t15 * t21;
-        float t23 = 0.5f * t6;
-        float t24 = floorf(t23);
-        float t27 = t6 - 2.0f * t24;
-        float t29 = 1.0f - 2.0f * t27;
-        float t30 = t22 * t22;
-        float t34 = t30 * (-2.51969432e-08f) + 2.76094511e-06f;
-        float t37 = t30 * t34 + (-0.000198427704f);
-        float t40 = t30 * t37 + 0.00833334867f;
-        float t43 = t30 * t40 + (-0.166666672f);
-        float t44 = t30 * t43;
-        float t46 = t22 + t22 * t44;
-        float t47 = t29 * t46;
-        float t48 = 1.0f < t47 ? 1.0f : t47;
-        float t50 = (-1.0f) > t48 ? (-1.0f) : t48;
-        v50[i] = t50;
+        float t16 = 0.5f * t6;
+        float t17 = floorf(t16);
+        float t20 = t6 - 2.0f * t17;
+        float t23 = 1.0f - 2.0f * t20;
+        float t24 = t15 * t15;
+        float t28 = t24 * (-2.51969432e-08f) + 2.76094511e-06f;
+        float t31 = t24 * t28 + (-0.000198427704f);
+        float t34 = t24 * t31 + 0.00833334867f;
+        float t37 = t24 * t34 + (-0.166666672f);
+        float t38 = t24 * t37;
+        float t40 = t15 + t15 * t38;
+        float t41 = t23 * t40;
+        float t42 = 1.0f < t41 ? 1.0f : t41;
+        float t44 = (-1.0f) > t42 ? (-1.0f) : t42;
+        float t45 = fabsf(v1[i]);
+        bool t47 = t45 <= 12800.0f;
+        float t48 = v1[i] - v1[i];
+        float t49 = t47 ? t44 : t48;
+        v49[i] = t49;
     }
 
-    /* %51: affine map W1 from 5 to 2 */
-    float v51[PIXELS * 1 * LANES];
+    /* %50: affine map W1 from 5 to 2 */
+    float v50[PIXELS * LANES];
     {
-        const float *w = weights + 104;
         wamnet_vector sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
@@ -339,32 +324,31 @@ static inline void wamnet_pixel(
         }
         for (int i = 0; i < 5; ++i) {
             wamnet_vector w0;
-            wamnet_load(&w0, w + 0 * LANES);
-            w += 1 * LANES;
+            wamnet_load(&w0, weights + (26 + i) * LANES);
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                float value = v50[p * 2 * LANES + i];
+                float value = v49[p * 2 * LANES + i];
                 wamnet_add_product(&sum[p][0], &w0, value);
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v51 + (p * 1 + 0) * LANES, &sum[p][0]);
+            wamnet_store(v50 + (p) * LANES, &sum[p][0]);
         }
     }
 
-    /* %53 to %54: elementwise on 2 numbers */
-    float v54[PIXELS * 1 * LANES];
-    for (int i = 0; i < PIXELS * 1 * LANES; ++i) {
-        float t53 = 0.0f > v51[i] ? 0.0f : v51[i];
-        float t54 = 1.0f < t53 ? 1.0f : t53;
-        v54[i] = t54;
+    /* %52 to %53: elementwise on 2 numbers */
+    float v53[PIXELS * LANES];
+    for (int i = 0; i < PIXELS * LANES; ++i) {
+        float t52 = 0.0f > v50[i] ? 0.0f : v50[i];
+        float t53 = 1.0f < t52 ? 1.0f : t52;
+        v53[i] = t53;
     }
 
     /* output color */
     for (int p = 0; p < PIXELS && x + p < width; ++p) {
         for (int i = 0; i < 2; ++i) {
-            result[(y * width + x + p) * 2 + i] = v54[p * 1 * LANES + i] == 0.0f ? 0.0f : v54[p * 1 * LANES + i];
+            result[(y * width + x + p) * 2 + i] = v53[p * LANES + i];
         }
     }
 }

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.kernels.run import before, frame_plan
-from wamnet.kernels.run.frame_plan import Request
+from wamnet.kernels.run import before
+from wamnet.models.data import frame_plan
+from wamnet.models.data.frame_plan import Request
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import HISTORY
 from wamnet.refimpl.light import history, scenes
@@ -36,14 +37,14 @@ def by_definition(picture, count):
 def test_a_noisy_picture_has_the_history_of_those_before_it():
     noisy, target = pictures()
     (task,) = noisy.tasks()
-    frame, wanted = frame_plan.carry_out(task), by_definition(noisy, 3)
+    frame, wanted = before.carry_out(task), by_definition(noisy, 3)
     for name, values in history.layers_of(wanted).items():
         assert np.array_equal(frame[name], values)
     assert np.array_equal(frame["color"], render(noisy.scene, noisy.job).frame["color"])
     assert float(frame["history_weight"].max()) > 0.5  # of four samples: 1 - 1/4 where all of them are known
     assert task.samples == 4 * 12 * 12
     (other,) = target.tasks()
-    assert not any(name in frame_plan.carry_out(other) for name in HISTORY)
+    assert not any(name in before.carry_out(other) for name in HISTORY)
 
 
 def test_pictures_before_have_samples_of_their_own():
@@ -67,9 +68,9 @@ def test_a_request_says_what_is_before_only_if_something_is():
     assert "before" not in replace(REQUEST, before=0).as_data()
 
 
-@pytest.mark.parametrize("count", [-1, before.MOST_BEFORE + 1])
+@pytest.mark.parametrize("count", [-1, frame_plan.MOST_BEFORE + 1])
 def test_numbers_that_mean_nothing_are_refused(count):
-    with pytest.raises(InputError, match=f"before is {count}: from 0 to 256 pictures"):
+    with pytest.raises(InputError, match=f"before {count}: must be from 0 to 256 frames"):
         frame_plan.plan(replace(REQUEST, before=count))
 
 

@@ -77,14 +77,14 @@ def test_a_file_that_is_too_large_is_no_entry(monkeypatch, caplog):
     cache.write_json("a", DATA)
     monkeypatch.setattr(cache, "LARGEST_BYTES", 20)
     assert cache.read_json("a") is None
-    assert "at most 20 bytes are read; remove it: it is ignored" in caplog.text
+    assert "at most 20 bytes are read (remove it): it is ignored" in caplog.text
 
 
 def test_what_cannot_be_read_or_written_costs_no_run(caplog):
     cache.folder().mkdir(parents=True)
     (cache.folder() / "a.json").mkdir()
     assert cache.read_json("a") is None
-    assert "it is a folder; give the name of a file in it: it is ignored" in caplog.text
+    assert "is a folder (give the name of a file in it): it is ignored" in caplog.text
     assert cache.write_json("a", DATA) is None
     assert "cannot be written" in caplog.text
     assert [file.name for file in cache.folder().iterdir()] == ["a.json"]

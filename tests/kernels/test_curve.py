@@ -94,27 +94,27 @@ def test_numbers_that_are_none_break_every_rule(number) -> None:
 
 def test_where_nothing_fits_the_nearest_point_is_named() -> None:
     with pytest.raises(
-        InputError, match=r"limit is --max-ms 30: no point .* nearest is rank16, schedule tile16"
+        InputError, match=r"limit '--max-ms 30': no point .* nearest is rank16, schedule tile16"
     ):
         choose(POINTS, Limits(max_ms=30.0))
     with pytest.raises(InputError, match=r"nearest is window8.*: 60 ms"):
         choose(POINTS, Limits(max_ms=50.0, max_error=0.1))
     with pytest.raises(
-        InputError, match="--max-loss-db -1: no point of the curve keeps it; the nearest is full"
+        InputError, match="--max-loss-db -1': no point of the curve keeps it; the nearest is full"
     ):
         choose(POINTS, Limits(max_loss_db=-1.0))
-    with pytest.raises(InputError, match="curve is 0 points: no point of the curve has a time"):
+    with pytest.raises(InputError, match="curve '0 points': no point of the curve has a time"):
         choose([], Limits(max_ms=1.0))
-    with pytest.raises(InputError, match="curve is 1 points: no point of the curve has a time"):
+    with pytest.raises(InputError, match="curve '1 points': no point of the curve has a time"):
         choose([replace(FULL, milliseconds=math.nan)], Limits())
 
 
 @pytest.mark.parametrize(
     ("limits", "rule"),
     [
-        (Limits(max_error=math.nan), "--max-error is nan: it must be finite and >= 0"),
-        (Limits(max_ms=-1.0), "--max-ms is -1.0: it must be finite and >= 0"),
-        (Limits(max_loss_db=math.inf), "--max-loss-db is inf: it must be finite"),
+        (Limits(max_error=math.nan), "--max-error nan: must be finite and >= 0"),
+        (Limits(max_ms=-1.0), "--max-ms -1.0: must be finite and >= 0"),
+        (Limits(max_loss_db=math.inf), "--max-loss-db inf: must be finite"),
     ],
 )
 def test_limits_that_mean_nothing_are_refused(limits, rule) -> None:
@@ -147,18 +147,18 @@ def damaged(change):
 
 
 DAMAGES = {
-    "x: schema is list": [],
-    "x: schema is missing: must be wamnet-curve-1": {},
-    "x: schema is wamnet-curve-0": damaged(lambda d: d.update(schema="wamnet-curve-0")),
-    "x: content is .*'points' is missing": damaged(lambda d: d.pop("points")),
-    "x: content is .*'milliseconds' is missing": damaged(lambda d: d["points"][0].pop("milliseconds")),
-    "x: content is .*could not convert": damaged(lambda d: d["points"][0].update(error_max="much")),
-    "variant is rank: 'rank' is not an approximation": damaged(
+    "x: schema 'list": [],
+    "x: schema 'missing': must be wamnet-curve-1": {},
+    "x: schema 'wamnet-curve-0": damaged(lambda d: d.update(schema="wamnet-curve-0")),
+    "x: content '.*'points' is missing": damaged(lambda d: d.pop("points")),
+    "x: content '.*'milliseconds' is missing": damaged(lambda d: d["points"][0].pop("milliseconds")),
+    "x: content '.*could not convert": damaged(lambda d: d["points"][0].update(error_max="much")),
+    "variant 'rank': 'rank' is not an approximation": damaged(
         lambda d: d["points"][0].update(variant="rank")
     ),
-    "x: content is .*variant, schedule and executor": damaged(lambda d: d["points"][0].update(schedule=3)),
-    "x: content is .*model, device and profile": damaged(lambda d: d.update(model=3)),
-    "x: content is .*not enough values": damaged(lambda d: d.update(size=[3])),
+    "x: content '.*variant, schedule and executor": damaged(lambda d: d["points"][0].update(schedule=3)),
+    "x: content '.*model, device and profile": damaged(lambda d: d.update(model=3)),
+    "x: content '.*not enough values": damaged(lambda d: d.update(size=[3])),
 }
 """What is said, and of which data."""
 
@@ -170,17 +170,17 @@ def test_data_that_are_no_curve_are_refused(message) -> None:
 
 
 def test_files_that_are_no_curve_are_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match=r"curve file is .*: it cannot be read"):
+    with pytest.raises(InputError, match=r"curve file '.*': not found"):
         curve.read(tmp_path / "none.json")
     (tmp_path / "half.json").write_text("{")
-    with pytest.raises(InputError, match=r"curve file .* is {: no JSON"):
+    with pytest.raises(InputError, match=r"curve file .* '{': is not acceptable JSON"):
         curve.read(tmp_path / "half.json")
 
 
 @pytest.mark.parametrize(("name", "value"), [("model", "other"), ("profile", "native")])
 def test_curves_of_something_else_are_refused(name, value) -> None:
     curve.check_fits(CURVE, CURVE, "x")
-    with pytest.raises(InputError, match=f"x: {name} is .*: this one is for {value}"):
+    with pytest.raises(InputError, match=f"x: {name} '.*': this one is for {value}"):
         curve.check_fits(CURVE, replace(CURVE, **{name: value}), "x")
 
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import attributes
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.schedules import emit_fourier
+from wamnet.compiler.schedules import schedules
 from wamnet.compiler.targets import DENOISERS, target_named
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)
@@ -190,7 +190,7 @@ def excess(kit, executor, original, variant, border, artifact=None):
 @pytest.fixture(autouse=True)
 def _spectra_of_small_windows(monkeypatch):
     """Let the Fourier schedule hold what is faster without it."""
-    monkeypatch.setattr(emit_fourier, "COST", 0.0)
+    monkeypatch.setattr(schedules, "COST", 0.0)
 
 
 @pytest.mark.thinned(3)

@@ -11,13 +11,13 @@ import pytest
 
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
+from wamnet.compiler.kernel.interface import DENOISE, ENCODE, PATH
 from wamnet.compiler.languages.c import C
-from wamnet.compiler.languages.interface import DENOISE, ENCODE, PATH
 from wamnet.compiler.languages.openings import Arguments
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network.dataset import Normalization
@@ -35,7 +35,7 @@ class Items(Arguments):
     item = ("item_x", "item_y")
     said = {DENOISE: "images; weights; result; width; height", PATH: "{planes}", ENCODE: "{planes}"}
     pixel, weight, store, table = C.pixel, C.weight, C.store, C.table
-    operations, magnitude, native_sine = C.operations, C.magnitude, C.native_sine
+    operations, native_sine = C.operations, C.native_sine
     max_output_channels = 2**16
 
 

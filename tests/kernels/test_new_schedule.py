@@ -1,8 +1,8 @@
-"""How a schedule is added: a class that names no language, and a line for each target that has it."""
+"""How a schedule is added: a builder that names no language, and a line for each target that has it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,38 +10,36 @@ import pytest
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import weights
-from wamnet.compiler.schedules.emit import Body, emit, kernel_gather
+from wamnet.compiler.kernel.interface import WEIGHTS
+from wamnet.compiler.kernel.kernel import load, rewritten
+from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.schedules import Plain
 
 
-@dataclass
-class BackwardsBody(Body):
-    """The plain statements; weights are counted from the last one."""
-
-    last: int = field(kw_only=True)
-
-    def _weight(self, index):
-        return super()._weight(f"{self.last} - ({index})")
-
-
 class Backwards(Plain):
-    """Weights from the last one to the first: of use to nobody, and different in every kernel."""
+    """Weights from the last one to the first: of use to no one, and different in every kernel."""
 
     name = "backwards"
     idea = "weights from the last one to the first"
     order = "backwards"
 
-    def emit(self, program, header, bounded):
+    def build(self, program):
         last = self.pack(program).size - 1
-        body = BackwardsBody(program, self.dialect, kernel_gather(program), last=last)
-        return emit(program, self.dialect, header, bounded, body)
+
+        def turned(value):
+            args = tuple(map(turned, value.args))
+            value = replace(value, args=args)
+            return load(WEIGHTS, last - args[0]) if value.value == WEIGHTS else value
+
+        kernel = plain(program)
+        return replace(kernel, body=rewritten(kernel.body, turned))
 
     def pack(self, program):
         return weights.pack(program)[::-1].copy()
 
 
 @pytest.mark.parametrize("target", ["opencl", "opengl", "c"])
-def test_a_class_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, executor_named, kit, target):
+def test_a_builder_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, executor_named, kit, target):
     """In each language its kernels compute what plain ones do, to the bit, within the same bound."""
     executor = executor_named("opengl-egl" if target == "opengl" else target)
     known = targets.target_named(target)

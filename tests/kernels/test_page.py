@@ -183,7 +183,7 @@ def test_ranges_are_those_of_the_scene_that_was_learned(model_of):
         ({**said, "trained_on_scene": "minicubes"}, None),
     ):
         assert P.learned_ranges(replace(model, info=info), "cornell") == found
-    with pytest.raises(InputError, match=r"ranges is .*: it must be a JSON object"):
+    with pytest.raises(InputError, match=r"ranges .*: must be a JSON object"):
         P.learned_ranges(replace(model, info={"trained_on_ranges": "[]"}), "cornell")
     networks = P.networks_of(model, replace(model, info=said), rank=1)
     data = P.page_data(animation("cornell", 0.0), networks, SETTINGS)

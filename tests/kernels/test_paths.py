@@ -12,7 +12,7 @@ from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import target_named
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
@@ -138,14 +138,14 @@ def test_samples_are_numbered_on(executor):
 
 
 def test_double_precision_is_refused(executor):
-    with pytest.raises(InputError, match="dtype is float64: kernels compute in float32; render with --exec"):
+    with pytest.raises(InputError, match=r"dtype 'float64': kernels compute in float32 \(render with --exec"):
         render_on(executor, scene("empty"), R.Job(4, 4, dtype="float64"))
 
 
 def test_kernel_in_another_language_is_refused(executor):
     other = "opencl" if executor.name == "numpy" else "numpy"
     kernel = compile_path(lower_scene(scene("empty"), Settings()), other)
-    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target is {other}"):
+    with pytest.raises(InputError, match=f"artifact for executor '{executor.name}': target '{other}'"):
         executor.trace(kernel, Part(1, 1, 0, 1, 0, 1, 0))
 
 
@@ -163,7 +163,7 @@ def test_source_that_does_not_compile_is_told_with_the_log(executor_named, name)
 def test_too_wide_an_image_is_refused(executor_named):
     executor = executor_named("opengl-egl")
     kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
-    with pytest.raises(InputError, match="texture for 'sums' is 100000 x 1 with 4 channels: this OpenGL"):
+    with pytest.raises(InputError, match="texture for 'sums' '100000 x 1 with 4 channels': this OpenGL"):
         executor.trace(kernel, Part(100000, 1, 0, 1, 0, 1, 0))
 
 

@@ -9,6 +9,7 @@ import pytest
 from rough import rough_layers
 
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
+from wamnet.kernels.devices.planes import smoothed
 from wamnet.kernels.run.denoise_on import denoise_on, filter_of, images_of, images_on
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, Frame
@@ -57,7 +58,7 @@ def test_frames_are_within_the_bound(device, size):
     for lanes in lanes_of(device):
         kernels = compile_smoothing(SCALES, device.name, lanes=lanes)
         layers = rough_layers(*size)
-        assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
+        assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 3e38, -3e38, 1e-42])
@@ -68,7 +69,7 @@ def test_hard_numbers_are_within_the_bound(device, name, value):
     layers = rough_layers(6, 18)
     for place in (np.s_[4, 4], np.s_[1], np.s_[:, 10:]):
         layers[name][place] = value
-    found = device.smooth(kernels, layers)
+    found = smoothed(device, kernels, layers)
     assert np.isfinite(found).all()
     assert excess(kernels, found, layers) <= 1
 
@@ -78,7 +79,7 @@ def test_a_frame_of_misses_is_within_the_bound(device):
     layers = {name: np.zeros_like(values) for name, values in rough_layers(6, 21).items()}
     layers["color"] = rough_layers(6, 21)["color"]
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
-    assert excess(kernels, device.smooth(kernels, layers), layers) <= 1
+    assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
 
 
 def changed(part, monkeypatch):
@@ -118,7 +119,7 @@ def test_each_part_is_seen(device, part, monkeypatch):
     """What a device computes is far from a filter that lacks one part."""
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
     layers = rough_layers(19, 35)
-    found, _ = device.smooth(kernels, layers), bound_of(kernels, layers)
+    found, _ = smoothed(device, kernels, layers), bound_of(kernels, layers)
     scales = changed(part, monkeypatch)
     assert excess(kernels, found, layers, scales) > 10
 
@@ -158,12 +159,11 @@ def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
 
 
 def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch):
-    """SMO-7: other executors, `exact`, integers, layers of float64, and models without such features."""
+    """SMO-7: other executors, integers, layers of float64, and models without such features."""
     device, frame = executor_named("opencl"), whole_frame(rough_layers(4, 5))
     model = model_of(kit, ("color", "smoothed"))
     assert filter_of(device, model, frame, "ieee") is not None
     assert filter_of(executor_named("numpy"), model, frame, "ieee") is None
-    assert filter_of(device, model, frame, "exact") is None
     assert filter_of(device, model, whole_frame(rough_layers(4, 5), np.float64), "ieee") is None
     assert filter_of(device, model_of(kit, ("color",)), frame, "ieee") is None
     monkeypatch.setattr(Model, "is_whole", True)

@@ -16,7 +16,7 @@ from wamnet.compiler.scenes import forms, hierarchy
 from wamnet.compiler.scenes.forms import list_cost, row_cost
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.run.render_on import compile_scene, render_on
 from wamnet.refimpl import vectors
 from wamnet.refimpl.light import intersection

@@ -478,9 +478,7 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state(opencl: A
     good = train_on(opencl, recipe, PAIRS, until=10)
     steep = replace(good, recipe=replace(recipe, learning_rate=1e30))
     kept: list[TrainState] = []
-    with pytest.raises(
-        TrainingError, match=r"loss at step 11 is (inf|nan): it must stay finite; lower the lear"
-    ):
+    with pytest.raises(TrainingError, match=r"loss at step 11 (inf|nan): must stay finite \(lower the lear"):
         train_on(opencl, steep.recipe, PAIRS, state=steep, on_checkpoint=kept.append)
     assert len(kept) == 1
     assert tensors(kept[0]) == tensors(good)
@@ -493,7 +491,7 @@ def test_frames_that_are_not_finite_leave_no_good_state(opencl: Any) -> None:
     kept: list[TrainState] = []
     noisy, reference = PAIRS[0]
     bad = Frame({"color": np.full_like(noisy["color"], np.nan)})
-    with pytest.raises(InputError, match=r"pair 0: layer 'color' at x=0, y=0 .* is nan"):
+    with pytest.raises(InputError, match=r"pair 0: layer 'color' at x=0, y=0 .* nan"):
         train_on(opencl, SMALL, [(bad, reference)], on_checkpoint=kept.append)
     assert kept == []
 
@@ -503,7 +501,7 @@ def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> Non
     kept: list[TrainState] = []
     with (
         np.errstate(over="ignore"),
-        pytest.raises(TrainingError, match="parameters after step 1 are not finite"),
+        pytest.raises(TrainingError, match="parameters after step 1: must be finite"),
     ):
         train_on(opencl, replace(SMALL, learning_rate=1e39, steps=1), PAIRS, on_checkpoint=kept.append)
     assert [state.step for state in kept] == [0]
@@ -511,25 +509,21 @@ def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> Non
 
 def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
     double = train.train(SMALL, PAIRS, until=1, dtype=np.float64)
-    with pytest.raises(
-        InputError, match="type of the state's numbers is float64: a device trains in float32"
-    ):
+    with pytest.raises(InputError, match="type of the state's numbers 'float64': a device trains in float32"):
         train_on(opencl, SMALL, PAIRS, state=double)
-    with pytest.raises(
-        InputError, match="executor that trains is numpy: it has no compiled trainer; use exec"
-    ):
+    with pytest.raises(InputError, match=r"executor that trains 'numpy': has no compiled trainer \(use exec"):
         train_on(executor_named("numpy"), SMALL, PAIRS)
-    with pytest.raises(InputError, match="changed parts of the recipe is batch"):
+    with pytest.raises(InputError, match="changed parts of the recipe 'batch"):
         train_on(opencl, replace(SMALL, batch=5), PAIRS, state=train.train(SMALL, PAIRS, until=1))
     with monkeypatch.context() as patch:
         patch.setattr(opencl, "trains", False)  # as on a GPU
         with pytest.raises(
-            InputError, match=r"device that trains is .*: the step is scheduled for processors"
+            InputError, match=r"device that trains '.*': the step is scheduled for processors"
         ):
             train_on(opencl, SMALL, PAIRS)
     monkeypatch.setattr("wamnet.kernels.devices.opencl_trainer.INDEX_LIMIT", 100)
     with pytest.raises(
-        InputError, match=r"numbers of all training pictures is .*: the device takes fewer than 100"
+        InputError, match=r"values of all training images .*: the device takes fewer than 100"
     ):
         train_on(opencl, SMALL, PAIRS)
 

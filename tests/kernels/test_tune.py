@@ -94,7 +94,7 @@ def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch
 
 
 def test_what_does_not_hold_the_program_says_why(executor_named, monkeypatch):
-    monkeypatch.setattr("wamnet.compiler.schedules.emit_group.LARGEST_NUMBERS", 30)
+    monkeypatch.setattr("wamnet.compiler.schedules.group.LARGEST_NUMBERS", 30)
     executor = executor_named("opencl")
     table = tune.tune(executor, planned(executor, model((8, 8), 1)), SIZE, repeats=1)
     notes = {r.schedule: r.note for r in table.rows}

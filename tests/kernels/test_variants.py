@@ -113,5 +113,5 @@ def test_a_rank_is_short_for_a_variant() -> None:
         "rank2",
         "window3",
     ]
-    with pytest.raises(InputError, match="rank is 2: the variant is window3; name it in the variant"):
+    with pytest.raises(InputError, match=r"rank 2: the variant is window3 \(name it in the variant"):
         with_rank("window3", 2)

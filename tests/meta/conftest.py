@@ -7,17 +7,18 @@ that states the rule and the fix.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import pytest
+from quick import DISTRIBUTIONS
 
 ROOT = Path(__file__).resolve().parents[2]
 """The repository's root folder."""
 
-PARTS = ("models", "refimpl", "compiler", "kernels", "spec", "cli", "wamnet")
+PARTS = ("refimpl", "models", "compiler", "kernels", "spec", "cli", "wamnet")
 """The folders that make up the package, in the order of imports: each may import those before it."""
 
 FOREIGN = {"out", "build", "dist", "__pycache__", "node_modules"}
@@ -33,7 +34,16 @@ class Source:
 
     @property
     def part(self) -> str:
-        return self.path.partition("/")[0]
+        """Return the folder of its distribution, or its folder at the root."""
+        others = (folder for folder in DISTRIBUTIONS if self.path.startswith(f"{folder}/"))
+        return next(others, self.path.partition("/")[0])
+
+    @property
+    def package(self) -> list[str]:
+        """Return the package that relative imports start from, as a list of names."""
+        folder = self.part if self.part in DISTRIBUTIONS else "wamnet"
+        inside = self.path.removeprefix(f"{folder}/").split("/")[:-1]
+        return [DISTRIBUTIONS.get(folder, "wamnet"), *inside]
 
     @cached_property
     def lines(self) -> list[str]:
@@ -58,6 +68,7 @@ class House:
     """The repository: `house.python("refimpl")` gives sources, `house.files()` every path."""
 
     root: Path
+    distributions: Mapping[str, str] = field(default_factory=lambda: DISTRIBUTIONS)
     _read: dict[Path, Source] = field(default_factory=dict, compare=False)
 
     def files(self) -> Iterator[Path]:
@@ -75,6 +86,10 @@ class House:
     def parts(self) -> list[Source]:
         """Return the Python files of the package."""
         return self.python(*PARTS)
+
+    def installed(self) -> list[Source]:
+        """Return the Python files of the package and of the other distributions."""
+        return self.python(*PARTS, *self.distributions)
 
     @staticmethod
     def refuse(violations: Iterable[str], rule: str) -> None:

@@ -24,7 +24,7 @@ def test_modules_open_with_their_contract(house):
 
 def test_constants_carry_a_string(house):
     wrong = []
-    for source in house.parts():
+    for source in house.installed():
         for node, after in zip(source.tree.body, [*source.tree.body[1:], None], strict=True):
             name = constant_name(node)
             if name and not (isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
@@ -49,7 +49,7 @@ def constant_name(node: ast.stmt) -> str | None:
 
 def test_public_names_are_documented(house):
     wrong = []
-    for source in house.parts():
+    for source in house.installed():
         for owner in [source.tree, *(n for n in source.tree.body if isinstance(n, ast.ClassDef))]:
             for node in owner.body:
                 named = isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_")
@@ -64,13 +64,13 @@ def is_declared_elsewhere(node: ast.stmt) -> bool:
     return any(d.endswith(("overload", "override", ".setter")) for d in decorators)
 
 
-UNTYPED = {"kernels/bench/peers/peer_numba.py"}
+UNTYPED = {"experiments/peers/peer_numba.py"}
 """Files whose functions have the types that a compiler of Python finds."""
 
 
 def test_functions_are_typed(house):
     wrong = []
-    for source in house.parts():
+    for source in house.installed():
         if source.path in UNTYPED:
             continue
         for node in source.functions():
@@ -99,7 +99,7 @@ def test_functions_are_short(house):
 
 def test_errors_come_from_one_module(house):
     wrong = []
-    for source in house.parts():
+    for source in house.installed():
         nodes = list(ast.walk(source.tree))
         caught = " ".join(ast.unparse(n.type) for n in nodes if isinstance(n, ast.ExceptHandler) and n.type)
         # Both stand for what refimpl/reading.py lists.

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 NAMED = re.compile(
-    r"(?<![\w/.<>{}*-])((?:refimpl|compiler|kernels|cli|tests|spec|experiments|examples|docs|\.ci)/[\w/.*<>{}-]*[\w>}*/])"
+    r"(?<![\w/.<>{}*-])((?:refimpl|compiler|kernels|cli|tests|spec|experiments|examples|docs|models|\.ci)/[\w/.*<>{}-]*[\w>}*/])"
 )
 """A path from the repository's root: it begins with one of its folders."""
 

@@ -121,7 +121,7 @@ def test_the_classifiers_name_each_python(project):
 
 def test_all_sources_are_of_the_oldest_python(house):
     oldest = tuple(int(part) for part in PYTHONS[0].split("."))
-    for source in house.parts():
+    for source in house.installed():
         assert ast.parse((house.root / source.path).read_text(encoding="utf-8"), feature_version=oldest)
 
 

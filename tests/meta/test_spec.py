@@ -17,10 +17,10 @@ from typing import NamedTuple
 CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 """A clause opens a paragraph with its number, as **RNG-1**."""
 
-CODE = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli)/[\w/]+\.py): *([\w., ]+)`")
+CODE = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py): *([\w., ]+)`")
 """Code is named by path and names: `refimpl/rng.py: pcg4d`; several names are separated by commas."""
 
-BROKEN = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli)/[\w/]+\.py:)[^`\n]*\n[^`]*`")
+BROKEN = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py:)[^`\n]*\n[^`]*`")
 """Names of code over two lines, which nobody would see."""
 
 REFERENCE = re.compile(r"\b([A-Z]{2,5}-\d+[a-z]?)\b")
@@ -137,14 +137,14 @@ def test_public_code_has_a_clause(house):
     named = named_by_clauses(house)
     wrong = [
         f"{source.path}: {name}"
-        for source in house.python("refimpl", "compiler")
+        for source in house.python("refimpl", "models", "compiler")
         for name in public_names(source.tree)
         if name not in named.get(source.path, set())
     ]
     house.refuse(
         wrong,
-        "A public function or class of refimpl and compiler is named by a clause: add it to the clause that "
-        "it serves, as (`refimpl/rng.py: pcg4d`), or begin its name with _.",
+        "A public function or class of refimpl, models and compiler is named by a clause: add it to the "
+        "clause that it serves, as (`refimpl/rng.py: pcg4d`), or begin its name with _.",
     )
 
 

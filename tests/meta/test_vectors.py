@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
 """A clause opens a paragraph with its number."""
 
-CODE = re.compile(r"`(?:refimpl|compiler|kernels|spec|cli)/[\w/]+\.py: *([\w., ]+)`")
+CODE = re.compile(r"`(?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py: *([\w., ]+)`")
 """The names of code that a clause is about."""
 
 

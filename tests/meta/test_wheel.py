@@ -76,7 +76,7 @@ def test_wheel_equals_the_tree(house, wheel):
         f"wamnet/{name.removeprefix('wamnet/')}"
         for name in (path.relative_to(house.root).as_posix() for path in house.files())
         if name.startswith(("spec/__init__.py", *(f"{part}/" for part in (*PARTS, *OF_SPEC))))
-        and not name.startswith(SHELF)
+        and not name.startswith((SHELF, *(f"{folder}/" for folder in house.distributions)))
         and not name.endswith(tuple(NOT_DATA))
     }
     found = {name for name in wheel.namelist() if ".dist-info/" not in name}
@@ -85,6 +85,23 @@ def test_wheel_equals_the_tree(house, wheel):
     house.refuse(
         differences, "The wheel installs what the tree holds: list packages and data in pyproject.toml."
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", quick.DISTRIBUTIONS)
+def test_wheels_of_other_distributions_equal_their_folders(house, tmp_path, folder):
+    """And have the version of the package."""
+    unbuilt = shutil.ignore_patterns("__pycache__", "build")
+    shutil.copytree(house.root / folder, tmp_path / "tree", ignore=unbuilt)
+    archive = built("wheel", tmp_path / "tree", tmp_path)
+    top = house.distributions[folder]
+    assert archive.name.startswith(f"{top}-{project()['version']}-")
+    prefix, beside = f"{folder}/", ("pyproject.toml", *(f"{other}/" for other in quick.DISTRIBUTIONS))
+    names = (path.relative_to(house.root).as_posix() for path in house.files())
+    inside = (name.removeprefix(prefix) for name in names if name.startswith(prefix))
+    wanted = {f"{top}/{name}" for name in inside if not name.startswith(beside) and not name.endswith(".pyc")}
+    with zipfile.ZipFile(archive) as wheel:
+        assert {name for name in wheel.namelist() if ".dist-info/" not in name} == wanted
 
 
 def test_wheel_brings_one_top_level_name(wheel):
@@ -206,7 +223,8 @@ def project() -> dict[str, Any]:
 def test_base_installation_names_the_extra_in_one_line(wheel, outside):
     """It was a traceback."""
     ((status, error),) = outside(project()["dependencies"], wheel.filename, "wamnet demo")
-    line = "Python package 'typer' is missing: the command needs it; install it: pip install 'wamnet[full]'"
+    rule = "missing, and needed for the command"
+    line = f"Python package 'typer': {rule} (install it: pip install 'wamnet[full]')"
     assert (status, error) == (2, f"wamnet: error: {line}\n")
 
 
@@ -221,7 +239,12 @@ def test_full_installation_runs_outside_the_repository(from_sdist, outside, tmp_
         "wamnet view minicubes -o view.html",
         "wamnet bench minicubes --only numpy:plain --size 16 --repeats 1 --budget 2 -o bench",
         "wamnet demo --quick -o demo",
+        "wamnet course check 1",
     )
-    assert [status for status, _ in results] == [0, 0, 0], results
+    assert [status for status, _ in results] == [0, 0, 0, 2], results
+    assert results[-1][1] == (
+        "wamnet: error: command is course: distribution wamnet-course is not installed; "
+        "install it: pip install wamnet-course\n"
+    )
     for name in ("view.html", "bench/bench.md", "demo/report.html"):
         assert (tmp_path / name).stat().st_size

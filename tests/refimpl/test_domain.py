@@ -156,14 +156,14 @@ def test_frames_are_measured_as_the_model_encodes_them() -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"features": ["color"]}, "domain.middle is .* must have 3 rows of 3 numbers"),
-        ({"features": ["color", "colour"]}, "feature name is colour"),
-        ({"middle": [[0.0] * 4] * 2}, "domain.middle is .* 3 rows of 4"),
-        ({"scale": [[0.0] * 4] * 3}, "domain.scale is 0.0: it must be positive"),
-        ({"threshold": -1.0}, "domain.threshold is -1.0: it must be positive"),
-        ({"rate": 0}, "domain.rate is 0.0: it must be positive"),
-        ({"more": 1}, "domain.more is 1: Domain has no such key"),
-        ({"features": ["depth", "color"]}, "domain.features is depth, color: the model's are color, depth"),
+        ({"features": ["color"]}, "domain.middle .* must have 3 rows of 3 numbers"),
+        ({"features": ["color", "colour"]}, "feature 'colour"),
+        ({"middle": [[0.0] * 4] * 2}, "domain.middle .* 3 rows of 4"),
+        ({"scale": [[0.0] * 4] * 3}, "domain.scale 0.0: must be positive"),
+        ({"threshold": -1.0}, "domain.threshold -1.0: must be positive"),
+        ({"rate": 0}, "domain.rate 0.0: must be positive"),
+        ({"more": 1}, "domain.more 1: Domain has no such key"),
+        ({"features": ["depth", "color"]}, "domain.features 'depth, color': the model's are color, depth"),
     ],
 )
 def test_domains_that_are_refused(change, text) -> None:
@@ -175,7 +175,7 @@ def test_domains_that_are_refused(change, text) -> None:
 
 def test_an_image_of_other_channels_is_refused() -> None:
     found = domain.domain_of(images(9), ("color", "depth"))
-    with pytest.raises(InputError, match="channels of the feature image is 3: color, depth are 4"):
+    with pytest.raises(InputError, match="channels of the feature image 3: color, depth are 4"):
         domain.measure(found, np.zeros((2, 2, 3)))
     renamed = replace(found, features=("normal", "depth"))
     assert domain.channel_names(renamed.features)[:2] == ["normal.X", "normal.Y"]

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from wamnet.refimpl.errors import (
     LONGEST_MESSAGE,
+    NO_VALUE,
     CompileError,
     ExecutorUnavailable,
     InputError,
     TrainingError,
     WamnetError,
+    choice,
     escaped,
     shown,
 )
@@ -75,12 +77,33 @@ def test_long_parts_keep_their_ends_and_leave_room_for_the_others():
     """A file's name is at the end of its path."""
     path = f"/{'folder/' * 1000}frame.exr"
     error = InputError(f"{path}: layers", path, 5000 * "r", 5000 * "w")
-    first, second = str(error).split(" is ")[0], str(error).split(" is ")[1]
+    first, _, second = str(error).partition(" '")
     assert first.startswith("/folder/")
     assert first.endswith("frame.exr: layers")
-    assert "...folder" in second or "frame.exr: rrr" in second
+    assert "frame.exr': rrr" in second
     assert str(error).count("r" * 100) > 0
-    assert str(error).endswith("www")
+    assert str(error).endswith("www)")
+
+
+@pytest.mark.parametrize(
+    ("value", "line"),
+    [
+        ("x.exr", "thing 'x.exr': rule (remedy)"),
+        (3, "thing 3: rule (remedy)"),
+        (None, "thing None: rule (remedy)"),
+        (NO_VALUE, "thing: rule (remedy)"),
+    ],
+)
+def test_the_template_quotes_text_and_leaves_out_what_has_no_value(value, line):
+    error = InputError("thing", value, "rule", "remedy")
+    assert str(error) == str(pickle.loads(pickle.dumps(error))) == line
+
+
+def test_a_choice_suggests_a_similar_name_and_lists_all():
+    assert choice("minicbes", ["glossy", "minicubes"]) == (
+        "did you mean 'minicubes'? choose one of glossy, minicubes"
+    )
+    assert choice("attic", {"glossy": 1, "minicubes": 2}) == "choose one of glossy, minicubes"
 
 
 def test_escapes_are_those_of_python():

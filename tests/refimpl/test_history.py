@@ -90,7 +90,7 @@ def test_the_corners_of_a_box_are_those_of_its_pose():
 
 def test_scenes_of_other_primitives_are_refused():
     """HIS-2."""
-    with pytest.raises(InputError, match=r"primitives of the scene before is 33: .*counterpart"):
+    with pytest.raises(InputError, match=r"primitives of the scene before 33: .*counterpart"):
         H.motion(canonical("cornell"), replace(canonical("minicubes"), lights=()))
 
 
@@ -404,7 +404,7 @@ def test_pictures_that_do_not_fit_are_refused():
     """HIS-5."""
     scene, color = canonical("furnace"), noise(0, 8, 8)
     past = H.begin(scene, job(8), color)
-    with pytest.raises(InputError, match=r"shape of the colour is \(8, 4, 3\): the job has \(8, 8, 3\)"):
+    with pytest.raises(InputError, match=r"shape of the colour \(8, 4, 3\): the job has \(8, 8, 3\)"):
         H.follow(past, scene, job(8), color[:, :4])
     with pytest.raises(InputError, match=r"shape of the colour .* the history has \(8, 8, 3\)"):
         H.follow(past, scene, job(4), color[:4, :4])
@@ -421,5 +421,5 @@ def test_pictures_that_do_not_fit_are_refused():
 @pytest.mark.parametrize("value", [0, 0.5, H.MOST_LIMIT + 1, np.nan])
 def test_limits_beyond_the_bound_s_reach_are_refused(name, value):
     """HIS-6."""
-    with pytest.raises(InputError, match=f"^limit `{name}` is .*from 1 to {H.MOST_LIMIT}"):
+    with pytest.raises(InputError, match=f"^limit `{name}` .*from 1 to {H.MOST_LIMIT}"):
         H.Limits(**{name: value})

@@ -48,20 +48,20 @@ def test_a_picture_by_hand():
 
 
 WRONG = {
-    "no image": ({"sources": ()}, "names of the images is : at least one"),
-    "a name": ({"sources": (Source("1", 1, 0.0, 1.0),)}, "names of the images is 1: at least one"),
-    "two signs": ({"sources": (Source("a__b", 1, 0.0, 1.0),)}, "names of the images is a__b: at least one"),
-    "a long name": ({"sources": (Source("a" * 41, 1, 0.0, 1.0),)}, "names of the images is a+: at least one"),
-    "channels": ({"sources": (Source("x", 0, 0.0, 1.0),)}, "channels of image x is 0: 1 to 1024"),
-    "range": ({"sources": (Source("x", 1, 1.0, 1.0),)}, "range of image x is .*: two numbers in order"),
-    "inputs": ({"sources": (Source("x", 2, 0.0, 1.0),)}, "inputs of the first layer is 9: 3 x 3 pixels of 2"),
-    "steps": ({"steps": ()}, "number of steps is 0: one after each of the 2 layers but the last"),
-    "kind": ({"steps": (Step("tanh", ()),)}, "step of layer 0 is tanh: a known one"),
-    "numbers": ({"steps": (Step("sine", (0.0,)),)}, "step of layer 0, sine is .*: a scale other than 0"),
+    "no image": ({"sources": ()}, "names of the images .*: at least one"),
+    "a name": ({"sources": (Source("1", 1, 0.0, 1.0),)}, "names of the images '1': at least one"),
+    "two signs": ({"sources": (Source("a__b", 1, 0.0, 1.0),)}, "names of the images 'a__b': at least one"),
+    "a long name": ({"sources": (Source("a" * 41, 1, 0.0, 1.0),)}, "names of the images 'a+': at least one"),
+    "channels": ({"sources": (Source("x", 0, 0.0, 1.0),)}, "channels of image x 0: 1 to 1024"),
+    "range": ({"sources": (Source("x", 1, 1.0, 1.0),)}, "range of image x .*: two numbers in order"),
+    "inputs": ({"sources": (Source("x", 2, 0.0, 1.0),)}, "inputs of the first layer 9: 3 x 3 pixels of 2"),
+    "steps": ({"steps": ()}, "number of steps 0: one after each of the 2 layers but the last"),
+    "kind": ({"steps": (Step("tanh", ()),)}, "step of layer 0 'tanh': a known one"),
+    "numbers": ({"steps": (Step("sine", (0.0,)),)}, "step of layer 0, sine .*: a scale other than 0"),
     "slope": ({"steps": (Step("leaky", (1.5,)),)}, r"a slope in \[0, 1\]"),
     "not float32": ({"steps": (Step("relu", (0.1,)),)}, "a floor, as float32 holds it"),
-    "clip": ({"low": 1.0, "high": 0.0}, "clip is .*: numbers of float32, in order"),
-    "no number": ({"low": float("nan")}, "clip is .*: numbers of float32, in order"),
+    "clip": ({"low": 1.0, "high": 0.0}, "clip .*: numbers of float32, in order"),
+    "no number": ({"low": float("nan")}, "clip .*: numbers of float32, in order"),
 }
 
 
@@ -76,15 +76,15 @@ def test_what_means_nothing_is_refused(case):
 
 def test_many_outputs_are_refused():
     many = replace(network(), weights=(np.ones((5, 9), np.float32),), biases=(np.zeros(5, np.float32),))
-    with pytest.raises(InputError, match="outputs of the last layer is 5: at most 4"):
+    with pytest.raises(InputError, match="outputs of the last layer 5: at most 4"):
         check_imported(many, WINDOW)
 
 
 def test_a_model_of_it_is_checked():
-    from wamnet.compiler.model_file import imported_model
+    from wamnet.models.model_file import imported_model
 
     model = imported_model(network(), WINDOW, {})
     check_model(model)
     assert model.is_imported
-    with pytest.raises(InputError, match="inputs of the first layer is 9"):
+    with pytest.raises(InputError, match="inputs of the first layer 9"):
         check_model(replace(model, window=Window(5, "zero")))

@@ -46,14 +46,14 @@ def test_json_comes_back(value):
         ("[" * 200_000, "nested"),
         ("[" * 65 + "]" * 65, "nested"),
         ('{"a":' * 70 + "0" + "}" * 70, "nested"),
-        ('{"a": [0, -1e999]}', r"thing\.a\[1\] is -inf"),
+        ('{"a": [0, -1e999]}', r"thing\.a\[1\] '-inf"),
         ("1" * 5000, "digits"),
         ("1." + "1" * 5000, "digits"),
-        ("1e999", "thing is inf: it must be a finite number"),
-        ("9" * 309, "thing is inf: it must be a finite number"),
-        ("[-1" + "0" * 309 + "]", r"thing\[0\] is -inf: it must be a finite number"),
-        ("NaN", "thing is nan"),
-        ("[Infinity]", r"thing\[0\] is inf"),
+        ("1e999", "thing 'inf': must be a finite number"),
+        ("9" * 309, "thing 'inf': must be a finite number"),
+        ("[-1" + "0" * 309 + "]", r"thing\[0\] '-inf': must be a finite number"),
+        ("NaN", "thing 'nan"),
+        ("[Infinity]", r"thing\[0\] 'inf"),
         ('{"a": 1, "a": 1}', "twice"),
         ('{"a": 1, "\\u0061": 1}', "twice"),
         (b"\xef\xbb\xbf[]", "BOM"),
@@ -130,7 +130,7 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
         (tmp_path / "link", "not a regular file"),
         ("/dev/zero", "not a regular file"),
         (tmp_path, "folder"),
-        (tmp_path / "none", "No such file"),
+        (tmp_path / "none", "not found"),
         (str(tmp_path) + "\0", "null"),
     ]:
         with pytest.raises(InputError, match=rule):
@@ -150,7 +150,7 @@ def test_a_file_of_another_length_than_stated_is_not_read(tmp_path, monkeypatch,
     (tmp_path / "file").write_bytes(b"1234")
     assert read_file(tmp_path / "file", stated=4) == b"1234"
     monkeypatch.setattr(reading.os, "fdopen", lambda handle, _mode: Unread(handle))
-    with pytest.raises(InputError, match=f"in bytes is 4: it must be the stated one, {stated}"):
+    with pytest.raises(InputError, match=f"in bytes 4: must be the stated one, {stated}"):
         read_file(tmp_path / "file", stated=stated)
 
 
@@ -182,9 +182,7 @@ def test_a_file_that_becomes_shorter_is_refused(tmp_path, monkeypatch):
 def test_lengths_that_a_manifest_does_not_state_are_refused(sizes):
     assert reading.stated_bytes({"file_bytes": {"a": 7}}, "a", "manifest", "fix it") == 7
     assert reading.stated_bytes({}, "a", "manifest", "fix it") is None, "an older manifest"
-    with pytest.raises(
-        InputError, match=r"manifest: file_bytes: a is .*: it must be the file's length in bytes"
-    ):
+    with pytest.raises(InputError, match=r"manifest: file_bytes: a .*: must be the file's length in bytes"):
         reading.stated_bytes({"file_bytes": sizes}, "a", "manifest", "fix it")
 
 
@@ -250,12 +248,12 @@ def test_a_record_is_made_by_its_annotations():
     ],
 )
 def test_a_value_of_another_type_is_refused_with_its_path(key, value, path):
-    with pytest.raises(InputError, match=f"^{path} is "):
+    with pytest.raises(InputError, match=f"^{path}[: ]"):
         to_dataclass(Outer, {**GOOD, key: value}, "it")
 
 
 def test_a_missing_key_is_refused():
-    with pytest.raises(InputError, match=r"it\.count is missing"):
+    with pytest.raises(InputError, match=r"it\.count: missing"):
         to_dataclass(Outer, {"number": 1, "text": ""}, "it")
 
 
@@ -277,7 +275,7 @@ def test_a_record_of_anything_is_made_or_refused(value):
 
 @pytest.mark.parametrize("error", reading.BROKEN)
 def test_what_python_raises_becomes_ours(error):
-    with pytest.raises(InputError, match="thing is 3: rule"), refusing("thing", 3, "rule", "way out"):
+    with pytest.raises(InputError, match="thing 3: rule"), refusing("thing", 3, "rule", "way out"):
         raise error("reason")
 
 
@@ -294,7 +292,7 @@ def test_bugs_and_interrupts_pass():
 def test_what_does_not_fit_the_memory_is_refused_before_it_is_asked_for():
     reading.check_room(1, "picture", "1 x 1", "cut it")
     with pytest.raises(
-        InputError, match=r"picture is 9 x 9: it would take [\d,]+ MiB of memory, and [\d,]+ MiB"
+        InputError, match=r"picture '9 x 9': it would take [\d,]+ MiB of memory, and [\d,]+ MiB"
     ):
         reading.check_room(2**60, "picture", "9 x 9", "cut it")
 

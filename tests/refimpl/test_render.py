@@ -60,7 +60,7 @@ def test_bands_cover_every_row_once(width, height, workers):
 
 
 def test_workers_must_be_one_or_more():
-    with pytest.raises(InputError, match=r"workers is 0: at least one process must work"):
+    with pytest.raises(InputError, match=r"workers 0: at least one process must work"):
         render_parallel(CORNELL, R.Job(4, 4), workers=0)
 
 
@@ -196,9 +196,9 @@ def test_four_rays_that_are_spread_are_worth_eight_at_random():
 
 
 def test_the_spread_of_camera_rays_is_refused_for_paths():
-    with pytest.raises(InputError, match="sampler is net: its numbers are for camera rays, not for scatt"):
+    with pytest.raises(InputError, match="sampler 'net': samples camera rays only"):
         Settings(max_depth=1, sampler="net")
-    with pytest.raises(InputError, match="feature_sampler is halton: it is unknown; known are pcg4d, sobol"):
+    with pytest.raises(InputError, match=r"feature_sampler 'halton': unknown \(choose one of pcg4d, sobol"):
         R.Job(4, 4, feature_spp=4, feature_sampler="halton")
 
 
@@ -249,15 +249,15 @@ def test_info_names_what_made_the_frame():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"width": 0}, "width is 0: it must be an integer from 1 to 65536"),
-        ({"width": 1.5}, "width is 1.5: it must be an integer"),
-        ({"height": 65537}, "height is 65537"),
-        ({"spp": 0}, "spp is 0"),
-        ({"seed": -1}, "seed is -1: it must be an integer from 0 to 4294967295"),
-        ({"seed": True}, "seed is True"),
-        ({"first_sample": 2**32}, "first_sample is 4294967296"),
-        ({"dtype": "float16"}, "dtype is float16: it must be float32 or float64"),
-        ({"feature_spp": -1}, "feature_spp is -1: it must be an integer from 0 to 4294967296"),
+        ({"width": 0}, "width 0: must be an integer from 1 to 65536"),
+        ({"width": 1.5}, "width 1.5: must be an integer"),
+        ({"height": 65537}, "height 65537"),
+        ({"spp": 0}, "spp 0"),
+        ({"seed": -1}, "seed -1: must be an integer from 0 to 4294967295"),
+        ({"seed": True}, "seed True"),
+        ({"first_sample": 2**32}, "first_sample 4294967296"),
+        ({"dtype": "float16"}, "dtype 'float16': must be float32 or float64"),
+        ({"feature_spp": -1}, "feature_spp -1: must be an integer from 0 to 4294967296"),
     ],
 )
 def test_refuses_jobs(arguments, message):
@@ -267,10 +267,10 @@ def test_refuses_jobs(arguments, message):
 
 @pytest.mark.parametrize("rows", [(0, 5), (2, 2), (-1, 3)])
 def test_refuses_row_ranges(rows):
-    with pytest.raises(InputError, match=r"rows is .*: they must be a range within 0 to 4"):
+    with pytest.raises(InputError, match=r"rows .*: must be a range within 0 to 4"):
         R.render(CORNELL, R.Job(4, 4), rows=rows)
 
 
 def test_refuses_tiles_of_no_pixel():
-    with pytest.raises(InputError, match="tile_pixels is 0"):
+    with pytest.raises(InputError, match="tile_pixels 0"):
         R.render(CORNELL, R.Job(4, 4), tile_pixels=0)

@@ -103,91 +103,91 @@ def changed(path: str, value: object) -> str:
 
 
 REFUSALS = [
-    ("format", "other", r"scene.format is 'other': it must be 'wamnet-scene'"),
-    ("version", 2, r"scene.version is 2: it must be 1"),
-    ("version", "1", r"scene.version is '1': it must be 1"),
-    ("version", True, r"scene.version is True: it must be 1"),
-    ("version", 1.5, r"scene.version is 1.5: it must be 1"),
-    ("name", "\ud800", r"scene.name is .*: half a character .* cannot be written"),
+    ("format", "other", r"scene.format 'other': must be 'wamnet-scene'"),
+    ("version", 2, r"scene.version 2: must be 1"),
+    ("version", "1", r"scene.version '1': must be 1"),
+    ("version", True, r"scene.version True: must be 1"),
+    ("version", 1.5, r"scene.version 1.5: must be 1"),
+    ("name", "\ud800", r"scene.name '.*': half a character .* cannot be written"),
     (
         "spheres.0.radius",
         10**400,
-        r"spheres\[0\].radius is inf: it must be a finite number",
+        r"spheres\[0\].radius 'inf': must be a finite number",
     ),
     (
         "spheres.0.center",
         [0, 1e39, 0],
-        r"center\[1\] is 1e\+39: it must be a finite number of at most 1e\+12",
+        r"center\[1\] 1e\+39: must be a finite number of at most 1e\+12",
     ),
-    ("name", 3, r"scene.name is 3: it must be a text"),
-    ("name", ..., r"scene.name is missing: it is required"),
-    ("info", [], r"scene.info is \[\]: it must map texts to texts"),
-    ("colour", 1, r"scene.colour is 1: Scene has no such key; known are name, camera"),
-    ("camera", 1, r"scene.camera is 1: it must be a JSON object; give the keys of a camera"),
-    ("camera.position", [0, 0], r"scene.camera.position is \[0, 0\]: it must have 3 entries"),
-    ("camera.position", "x", r"scene.camera.position is x: it must be a list"),
-    ("camera.position.1", True, r"scene.camera.position\[1\] is True: it must be a finite number"),
-    ("camera.position.1", "1", r"scene.camera.position\[1\] is '1': it must be a finite number"),
-    ("camera.vertical_fov_deg", 180, r"vertical_fov_deg is 180.0: it must lie between 0 and 180"),
-    ("camera.look_at", [0, 0, 5], r"look_at is .*: it must differ from position"),
-    ("camera.up", [0, 0, 1], r"up is .*: it must not be parallel to the view"),
-    ("background", [0, -1, 0], r"scene.background is .*: radiance must not be negative"),
-    ("room.high.1", -2.0, r"scene.room.high\[1\] is -2.0: it must exceed low\[1\] = -2.0"),
+    ("name", 3, "scene.name 3: must be a string"),
+    ("name", ..., "scene.name: missing"),
+    ("info", [], r"scene.info \[\]: must map texts to texts"),
+    ("colour", 1, r"scene.colour 1: Scene has no such key \(choose one of name, camera"),
+    ("camera", 1, r"scene.camera 1: must be a JSON object \(give the keys of a camera"),
+    ("camera.position", [0, 0], r"scene.camera.position \[0, 0\]: must have 3 entries"),
+    ("camera.position", "x", r"scene.camera.position 'x': must be a list"),
+    ("camera.position.1", True, r"scene.camera.position\[1\] True: must be a finite number"),
+    ("camera.position.1", "1", r"scene.camera.position\[1\] '1': must be a finite number"),
+    ("camera.vertical_fov_deg", 180, r"vertical_fov_deg 180.0: must lie between 0 and 180"),
+    ("camera.look_at", [0, 0, 5], "look_at .*: must differ from position"),
+    ("camera.up", [0, 0, 1], "up .*: must not be parallel to the view"),
+    ("background", [0, -1, 0], "scene.background .*: radiance must not be negative"),
+    ("room.high.1", -2.0, r"scene.room.high\[1\] -2.0: must exceed low\[1\] = -2.0"),
     (
         "room.reflectances.2",
         [0, 0, 1.5],
-        r"scene.room.reflectances\[2\] is .*: a reflectance must lie in \[0, 1\]",
+        r"scene.room.reflectances\[2\] .*: a reflectance must lie in \[0, 1\]",
     ),
-    ("room.emission", [0, 0, -1], r"scene.room.emission is .*: emission must not be negative"),
-    ("boxes.0.half_extent", [1, 0, 1], r"scene.boxes\[0\].half_extent is .*: half extents must be positive"),
-    ("boxes.0.rotation.0", [2, 0, 0], r"scene.boxes\[0\].rotation is .*: its rows must be orthonormal"),
-    ("boxes.0.rotation.0", [-1, 0, 0], r"scene.boxes\[0\].rotation is .*: its rows must be orthonormal"),
-    ("boxes.0.reflectance", [1.1, 0, 0], r"scene.boxes\[0\].reflectance is .*: energy|a reflectance"),
-    ("spheres.0.radius", 0, r"scene.spheres\[0\].radius is 0.0: it must be positive"),
-    ("quads.0.edge_v", [1, 0, 0], r"scene.quads\[0\].edge_v is .*: the edges must span an area"),
-    ("lights.0.color", [-1, 0, 0], r"scene.lights\[0\].color is .*: a colour must not be negative"),
+    ("room.emission", [0, 0, -1], "scene.room.emission .*: emission must not be negative"),
+    ("boxes.0.half_extent", [1, 0, 1], r"scene.boxes\[0\].half_extent .*: half extents must be positive"),
+    ("boxes.0.rotation.0", [2, 0, 0], r"scene.boxes\[0\].rotation .*: its rows must be orthonormal"),
+    ("boxes.0.rotation.0", [-1, 0, 0], r"scene.boxes\[0\].rotation .*: its rows must be orthonormal"),
+    ("boxes.0.reflectance", [1.1, 0, 0], r"scene.boxes\[0\].reflectance '.*': energy|a reflectance"),
+    ("spheres.0.radius", 0, r"scene.spheres\[0\].radius 0.0: must be positive"),
+    ("quads.0.edge_v", [1, 0, 0], r"scene.quads\[0\].edge_v .*: the edges must span an area"),
+    ("lights.0.color", [-1, 0, 0], r"scene.lights\[0\].color .*: a colour must not be negative"),
     (
         "boxes.0.material",
         "glass",
-        r"scene.boxes\[0\].material is glass: it must be a JSON object; give a kind",
+        r"scene.boxes\[0\].material 'glass': must be a JSON object \(give a kind",
     ),
     (
         "boxes.0.material",
         {"ior": 2},
-        r"scene.boxes\[0\].material.kind is None: it is required; known are lam",
+        r"scene.boxes\[0\].material.kind: missing \(choose one of lam",
     ),
     (
         "boxes.0.material",
         {"kind": "wood"},
-        r"material.kind is 'wood': no material has this name; known are lamb",
+        r"material.kind 'wood': unknown material \(choose one of lamb",
     ),
     (
         "boxes.0.material",
         {"kind": "mirror", "ior": 2},
-        r"material.ior is 2: Mirror has no such key; remove it: there are none",
+        r"material.ior 2: Mirror has no such key \(remove it",
     ),
     (
         "boxes.0.material",
         {"kind": "dielectric", "ior": 0.5},
-        r"material.ior is 0.5: an index of refraction must",
+        r"material.ior 0.5: an index of refraction must",
     ),
     (
         "spheres.0.material",
         {"kind": "conductor", "roughness": 0},
-        r"roughness is 0.0: a roughness must lie in",
+        r"roughness 0.0: a roughness must lie in",
     ),
     (
         "quads.0.material",
         {"kind": "dielectric"},
-        r"scene.quads\[0\].material is dielectric: light passes only into c",
+        r"scene.quads\[0\].material 'dielectric': light passes only into c",
     ),
-    ("room.materials", [None] * 5, r"scene.room.materials is 5 entries: they must be six or none; use null"),
+    ("room.materials", [None] * 5, r"scene.room.materials '5 entries': must be six or none \(use null"),
     (
         "room.materials",
         [{"kind": "dielectric"}] + [None] * 5,
-        r"materials\[0\] is dielectric: light passes only into",
+        r"materials\[0\] 'dielectric': light passes only into",
     ),
-    ("lights.0.power", -1, r"scene.lights\[0\].power is -1.0: power must not be negative"),
+    ("lights.0.power", -1, r"scene.lights\[0\].power -1.0: power must not be negative"),
 ]
 
 
@@ -202,23 +202,23 @@ def test_refuses(path, value, message):
     [
         (
             {"zenith": (0.0, -1.0, 0.0)},
-            r"environment.zenith is .*: light must not be negative; use 0 or more",
+            r"environment.zenith .*: light must not be negative \(use 0 or more",
         ),
         (
             {"sun_irradiance": (0.0, -1.0, 0.0)},
-            r"environment.sun_irradiance is .*: light must not be negative",
+            "environment.sun_irradiance .*: light must not be negative",
         ),
         (
             {"sun_direction": (0.0, 0.0, 0.0)},
-            r"environment.sun_direction is .*: it must not be zero; straight up",
+            r"environment.sun_direction .*: must not be zero \(straight up",
         ),
         (
             {"sun_concentration": -1.0},
-            r"environment.sun_concentration is -1.0: it must lie in \[0, 1e\+06\]; 1000 is",
+            r"environment.sun_concentration -1.0: must lie in \[0, 1e\+06\] \(1000 is",
         ),
         (
             {"sun_concentration": float("nan")},
-            r"environment.sun_concentration is nan: all numbers must be finite",
+            r"environment.sun_concentration nan: all numbers must be finite",
         ),
     ],
 )
@@ -229,25 +229,25 @@ def test_refuses_a_sky(change, message):
 
 def test_refuses_a_sky_before_a_background():
     with pytest.raises(
-        InputError, match=r"scene.background is .*: an environment takes the background's place; m"
+        InputError, match=r"scene.background .*: an environment takes the background's place \(m"
     ):
         S.validate(replace(DAY, background=GREY))
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '"x"', "NaN", "[" * 100_000])
 def test_refuses_texts_that_are_no_scene(text):
-    with pytest.raises(InputError, match=r"scene is|scene.format"):
+    with pytest.raises(InputError, match=r"scene .*|scene.format"):
         S.from_json(text)
 
 
 def test_refuses_infinite_numbers_in_scenes_made_in_python():
     scene = replace(EVERYTHING, spheres=(S.Sphere((float("inf"), 0.0, 0.0), 0.25, GREY),))
-    with pytest.raises(InputError, match=r"scene.spheres\[0\].center is .*: all numbers must be finite"):
+    with pytest.raises(InputError, match=r"scene.spheres\[0\].center .*: all numbers must be finite"):
         S.validate(scene)
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
 def test_refuses_infinite_numbers_in_json(number):
     text = S.to_json(EVERYTHING).replace("0.25", number)
-    with pytest.raises(InputError, match=r"scene.spheres\[0\].radius is .*: it must be a finite number"):
+    with pytest.raises(InputError, match=r"scene.spheres\[0\].radius '.*': must be a finite number"):
         S.from_json(text)

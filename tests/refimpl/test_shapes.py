@@ -40,7 +40,7 @@ class Disk(Shape):
 
     def check(self, path: str) -> None:
         """Refuse a radius of 0 and below."""
-        require(self.radius > 0.0, self.radius, f"{path}.radius", "it must be positive", "use another")
+        require(self.radius > 0.0, self.radius, f"{path}.radius", "must be positive", "use another")
 
     @property
     def row(self) -> tuple[Any, ...]:
@@ -97,10 +97,10 @@ def test_a_new_shape_s_rules_are_applied(known: None) -> None:
     assert scene.validate(SCENE) is SCENE
     assert scene.primitives(SCENE) == 4
     flat = replace(SCENE, disks=(replace(DISKS[0], radius=0.0),))
-    with pytest.raises(InputError, match=r"scene\.disks\[0\]\.radius is 0\.0: it must be positive"):
+    with pytest.raises(InputError, match=r"scene\.disks\[0\]\.radius 0\.0: must be positive"):
         scene.validate(flat)
     black = replace(SCENE, disks=(replace(DISKS[0], reflectance=(2.0, 0.0, 0.0)),))
-    with pytest.raises(InputError, match=r"scene\.disks\[0\]\.reflectance is .*: a reflectance must lie in"):
+    with pytest.raises(InputError, match=r"scene\.disks\[0\]\.reflectance .*: a reflectance must lie in"):
         scene.validate(black)
 
 

@@ -186,7 +186,7 @@ def test_the_sampler_is_told_where_it_is_not_the_usual_one():
 
 
 def test_refuses_an_unknown_sampler():
-    with pytest.raises(InputError, match="sampler is halton: it is unknown; known are pcg4d, sobol"):
+    with pytest.raises(InputError, match=r"sampler 'halton': unknown \(choose one of pcg4d, sobol"):
         Settings(sampler="halton")
 
 

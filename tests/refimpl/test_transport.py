@@ -246,16 +246,16 @@ def test_depth_adds_light_and_nothing_else():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"max_depth": -1}, "max_depth is -1: it counts scatterings"),
+        ({"max_depth": -1}, "max_depth -1: must be an integer of 0 or more"),
         (
             {"max_depth": 2**31},
-            "max_depth is 2147483648: random numbers are counted in 32 bits",
+            "max_depth 2147483648: must be below 2147483648, since random numbers",
         ),
-        ({"roulette_depth": 2**31}, "roulette_depth is 2147483648: it must be 0 or more, and below"),
-        ({"max_depth": 2.5}, "max_depth is 2.5: it counts scatterings"),
-        ({"roulette_depth": -1}, "roulette_depth is -1: it must be 0 or more"),
-        ({"strategy": "photon"}, "strategy is photon: it is unknown; known are mis, light, bsdf"),
-        ({"heuristic": "max"}, "heuristic is max: it is unknown; known are balance, power"),
+        ({"roulette_depth": 2**31}, "roulette_depth 2147483648: must be 0 or more, and below"),
+        ({"max_depth": 2.5}, "max_depth 2.5: must be an integer of 0 or more"),
+        ({"roulette_depth": -1}, "roulette_depth -1: must be 0 or more"),
+        ({"strategy": "photon"}, r"strategy 'photon': unknown \(choose one of mis, light, bsdf"),
+        ({"heuristic": "max"}, r"heuristic 'max': unknown \(choose one of balance, power"),
     ],
 )
 def test_refuses_settings(settings, message):

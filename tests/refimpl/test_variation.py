@@ -80,10 +80,10 @@ def test_a_frame_says_what_was_varied() -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"yaw_deg": 181.0}, "yaw_deg is 181.0: it must be a number from -180 to 180"),
-        ({"pitch_deg": float("nan")}, "pitch_deg is nan"),
-        ({"distance": 0.0}, "distance is 0.0: it must be a number from 0.1 to 10"),
-        ({"lights": ((1.0, 1.0, 1.0),)}, "number of lamps' colours is 1: the scene has 2"),
+        ({"yaw_deg": 181.0}, "yaw_deg 181.0: must be a number from -180 to 180"),
+        ({"pitch_deg": float("nan")}, "pitch_deg nan"),
+        ({"distance": 0.0}, "distance 0.0: must be a number from 0.1 to 10"),
+        ({"lights": ((1.0, 1.0, 1.0),)}, "number of light colours 1: the scene has 2"),
     ],
 )
 def test_variations_that_are_refused(change, text) -> None:
@@ -104,7 +104,7 @@ def test_ranges_as_text() -> None:
 @pytest.mark.parametrize(
     ("ranges", "text"),
     [
-        (V.Ranges(yaw_deg=(5.0, -5.0)), r"range of yaw_deg is 5.0:-5.0: LOW:HIGH within -180 to 180"),
+        (V.Ranges(yaw_deg=(5.0, -5.0)), r"range of yaw_deg '5.0:-5.0': must be LOW:HIGH within -180 to 180"),
         (V.Ranges(pitch_deg=(0.0, 90.0)), "range of pitch_deg"),
         (V.Ranges(distance=(0.0, 1.0)), "range of distance"),
         (V.Ranges(saturation=(0.0, 1.5)), "range of saturation"),
@@ -169,7 +169,9 @@ def test_ranges_without_power_are_the_text_that_they_were() -> None:
     assert "power" not in plain.to_json()
     assert V.ranges_from_json(plain.to_json()) == plain
     assert V.ranges_from_json(powered.to_json()) == powered
-    with pytest.raises(InputError, match=r"range of power is 0.0:1.0: LOW:HIGH within 0.000976562 to 1024"):
+    with pytest.raises(
+        InputError, match=r"range of power '0.0:1.0': must be LOW:HIGH within 0.000976562 to 1024"
+    ):
         V.check_ranges(V.Ranges(power=(0.0, 1.0)))
 
 

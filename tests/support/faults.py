@@ -199,7 +199,7 @@ def prepare(folder: Path) -> None:
     import numpy as np
 
     from wamnet.cli.files import exr
-    from wamnet.compiler.model_file import save_model
+    from wamnet.models.model_file import save_model
     from wamnet.refimpl.light.render import Job, render
     from wamnet.refimpl.light.scenes import canonical
     from wamnet.refimpl.network import siren
@@ -415,7 +415,7 @@ class Bench:
         if all(status for status, _, _ in ends):
             wrong.append("both are refused")
         refusals = [said for status, said, _ in ends if status == 2]
-        known = ("another process is ", "is not empty", "from an earlier run", "it holds something else")
+        known = ("another process is ", "is not empty", "from an earlier run", "holds something else")
         wrong += [f"other words: {said}" for said in refusals if not any(word in said for word in known)]
         if case.locks and not refusals and case.arguments[0] in ("train",):
             wrong.append("none is refused")

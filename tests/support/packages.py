@@ -13,8 +13,6 @@ from typing import Any
 
 import pytest
 
-from wamnet.cli.course.sandbox import unavailable
-
 PACKAGES = {
     "torch": "PyTorch",
     "pyoidn": "Open Image Denoise",
@@ -50,6 +48,8 @@ def needed(name: str) -> Any:
 
 def needed_sandbox() -> None:
     """Skip the test where students' code has no sandbox; fail where it is required."""
+    from wamnet_course.sandbox import unavailable
+
     if reason := unavailable():
         FOUND[SANDBOX] = f"MISSING: {reason}; apt-get install bubblewrap"
         if SANDBOX in required():

@@ -15,10 +15,10 @@ from statistical import welch_p
 
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.bench.peers import peer_mitsuba
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.transport import Settings
+from wamnet_peers import peer_mitsuba
 
 WIDTH, HEIGHT, BLOCK = 16, 12, 4
 BATCHES = 32

@@ -35,6 +35,13 @@ else:
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 """Where the packages of the quick set-up are listed."""
 
+DISTRIBUTIONS = {
+    "spec/conformance/renderers": "wamnet_verify",
+    "experiments/peers": "wamnet_peers",
+    "course": "wamnet_course",
+}
+"""Package of each other distribution in this repository, by its folder."""
+
 NEEDS = {
     "devices": "it runs kernels or other renderers",
     "packages": "it imports what the dependency group `quick` does not bring",
@@ -55,7 +62,7 @@ def left_out(need: str) -> str:
 def brought() -> set[str]:
     """Return the distributions of the group `quick` and all that they require."""
     project = tomllib.loads(PROJECT.read_text())
-    return {"wamnet"} | distributions(
+    return {"wamnet", *map(canonicalize_name, DISTRIBUTIONS.values())} | distributions(
         project["project"]["dependencies"] + project["dependency-groups"]["quick"]
     )
 

@@ -1,4 +1,4 @@
-"""A program that answers as Blender does (kernels/blender/process.py), for machines without Blender.
+"""A program that answers as Blender does (models/blender/process.py), for machines without Blender.
 
 Its film has ten frames; a picture's colour is that of its frame, samples and seed, and one pixel misses.
 `BLENDER_FAULT` makes it end early (`end`), or refuse the file (`refuse`).

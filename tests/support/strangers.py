@@ -1,4 +1,4 @@
-"""Networks of other programs for tests: those of tests/compiler/networks, and graphs that are made by hand.
+"""Networks of other programs for tests: those of tests/models/networks, and graphs that are made by hand.
 
 The files are PyTorch's own, written by `python tests/support/strangers.py`; tests with PyTorch make them
 again and compare. Others need the package onnx only.
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FOLDER = Path(__file__).parents[1] / "compiler" / "networks"
+FOLDER = Path(__file__).parents[1] / "models" / "networks"
 """Where the files are."""
 
 SIZE = (9, 11)

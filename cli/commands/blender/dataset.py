@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ....kernels.run.frame_plan import KINDS
+from ....models.data.frame_plan import KINDS
 from ...common.inputs import check_input
 from ...common.terminal import progress, say
 from ...files import dataset_files, exr
-from ..dataset import say_what_was_made
 
 if TYPE_CHECKING:
-    from ....kernels.blender.plan import FilmFrame, Request, Shot
-    from ....kernels.blender.session import Blender
+    from ....models.blender.plan import FilmFrame, Request, Shot
+    from ....models.blender.session import Blender
     from ....refimpl.frame import Frame
 
 PASSES = ("color", "albedo", "normal", "depth", "position")
@@ -46,7 +45,7 @@ class Asked:
 
 def make(folder: Path, asked: Asked) -> None:
     """Make what is missing in the folder."""
-    from ....kernels.blender.session import Blender
+    from ....models.blender.session import Blender
 
     check_input(asked.file)
     with Blender(asked.file, asked.view_layer, asked.blender) as blender:
@@ -66,12 +65,13 @@ def make(folder: Path, asked: Asked) -> None:
         f"{asked.file}: frames {animation.first} to {animation.last} of {animation.scene}, view layer "
         f"{animation.view_layer}, by Cycles of Blender {animation.version}"
     )
-    say_what_was_made(store, made)
+    for line in store.summary(made):
+        say(line)
 
 
 def _planned(asked: Asked, blender: Blender) -> tuple[Request, list[FilmFrame]]:
     """Return the request for the open file, and its frames."""
-    from ....kernels.blender.plan import Request, plan
+    from ....models.blender.plan import Request, plan
 
     counts = (asked.frames, asked.test, asked.outside, asked.arc, asked.percent)
     samples = (asked.noisy_spp, asked.spp, asked.test_spp, asked.seed)

@@ -35,29 +35,29 @@ def exports(
         Path | None,
         typer.Option(
             metavar="MODEL",
-            help="Trained model (.safetensors), or the name of one that ships with wamnet.",
+            help="Trained model (.safetensors) or bundled model.",
             show_default="a small network with random weights",
         ),
     ] = None,
     scene: SceneShown = "minicubes",
     targets: Annotated[
         str | None,
-        typer.Option(metavar="NAME,...", help="Targets of wamnet export.", show_default="all"),
+        typer.Option(metavar="NAME,...", help="Export targets to measure.", show_default="all"),
     ] = None,
     places: Annotated[
-        bool, typer.Option("--places", help="Every place of the weights, without the scene's paths.")
+        bool, typer.Option("--places", help="Every storage of the weights, without the path tracer.")
     ] = False,
 ) -> None:
-    """Export for every target, compile, run, and check against the bound; print a table of the verdicts.
+    """Export for every target, compile, run, check against the bound, and print the verdicts.
 
-    Each target is compiled by its own tools and run by what is nearest to it on this machine, and its picture
-    is compared with the reference's. A missing tool is a cell of the table. Status 1 says that something that
-    was tried is wrong.
+    Each target is compiled by its own tools and run by the closest available runtime, and its image is
+    compared with the reference. A missing tool is reported in the table. The exit status is 1 if a
+    target that ran is wrong.
     """
     from ....kernels.export.check import HEAD
     from ....kernels.export.shelf import random_model
     from ....kernels.export.targets import NAMES
-    from ....kernels.run.scene_source import scene_source
+    from ....models.data.scene_source import scene_source
 
     # Of a scene that moves, a time when its parts are turned.
     shown = scene_source(scene).at(TIME_S)
@@ -92,4 +92,4 @@ def judged(model: Model, target: str, place: str, scene: Scene | None) -> Verdic
     except ExecutorUnavailable as error:
         return Verdict(target, place, 0, f"missing: {error}", "-")
     except InputError as error:
-        return Verdict(target, place, 0, f"beyond a limit: {error.what} is {error.value}", "-")
+        return Verdict(target, place, 0, f"beyond a limit: {error.what} {error.value}", "-")

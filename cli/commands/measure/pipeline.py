@@ -24,8 +24,7 @@ from .shared import (
 )
 
 if TYPE_CHECKING:
-    from ....kernels.bench.measure_pipeline import Measured
-    from ....kernels.bench.peers.moving import Maker
+    from ....kernels.bench.measure_pipeline import Maker, Measured
     from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -37,45 +36,50 @@ wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --pe
 wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
 """Shown below the help of `wamnet bench pipeline`."""
 
+Peers = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
+    ),
+]
+
 
 def pipeline(
     scene: SceneShown = "minicubes",
     executors: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What runs the kernels: numpy, opencl, opengl, c.")
+        str, typer.Option(metavar="NAME,...", help="Backends to measure: numpy, opencl, opengl, c.")
     ] = "opencl,opengl",
     sizes: Annotated[
-        str, typer.Option(metavar="N,...", help="Widths and heights of the picture, in pixels.")
+        str, typer.Option(metavar="N,...", help="Image sizes (width and height), in pixels.")
     ] = "256,512",
     features: Annotated[
-        str, typer.Option(metavar="NAME,...", help="What the network sees.")
+        str, typer.Option(metavar="NAME,...", help="Input features of the network.")
     ] = "color,normal",
-    hidden: Annotated[str, typer.Option(metavar="N,...", help="Neurons of each hidden layer.")] = (
+    hidden: Annotated[str, typer.Option(metavar="N,...", help="Width of each hidden layer, in neurons.")] = (
         "32,32,32,32"
     ),
     window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
     feature_rays: Annotated[
-        int, typer.Option(metavar="N", help="Camera rays per pixel of the features; 0: the paths' own.")
+        int,
+        typer.Option(
+            metavar="N", help="Camera rays per pixel for the features; 0 uses the paths themselves."
+        ),
     ] = 0,
     repeats: Repeats = 5,
-    peers: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...", help="Other makers of pictures: mitsuba, cycles.", show_default="none"
-        ),
-    ] = "",
+    peers: Peers = "",
 ) -> None:
-    """Measure whole pictures of a scene that moves: one path per pixel and its denoising.
+    """Measure full frames of an animated scene: one path per pixel, and denoising.
 
-    One pipeline on a device is ours, moving: every picture shows another moment; the table has its parts.
-    Separate: trace all layers, read them back, encode, upload, denoise, read back. Peers show the same
-    moments: mitsuba is Mitsuba 3 and Open Image Denoise, cycles is Blender's renderer with its own
-    (package bpy). All take turns. The first picture of a new scene waits for its kernel; with empty
-    caches, in a process of its own, for all kernels. The network has random weights.
+    [bold]ours, moving[/] is one pipeline on a device in which every frame has another time; the table
+    has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
+    [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
+    own (package bpy). All are interleaved. The first frame waits for its kernel; with empty caches, in a
+    separate process, for all. The network has random weights.
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring
     from ....kernels.bench.workload import check_size
-    from ....kernels.run.scene_source import scene_source
+    from ....models.data.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 
@@ -133,12 +137,13 @@ def _makers(
 ) -> dict[str, Maker]:
     """Open other makers of pictures until the stack is closed; note what they are, or why one is missing."""
     from ....kernels.bench import measure_pipeline as measuring
+    from ....kernels.bench import peers
     from ....refimpl.errors import ExecutorUnavailable, InputError
 
     makers: dict[str, Maker] = {}
     for name in names:
         try:
-            makers[name] = measuring.PEERS[name](measuring.moments(scene)[0], size)
+            makers[name] = peers.table().makers[name](measuring.moments(scene)[0], size)
         except (ExecutorUnavailable, InputError) as error:
             notes[f"No row: {error}"] = None
         else:

@@ -29,28 +29,31 @@ def primitives(
     executors: Annotated[
         str,
         typer.Option(
-            metavar="NAME,...", help="Who follows paths: opencl, opengl, c, mitsuba, embree, numba."
+            metavar="NAME,...", help="Path tracers to measure: opencl, opengl, c, mitsuba, embree, numba."
         ),
     ] = "opencl,opengl",
     kinds: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Primitives: shared, turned, spheres, quads, mixture.")
+        str,
+        typer.Option(
+            metavar="NAME,...", help="Kinds of primitives: shared, turned, spheres, quads, mixture."
+        ),
     ] = "mixture",
-    counts: Annotated[str, typer.Option(metavar="N,...", help="How many there are.")] = "10,30,100,300",
+    counts: Annotated[str, typer.Option(metavar="N,...", help="Number of primitives.")] = "10,30,100,300",
     size: Square = 128,
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 4,
     repeats: Repeats = 5,
 ) -> None:
-    """Measure scenes of many primitives in all forms: statements for each, tables with a loop, and a tree.
+    """Measure scenes of many primitives in all forms: unrolled statements, tables with a loop, a tree.
 
-    The table has lines and size of the source, seconds to trace and emit it, seconds until the driver has
-    built it and followed a first row of paths (its caches on disk are not used), and million samples a
-    second: median and range of turns that all forms take. A star marks the form that the scene has; a tree
-    is measured only where it seems to pay.
+    The table has the lines and size of the source, the seconds to trace and emit it, the seconds until
+    the driver has built it and traced a first row of paths (without disk caches), and million samples
+    per second: median and range of the interleaved rounds. A star marks the scene's own form; a tree is
+    measured only if it is expected to pay off.
     """
     from ....kernels import open_executor
     from ....kernels.bench import measure_primitives as measuring
     from ....kernels.bench.workload import check_size
-    from ....kernels.devices.executor import Part
+    from ....kernels.devices.kernel import Part
     from ....kernels.measure import environment
 
     given = names_of("--executors", executors, measuring.EXECUTORS)

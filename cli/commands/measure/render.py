@@ -35,27 +35,26 @@ def render(
             "--by",
             "--executors",
             metavar="NAME,...",
-            help="What renders: numpy, opencl, opengl, c, mitsuba, embree, numba.",
+            help="Renderers to measure: numpy, opencl, opengl, c, mitsuba, embree, numba.",
         ),
     ] = "numpy",
     workers: Annotated[
         str | None,
         typer.Option(
-            metavar="N,...", help="Processes of the reference.", show_default="1, and one for each core"
+            metavar="N,...", help="Processes for the NumPy reference.", show_default="1, and one per core"
         ),
     ] = None,
     size: Square = 512,
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 2,
-    depth: Annotated[int, typer.Option(help="Most edges of a path, from the camera on.")] = 6,
+    depth: Annotated[int, typer.Option(help="Maximum path length, camera ray included.")] = 6,
     repeats: Repeats = 5,
 ) -> None:
-    """Measure samples a second of the renderer: the reference, its kernels, Mitsuba 3, Embree.
+    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3, Embree.
 
-    Each makes its first frame with empty caches of compilers, then they take turns; a turn ends when the
-    frame is in memory. The table has the median and the range, samples a second, and their ratio to the last
-    way's; below it is how far each mean colour is from the first's, in standard errors. A sample is one path.
-    [bold]pip install mitsuba[/] adds Mitsuba, which needs libLLVM too.
-    Embree by hand in C needs a compiler and libembree-dev.
+    Each renders its first frame with empty compiler caches, then they are interleaved. The table has the
+    median and the range, samples (paths) per second, and the ratio to the last row's. Below it is the
+    difference of each mean colour from the first one's, in standard errors. [bold]pip install mitsuba[/]
+    adds Mitsuba, which also needs libLLVM; the Embree baseline needs a C compiler and libembree-dev.
     """
     from ....kernels.bench import measure_render as measuring
     from ....kernels.bench.workload import check_size

@@ -19,7 +19,7 @@ from ...reports import machine
 MOST = 1 << 20
 """Largest count that an option takes: a typing error is refused before anything is measured."""
 
-Repeats = Annotated[int, typer.Option(help="Rounds; in each, all take turns.")]
+Repeats = Annotated[int, typer.Option(help="Number of interleaved rounds.")]
 SceneShown = Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}) or scene file.")]
 Square = Annotated[int, typer.Option(help="Width and height in pixels.")]
 
@@ -28,7 +28,7 @@ def names_of(option: str, text: str, known: Iterable[str]) -> tuple[str, ...]:
     """Return the names of a text like `opencl,opengl`, or refuse one that is not known."""
     names, known = parse_names(text), tuple(known)
     if not names or not set(names) <= set(known):
-        rule = f"it must be one or more of {', '.join(known)}, with commas"
+        rule = f"must be one or more of {', '.join(known)}, with commas"
         raise InputError(option, text, rule, f"for example {option} {','.join(known[:2])}")
     return names
 
@@ -40,7 +40,7 @@ def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
     except ValueError:
         counts = ()
     if not counts or not all(1 <= count <= MOST for count in counts):
-        rule = f"it must be integers from 1 to {MOST}, with commas"
+        rule = f"must be integers from 1 to {MOST}, with commas"
         raise InputError(option, text, rule, f"for example {option} {example}")
     return counts
 
@@ -48,7 +48,7 @@ def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
 def check_count(option: str, value: int, example: int) -> None:
     """Refuse a number of things that makes none."""
     if not 1 <= value <= MOST:
-        raise InputError(option, value, f"it must be from 1 to {MOST}", f"for example {option} {example}")
+        raise InputError(option, value, f"must be from 1 to {MOST}", f"for example {option} {example}")
 
 
 def facts(*others: str) -> list[str]:

@@ -29,26 +29,29 @@ LONGEST_S = 600.0
 
 def train(
     presets: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Training protocols: best, mirrors, paper, short, sky.")
+        str, typer.Option(metavar="NAME,...", help="Training presets: best, mirrors, paper, short, sky.")
     ] = "paper,short",
     trainers: Annotated[
         str | None,
         typer.Option(
             metavar="NAME,...",
-            help="What trains: numpy, opencl, torch.",
+            help="Trainers to measure: numpy, opencl, torch.",
             show_default="all that are installed",
         ),
     ] = None,
     size: Square = 256,
-    frames: Annotated[int, typer.Option(help="Frames of noise to learn from.")] = 4,
-    seconds: Annotated[float, typer.Option(metavar="S", help="Of one measurement, about.")] = 1.0,
+    frames: Annotated[int, typer.Option(help="Number of noise frames to train on.")] = 4,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", help="Approximate time per measurement, in seconds.")
+    ] = 1.0,
     repeats: Repeats = 5,
 ) -> None:
-    """Measure milliseconds of a training step: the reference, the compiled trainer, PyTorch.
+    """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch.
 
-    They take turns with a product of two large matrices, on frames of noise, drawing of minibatches included;
-    compiling does not count. The table has the median and the range, GFLOP/s of products of matrices, their
-    share of the product's, and what all steps would take. [bold]pip install torch[/] adds PyTorch.
+    They are interleaved with a product of two large matrices, on noise frames, minibatch sampling
+    included and compilation excluded. The table has the median and the range, GFLOP/s of the matrix
+    products, their share of the large product's rate, and the time that all steps would take. [bold]pip
+    install torch[/] adds PyTorch.
     """
     from ....kernels.bench import measure_train as measuring
     from ....kernels.bench.workload import check_size
@@ -60,7 +63,7 @@ def train(
     check_count("--frames", frames, 4)
     check_count("--repeats", repeats, 5)
     if not 0.0 < seconds <= LONGEST_S:
-        rule = f"it must be above 0 and at most {LONGEST_S:g}"
+        rule = f"must be above 0 and at most {LONGEST_S:g}"
         raise InputError("--seconds", seconds, rule, "for example --seconds 1")
     packages = [f"{name} {value}" for name, value in machine.versions().items()]
     say(", ".join(facts(*packages, f"{frames} frames of {size}x{size}")))

@@ -14,7 +14,7 @@ from ...common.terminal import say
 from ...files.outputs import check_output
 
 if TYPE_CHECKING:
-    from ....compiler.importing.network import Found
+    from ....models.importing.network import Found
 
 EXAMPLES = """Examples:
 
@@ -34,12 +34,16 @@ SUFFIX = ".safetensors"
 def import_model(
     network: Annotated[
         Path,
-        typer.Argument(metavar="NETWORK", help="Network in ONNX's form (.onnx).", show_default=False),
+        typer.Argument(metavar="NETWORK", help="ONNX network (.onnx).", show_default=False),
     ],
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Model (.safetensors).", show_default="the network's name"
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Model to write (.safetensors).",
+            show_default="the network's name",
         ),
     ] = None,
     ranges: Annotated[
@@ -47,7 +51,7 @@ def import_model(
         typer.Option(
             "--range",
             metavar="[INPUT=]LOW:HIGH",
-            help="Range of the numbers that an input, or every other input, is given; bounds hold for it.",
+            help="Range of one input's values, or of all other inputs; bounds hold within it.",
             show_default="0:1",
         ),
     ] = None,
@@ -55,19 +59,20 @@ def import_model(
         str | None,
         typer.Option(
             metavar="RULE",
-            help="What is outside of the picture, zero or clamp, where the network pads what it computes.",
-            show_default="the network's own margins",
+            help="Border rule for networks that pad intermediate layers: zero or clamp.",
+            show_default="the network's own padding",
         ),
     ] = None,
 ) -> None:
-    """Import a small network in ONNX's form as a model: compile, export and certify take it as any other.
+    """Import a small ONNX network as a model that compile, export and certify accept.
 
-    It is made of Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip, as PyTorch exports them. A
-    convolution becomes a layer on a window; the border of the picture is that of the network's own margins.
-    What cannot be a kernel is refused with the node's name.
+    Supported are Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip, as PyTorch exports
+    them. A convolution becomes a layer on a window; the border rule of the image is that of the
+    network's own padding. An operator that cannot become part of a kernel is rejected with its node's
+    name.
     """
-    from ....compiler.importing.network import import_network
-    from ....compiler.model_file import save_model
+    from ....models.importing.network import import_network
+    from ....models.model_file import save_model
 
     check_input(network)
     path = output or Path(network.with_suffix(SUFFIX).name)
@@ -90,7 +95,7 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
     except ValueError:
         low = high = math.nan
     if not low < high or math.isinf(high - low):
-        rule = "it must be LOW:HIGH or INPUT=LOW:HIGH, two numbers in order"
+        rule = "must be LOW:HIGH or INPUT=LOW:HIGH, two numbers in order"
         raise InputError("--range", text, rule, "give what the network is run on, as in --range -1:1")
     return name, (low, high)
 

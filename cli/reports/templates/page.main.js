@@ -67,6 +67,7 @@ class Page {
   async start() {
     this.fill();
     this.listen();
+    this.poster();
     const canvas = find("picture");
     try {
       this.device = new Device(canvas, this.leastBuffers());
@@ -287,6 +288,7 @@ class Page {
       this.restUntil = performance.now() + (ms > SLOW_MS ? Math.min(REST_MS, ms / 4) : 0);
       this.measured(size, ms);
       this.show();
+      find("poster").hidden = true;
       this.firstDrawn();
       this.announce(ms);
     } catch (error) {
@@ -365,13 +367,34 @@ class Page {
   // ---- what is said -----------------------------------------------------------------------------------
 
   say(text) {
-    find("status").textContent = text;
+    find("status").textContent = find("poster-text").textContent = text;
+  }
+
+  /** Until a picture is drawn, show the reference's small one, which the page carries for its check. */
+  poster() {
+    const { check, variants } = this.data;
+    const canvas = find("poster-picture");
+    canvas.width = canvas.height = check.size;
+    const context = canvas.getContext("2d");
+    const image = context.createImageData(check.size, check.size);
+    image.data.fill(255);
+    decodeFloats(variants[0].check.expected, Float64Array).forEach((value, i) => {
+      image.data[4 * Math.floor(i / 3) + (i % 3)] = 255 * value; // rounded, and clamped
+    });
+    context.putImageData(image, 0, 0);
   }
 
   progress(done, all) {
     find("progress").hidden = done >= all;
     find("progress").max = all;
     find("progress").value = done;
+    const bar = find("poster-progress");
+    bar.max = all;
+    if (done < all) {
+      bar.value = done;
+    } else {
+      bar.removeAttribute("value"); // busy, for nobody knows how long
+    }
     find("progress-text").textContent = done < all ? `shader ${done + 1} of ${all}` : "";
   }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ....refimpl.errors import CompileError
+from ....refimpl.errors import CompileError, choice
 from ..ir import Program
 from ..profiles import EXPAND_SINE
 from ..sine import POLYNOMIALS
@@ -15,7 +15,6 @@ from .expand_sine import expand_sine
 from .expand_tables import expand_tables
 from .fold import fold, fold_float32
 from .fuse_bias import fuse_bias
-from .pin import pin
 from .scalarize import scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
@@ -24,7 +23,6 @@ PASSES: Mapping[str, Callable[[Program], Program]] = {
     "scalarize": scalarize,
     "expand_tables": expand_tables,
     "fuse_bias": fuse_bias,
-    "pin": pin,
     EXPAND_SINE: expand_sine,
     **{f"{EXPAND_SINE}_{degree}": partial(expand_sine, degree=degree) for degree in POLYNOMIALS},
     "eliminate_dead": eliminate_dead,
@@ -40,6 +38,6 @@ def run(program: Program, names: Sequence[str]) -> Program:
     verify(program, "before the passes")
     for name in names:
         if name not in PASSES:
-            raise CompileError(f"pass {name!r} does not exist; there are: {', '.join(PASSES)}")
+            raise CompileError(f"pass {name!r}: unknown ({choice(name, PASSES)})")
         program = verify(PASSES[name](program), f"after pass {name}")
     return program

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ....compiler.kernel.interface import DENOISE, ENCODE, IMAGE, PATH, RESULT, SUMS, WEIGHTS
 from ....compiler.languages.c import whole
-from ....compiler.languages.interface import DENOISE, ENCODE, IMAGE, PATH, RESULT, SUMS, WEIGHTS
 
 TOP = """\
 /*

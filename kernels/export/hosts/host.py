@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ....refimpl.errors import InputError
+from ....refimpl.errors import NO_VALUE, InputError
 
 FILES = Path(__file__).parent / "files"
 """A folder for each host, and one for what several share."""
@@ -107,14 +107,16 @@ class Host:
         """Refuse what it does not run."""
         lacking = [name for name in features if self.features and name not in self.features]
         if lacking:
-            rule = f"host {self.name} has no such features, but {', '.join(self.features)}"
+            rule = f"are not available in host {self.name}, which has {', '.join(self.features)}"
             raise InputError("features of the model", ", ".join(lacking), rule, "train it with these")
         if scene is not None and not self.scenes:
-            rule = f"the program of host {self.name} denoises, and traces no paths"
+            rule = f"is not supported by host {self.name}, which only denoises"
             raise InputError("--scene", scene, rule, "leave it out, or export with --target and no --host")
         if moving:
-            rule = f"the program of host {self.name} draws one moment"
-            raise InputError("--moving", "given", rule, "leave it out, or export with --target and no --host")
+            rule = f"is not supported by host {self.name}, which renders one time"
+            raise InputError(
+                "--moving", NO_VALUE, rule, "leave it out, or export with --target and no --host"
+            )
         if two_kernels and not self.ranks:
-            rule = f"the program of host {self.name} has one pass, and a rank is two"
+            rule = f"is not supported by host {self.name}: it has one pass, and a rank needs two"
             raise InputError("--variant", variant, rule, "leave the rank out, or choose another host")

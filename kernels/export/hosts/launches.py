@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ....compiler.languages.interface import DENOISE, IMAGE, RESULT, WEIGHTS
+from ....compiler.kernel.interface import DENOISE, IMAGE, RESULT, WEIGHTS
 
 TABLES = """\
 /*

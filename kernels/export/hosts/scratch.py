@@ -9,8 +9,8 @@ end [`header`]. The source of the kernel remains the one that is certified.
 from __future__ import annotations
 
 from ....compiler.artifact import Artifact
+from ....compiler.kernel.interface import READ
 from ....compiler.languages.c import stack_bytes, whole
-from ....compiler.languages.interface import READ
 from .host import FILES
 
 NAME = "scratch.h"

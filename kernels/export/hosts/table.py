@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ....refimpl.errors import InputError
+from ....refimpl.errors import InputError, choice
 from . import calls, launches
 from .host import EIGHT_BITS, Host, page
 
@@ -153,5 +153,5 @@ HOSTS: Mapping[str, Host] = {row.name: row for row in ROWS}
 def host_named(name: str) -> Host:
     """Return a host, or refuse a name that nobody has."""
     if name not in HOSTS:
-        raise InputError("--host", name, f"must be one of {', '.join(HOSTS)}", "choose one of these")
+        raise InputError("--host", name, "unknown", choice(name, HOSTS))
     return HOSTS[name]

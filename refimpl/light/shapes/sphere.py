@@ -32,9 +32,7 @@ class Sphere(Shape):
 
     def check(self, path: str) -> None:
         """Refuse a radius of 0 and below."""
-        require(
-            self.radius > 0.0, self.radius, f"{path}.radius", "it must be positive", "use a positive radius"
-        )
+        require(self.radius > 0.0, self.radius, f"{path}.radius", "must be positive", "use a positive radius")
 
     @property
     def extent(self) -> Extent:

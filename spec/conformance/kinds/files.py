@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....compiler import model_file
+from ....models import model_file
 from ....refimpl.network import siren
 from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model

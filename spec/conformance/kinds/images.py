@@ -246,7 +246,7 @@ def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
     window, image = Window(int(inputs["size"]), str(inputs["border"])), inputs["image"]
     dataset.check_window(window)
     if not isinstance(image, np.ndarray) or image.ndim != 3 or image.dtype.kind != "i" or not image.size:
-        rule = "it must be integers [H][W][C], none of the three 0"
+        rule = "must be integers [H][W][C], none of the three 0"
         raise InputError("image", getattr(image, "shape", image), rule, "see the format page of this kind")
     for name, sides in (("x", image.shape[1]), ("y", image.shape[0])):
         if not 0 <= inputs[name] < sides:

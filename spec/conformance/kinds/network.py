@@ -90,7 +90,7 @@ def _check_fit(weights: Sequence[Array], biases: Sequence[Array]) -> None:
     for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
         wide = weights[layer - 1].shape[0] if layer else weight.shape[1]
         if weight.shape[1] != wide or bias.shape != weight.shape[:1]:
-            rule = f"it must take {wide} numbers, and have as many biases as rows"
+            rule = f"must take {wide} numbers, and have as many biases as rows"
             raise InputError(f"layer {layer}", weight.shape, rule, "give layers that fit one another")
 
 

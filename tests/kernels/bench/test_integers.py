@@ -9,9 +9,9 @@ from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.accuracy import Crop
 from wamnet.kernels.bench.contender import Tools
-from wamnet.kernels.bench.peers import peer_onnxruntime, peer_openvino
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet_peers import peer_onnxruntime, peer_openvino
 
 pytestmark = pytest.mark.apart
 

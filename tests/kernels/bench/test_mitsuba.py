@@ -11,13 +11,13 @@ import pytest
 from peer_pictures import SPP, ours, p_values, theirs
 from statistical import SIGNIFICANCE, assert_all_plausible, sidak
 
-from wamnet.kernels.bench.peers import peer_mitsuba
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.materials import Dielectric
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Variation, varied
+from wamnet_peers import peer_mitsuba
 
 pytestmark = pytest.mark.apart
 
@@ -120,17 +120,17 @@ ROOM = scenes.furnace()
 @pytest.mark.parametrize(
     ("scene", "settings", "message"),
     [
-        (ROOM, Settings(roulette_depth=2), "the peer combines both strategies by the power heuristic"),
+        (ROOM, Settings(roulette_depth=2), "Mitsuba combines both strategies by the power heuristic"),
         (ROOM, Settings(strategy="light"), "use the default ones except for max_depth"),
         (
             scenes.daylight(sun_concentration=3000.0),
             Settings(),
-            "sun_concentration is 3000.0: the sky's table shows lobes up to 2000; make the sun softer",
+            r"sun_concentration 3000.0: the sky's table shows lobes up to 2000 \(make the sun softer",
         ),
         (
             replace(ROOM, spheres=(Sphere((0.0, 0.5, 0.0), 0.2, (0.9,) * 3, (0.1,) * 3, Dielectric()),)),
             Settings(),
-            "glass is Sphere.*: no light may begin inside of it; move the lamp out",
+            r"glass Sphere.*: no light may start inside \(move the light out",
         ),
         (
             replace(
@@ -139,33 +139,33 @@ ROOM = scenes.furnace()
                 lights=(Light((0.0, 0.5, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.1), (1.0, 1.0, 1.0), 1.0),),
             ),
             Settings(),
-            "glass is Box.*: no light may begin inside of it",
+            "glass Box.*: no light may start inside",
         ),
-        (ROOM, Settings(heuristic="balance"), "without roulette; use the default ones"),
+        (ROOM, Settings(heuristic="balance"), r"without roulette \(use the default ones"),
         (
             replace(ROOM, spheres=(Sphere((0.5, 0.0, 0.0), 0.6, (0.5,) * 3),)),
             Settings(),
-            r"primitive is Sphere\(.*nothing may reach out of it; make the room larger",
+            r"primitive Sphere\(.*nothing may reach out of it \(make the room larger",
         ),
         (
             replace(ROOM, boxes=(Box((0.0, 0.0, -0.6), (0.1, 0.1, 0.5), (0.5,) * 3),)),
             Settings(),
-            r"primitive is Box\(.*nothing may reach out of it",
+            r"primitive Box\(.*nothing may reach out of it",
         ),
         (
             replace(ROOM, quads=(Quad((0.0, 0.0, 0.0), (0.0, 1.1, 0.0), (0.5, 0.0, 0.0), (0.5,) * 3),)),
             Settings(),
-            r"primitive is Quad\(.*nothing may reach out of it",
+            r"primitive Quad\(.*nothing may reach out of it",
         ),
         (
             replace(ROOM, spheres=(Sphere((0.1, 0.2, 0.6), 0.2, (0.5,) * 3),)),
             Settings(),
-            r"camera inside is Sphere\(.*shows solids from outside; move the camera out",
+            r"camera inside Sphere\(.*shows solids from outside \(move the camera out",
         ),
         (
             replace(ROOM, boxes=(Box((0.1, 0.2, 0.6), (0.2, 0.2, 0.2), (0.5,) * 3),)),
             Settings(),
-            r"camera inside is Box\(",
+            r"camera inside Box\(",
         ),
     ],
 )

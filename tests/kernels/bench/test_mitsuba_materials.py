@@ -13,13 +13,13 @@ import pytest
 from peer_pictures import HEIGHT, WIDTH, of_dictionary, ours, p_values, theirs
 from statistical import SIGNIFICANCE, assert_all_plausible, sidak
 
-from wamnet.kernels.bench.peers import mitsuba_looks, peer_mitsuba
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light import environment, scenes
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Mirror, Site
 from wamnet.refimpl.light.materials.dielectric import fresnel, refract
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
 from wamnet.refimpl.light.transport import Settings
+from wamnet_peers import mitsuba_looks, peer_mitsuba
 
 pytestmark = pytest.mark.apart
 

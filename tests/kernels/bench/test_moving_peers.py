@@ -13,9 +13,7 @@ import pytest
 from packages import needed
 from statistical import assert_all_plausible, welch_p
 
-from wamnet.kernels.bench import measure_pipeline
-from wamnet.kernels.bench.peers import moving, peer_cycles
-from wamnet.kernels.bench.peers.peer_oidn import Kept, filtered
+from wamnet.kernels.bench import measure_pipeline, measure_primitives
 from wamnet.kernels.bench.workload import noise
 from wamnet.kernels.run.render_on import render_on
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
@@ -23,6 +21,8 @@ from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Quad
 from wamnet.refimpl.light.transport import Settings
+from wamnet_peers import moving, peer_cycles, table
+from wamnet_peers.peer_oidn import Kept, filtered
 
 pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
 
@@ -126,7 +126,7 @@ def test_a_process_that_ends_is_told(monkeypatch) -> None:
 
 @pytest.mark.parametrize("scene", [scenes.furnace(), scenes.glossy(), scenes.daylight()])
 def test_what_cycles_would_show_differently_is_refused(scene) -> None:
-    with pytest.raises(InputError, match=f"{scene.name}: (only matte|no sky)"):
+    with pytest.raises(InputError, match=f"scene.* '{scene.name}': (only matte|no sky)"):
         peer_cycles.check(scene, Settings())
 
 
@@ -141,4 +141,5 @@ def test_a_kept_filter_is_the_filter(quality) -> None:
 
 
 def test_every_peer_can_be_named() -> None:
-    assert set(measure_pipeline.PEERS) == {"mitsuba", "cycles"}
+    assert set(measure_pipeline.PEERS) == set(table.makers)
+    assert set(measure_primitives.PEERS) == set(table.renderers)

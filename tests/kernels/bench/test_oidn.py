@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from packages import needed
 
-from wamnet.kernels.bench.peers.peer_oidn import prefiltered
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+from wamnet_peers.peer_oidn import prefiltered
 
 pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
 
@@ -46,5 +46,5 @@ def test_each_auxiliary_image_loses_its_noise():
 
 def test_images_that_it_refuses_are_told(monkeypatch, pyoidn):
     monkeypatch.setattr(pyoidn, "OIDN_FORMAT_FLOAT3", 12345)
-    with pytest.raises(InputError, match=r"albedo for Open Image Denoise is \(64, 64, 3\): it says: "):
+    with pytest.raises(InputError, match=r"albedo for Open Image Denoise \(64, 64, 3\): it says: "):
         prefiltered(Frame({"color": np.ones((SIZE, SIZE, 3)), **two_surfaces()}))

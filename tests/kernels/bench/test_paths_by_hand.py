@@ -11,14 +11,13 @@ from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.bench.measure_primitives import crowd
-from wamnet.kernels.bench.measure_render import BY_HAND
-from wamnet.kernels.bench.peers import peer_embree
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Variation, varied
+from wamnet_peers import peer_embree, peer_numba
 
 WIDTH, HEIGHT, BLOCK = 24, 16, 8
 """A picture that is not square, a packet and a half wide, and its blocks."""
@@ -45,6 +44,9 @@ SCENES = {
 }
 """Cameras within a room, outside of one, and without; all kinds of primitives."""
 
+
+BY_HAND = {"embree": peer_embree.Embree, "numba": peer_numba.Numba}
+"""Both programs."""
 
 pytestmark = pytest.mark.apart
 

@@ -14,13 +14,14 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import SineContract
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
-from wamnet.kernels.bench import contenders, workload
+from wamnet.kernels.bench import workload
 from wamnet.kernels.bench.contender import Tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet_peers import table
 
 pytestmark = [
     pytest.mark.apart,
@@ -31,7 +32,7 @@ pytestmark = [
 LIBRARY_SINE = SineContract("4 ulp, as OpenCL asks of a library", 4 * 2.0**-24)
 """A sine of a library: an ulp of a number in [-1, 1] is at most 2^-24, and libraries promise 1 to 4."""
 
-SAME_FUNCTION = [peer for peer in contenders.PEERS if peer.variant]
+SAME_FUNCTION = [peer for peer in table.contenders if peer.variant]
 """Peers that compute the network."""
 
 
@@ -71,7 +72,7 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
     assert (np.abs(picture - denoise(model, frame, np.float64)) <= bound).all()
 
 
-OTHERS = [p for p in contenders.PEERS if p.name.startswith("oidn")]
+OTHERS = [p for p in table.contenders if p.name.startswith("oidn")]
 """Peers that are another denoiser; those of this network in fewer bits: test_integers.py."""
 
 
@@ -91,7 +92,7 @@ def test_another_denoiser_makes_a_picture(peer) -> None:
 
 def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch) -> None:
     monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
-    for peer in contenders.PEERS:
+    for peer in table.contenders:
         text = f"not installed: {', '.join(peer.packages)}; pip install {' '.join(peer.packages)}"
         assert peer.missing() == text
         with pytest.raises(ExecutorUnavailable, match="not installed: "):

@@ -14,7 +14,7 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_encode import layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.export.gl_runner import ESRunner
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light.scenes import canonical
@@ -51,11 +51,6 @@ def test_denoiser_keeps_its_bound(runner, kit, case, schedule):
 def test_the_bound_says_what_it_assumes(case):
     assert "assumes   the compiler keeps the order" in compile_program(case[0], "glsl-es").source
     assert "assumes" not in compile_program(case[0], "opengl").source
-
-
-def test_a_profile_that_needs_an_order_is_refused(case):
-    with pytest.raises(CompileError, match=r"exact: kernels in GLSL ES .* their text does not demand"):
-        compile_program(case[0], "glsl-es", "exact")
 
 
 def test_paths_are_those_of_the_reference(runner):

@@ -11,9 +11,9 @@ from strangers import STRANGERS
 
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.importing.network import import_network
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.export.package import Request, export
+from wamnet.models.importing.network import import_network
 from wamnet.refimpl.errors import InputError
 
 pytestmark = pytest.mark.needs("packages")
@@ -87,7 +87,7 @@ def test_exports_are_of_kernels_only():
     made = export(Request(model, "c"))
     assert "encoded for the display" not in made.contents()["README.md"].decode()
     assert made.manifest["images"][0]["encoding"] == "as the network was trained"
-    with pytest.raises(InputError, match="--target is onnx: the model was imported from a graph"):
+    with pytest.raises(InputError, match="--target 'onnx': the model was imported from a graph"):
         export(Request(model, "onnx"))
-    with pytest.raises(InputError, match="variant is hidden2: an imported network has none"):
+    with pytest.raises(InputError, match="variant 'hidden2': an imported network has none"):
         export(Request(model, "c", variant="hidden2"))

@@ -55,7 +55,7 @@ def exported(target, where, schedule, **options):
     except ExecutorUnavailable as error:
         pytest.skip(str(error))
     except (CompileError, InputError) as error:
-        if not re.search("it cannot hold this model|a compiler that keeps operations in order", str(error)):
+        if not re.search("cannot hold this model|a compiler that keeps operations in order", str(error)):
             raise
         pytest.skip(str(error))
 
@@ -81,15 +81,9 @@ def test_it_says_what_certify_does(target, where, schedule, variant, tmp_path):
 
 
 @pytest.mark.parametrize("variant", ["full", "whole8"])
-@pytest.mark.parametrize("profile", ["exact", "native"])
 @pytest.mark.parametrize("target", ["opencl", "c", "cuda", "glsl", "wgsl"])
-def test_it_says_so_of_other_profiles(target, profile, variant, tmp_path):
-    """A network of integers is what profile exact refuses."""
-    if variant == "whole8" and profile == "exact":
-        with pytest.raises(CompileError, match="need not have the same bits"):
-            exported(target, "", "plain", variant=variant, profile=profile)
-        return
-    made = exported(target, "", "plain", variant=variant, profile=profile)
+def test_it_says_so_of_the_target_s_own_sine(target, variant, tmp_path):
+    made = exported(target, "", "plain", variant=variant, profile="native")
     if made.manifest["certificate"] is None:
         assert "There is no certificate: nothing is promised of the sine" in proof_of(made)
     else:

@@ -21,7 +21,7 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import DENOISERS, EXPORTED
-from wamnet.kernels.devices.executor import Part
+from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.export import check, runners, tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical

@@ -9,8 +9,7 @@ import pytest
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.variants import parse, vary
-from wamnet.kernels.bench.peers import peer_onnxruntime
-from wamnet.kernels.export import check, targets
+from wamnet.kernels.export import check, onnx_export, targets
 from wamnet.kernels.export.host_runner import CRunner, CUDARunner, MetalRunner
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -160,7 +159,7 @@ def test_a_graph_of_integers_has_phases_below_zero():
     )
     extreme = replace(network, siren=changed)
     images = {n: np.full((6, 7, 3), v, np.float32) for n, v in (("color", -127), ("normal", 127))}
-    _, found = peer_onnxruntime.run_graph(peer_onnxruntime.graph(extreme), images)
+    _, found = onnx_export.run_graph(onnx_export.graph(extreme), images)
     assert found.tobytes() == by_definition(extreme, images).tobytes()
 
 

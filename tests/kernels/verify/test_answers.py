@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.kernels.verify import answers
-from wamnet.kernels.verify.case import PROFILES, RULES, SLACK
-from wamnet.kernels.verify.cases import questions
 from wamnet.refimpl.light.scene import validate
+from wamnet_verify import answers
+from wamnet_verify.case import PROFILES, RULES, SLACK
+from wamnet_verify.cases import questions
 
 
 def test_cases_are_whole():

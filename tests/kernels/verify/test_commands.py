@@ -11,18 +11,18 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from wamnet.cli.commands.verify.renderer import read_layers
 from wamnet.kernels.orphans import printed, running
-from wamnet.kernels.verify import renderers as R
-from wamnet.kernels.verify import report, run
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.cases import chosen, questions
-from wamnet.kernels.verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing, Verdict
-from wamnet.kernels.verify.parts import NotExpressed, parts_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.materials import Mirror
 from wamnet.refimpl.light.scene import Quad, Scene, Sphere, from_json
 from wamnet.refimpl.light.scenes import canonical, daylight, empty
+from wamnet_verify import renderers as R
+from wamnet_verify import report, run
+from wamnet_verify.case import Shot
+from wamnet_verify.cases import chosen, questions
+from wamnet_verify.command import read_layers
+from wamnet_verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing, Verdict
+from wamnet_verify.parts import NotExpressed, parts_of
 
 SHOT = Shot("a shot", empty(), size=4, spp=1)
 WRITES = "import sys; import numpy as np; np.savez(sys.argv[2], color=np.full((4, 4, 3), 0.25))"
@@ -201,7 +201,7 @@ def test_our_own_tracer_as_a_program():
 @pytest.mark.parametrize(
     ("command", "rule"),
     [
-        ("mine 'half", "it is not a command"),
+        ("mine 'half", "is not a command"),
         ("", "{scene} and {output}"),
         ("mine {scene}", "{scene} and {output}"),
         ("mine {output}", "{scene} and {output}"),

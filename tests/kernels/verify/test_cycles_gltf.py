@@ -6,11 +6,11 @@ from importlib.util import find_spec
 
 import pytest
 
-from wamnet.cli.commands.verify.renderer import read_layers
-from wamnet.kernels.verify import gltf_process, run
-from wamnet.kernels.verify import renderers as R
-from wamnet.kernels.verify.cases import chosen
-from wamnet.kernels.verify.judgement import DEVIATES, PASS
+from wamnet_verify import gltf_process, run
+from wamnet_verify import renderers as R
+from wamnet_verify.cases import chosen
+from wamnet_verify.command import read_layers
+from wamnet_verify.judgement import DEVIATES, PASS
 
 ASKED = (
     "sky-dim",

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from triangles import U32, U64, ReadFile, ReadSurface, areas, differences, volume
 
-from wamnet.kernels.verify import write_gltf
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.parts import NotExpressed
-from wamnet.kernels.verify.run import shots_of
 from wamnet.refimpl.light.materials import Dielectric, Mirror
 from wamnet.refimpl.light.scene import Quad, Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
+from wamnet_verify import write_gltf
+from wamnet_verify.case import Shot
+from wamnet_verify.cases import questions
+from wamnet_verify.parts import NotExpressed
+from wamnet_verify.run import shots_of
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
 WRITTEN = [name for name in SHOTS if name != "layers-miss"]

@@ -10,12 +10,12 @@ import pytest
 from scipy import stats
 
 from wamnet.kernels.judge.welch import holm, student_quantile
-from wamnet.kernels.verify import judgement as J
-from wamnet.kernels.verify import report, run
-from wamnet.kernels.verify.case import RULES, Question, Shot
-from wamnet.kernels.verify.cases import chosen
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import empty
+from wamnet_verify import judgement as J
+from wamnet_verify import report, run
+from wamnet_verify.case import RULES, Question, Shot
+from wamnet_verify.cases import chosen
 
 SIZE = 4
 SHOT = Shot("shot", empty(), size=SIZE)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from triangles import ReadSurface, shape_differences, volume, wanted
 
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.parts import MATTE, METAL, MIRROR, NotExpressed, meshes_of, parts_of, sky_of
-from wamnet.kernels.verify.run import shots_of
 from wamnet.refimpl.light.materials import Conductor, Lambertian, Mirror
 from wamnet.refimpl.light.scene import Quad, Room, Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
+from wamnet_verify.cases import questions
+from wamnet_verify.parts import MATTE, METAL, MIRROR, NotExpressed, meshes_of, parts_of, sky_of
+from wamnet_verify.run import shots_of
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
 SHAPES = ("layers-wall", "layers-glass", "glass-ball-1.5")

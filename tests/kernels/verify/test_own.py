@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.kernels.verify import judgement, run
-from wamnet.kernels.verify.case import RULES
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.renderers import Own
 from wamnet.refimpl.light import camera, intersection, transport
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, conductor, dielectric
+from wamnet_verify import judgement, run
+from wamnet_verify.case import RULES
+from wamnet_verify.cases import questions
+from wamnet_verify.renderers import Own
 
 CHEAP = 16
 """Samples of a pixel where a fault is gross."""
@@ -50,7 +50,7 @@ def layer(name, change):
 
 def along_view(picture):
     """Return the picture with distances along the view, of the scene of layers."""
-    from wamnet.kernels.verify.layer_cases import CAMERA
+    from wamnet_verify.layer_cases import CAMERA
 
     forward = camera.camera_basis(CAMERA).forward
     cosine = np.sum(picture["direction"] * forward, axis=-1, keepdims=True)

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from triangles import U64, ReadFile, ReadSurface, differences
 
-from wamnet.kernels.verify import write_three
-from wamnet.kernels.verify.case import Shot
-from wamnet.kernels.verify.cases import questions
-from wamnet.kernels.verify.parts import NotExpressed
-from wamnet.kernels.verify.run import shots_of
-from wamnet.kernels.verify.write_three import LEVEL_SLACK, levels_of
 from wamnet.refimpl.encoding import srgb_decode
 from wamnet.refimpl.light.materials import Dielectric
 from wamnet.refimpl.light.scene import Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
+from wamnet_verify import write_three
+from wamnet_verify.case import Shot
+from wamnet_verify.cases import questions
+from wamnet_verify.parts import NotExpressed
+from wamnet_verify.run import shots_of
+from wamnet_verify.write_three import LEVEL_SLACK, levels_of
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
 WRITTEN = [name for name in SHOTS if name != "glass-ball-2.4"]

@@ -23,8 +23,6 @@
  *           32) at 70208, b2 (32) at 71232, W3 (32 x 32) at 71264, b3 (32) at 72288, W4 (32 x 3) at
  *           72320, b4 (3) at 72416; matrices input-major: D_in x D_out, in C order
  */
-#define WINDOW_SIZE 12
-#define WINDOW_CENTRE 6 /* the tap that lies on the pixel itself */
 #ifndef WAMNET_CLAMP
 #define WAMNET_CLAMP
 static __device__ inline int wamnet_clamp(int value, int low, int high)
@@ -32,7 +30,8 @@ static __device__ inline int wamnet_clamp(int value, int low, int high)
     return value < low ? low : value > high ? high : value;
 }
 #endif
-
+#define WINDOW_SIZE 12
+#define WINDOW_CENTRE 6 /* the tap that lies on the pixel itself */
 extern "C" __global__ void wamnet_denoise(
     const float *__restrict__ image_color,
     const float *__restrict__ image_normal,

@@ -47,12 +47,12 @@ kernel void wamnet_denoise(
     uint2 thread_place [[thread_position_in_grid]])
 {
     int width = size.width;
+    int height = size.height;
     int x = int(thread_place.x);
     int y = int(thread_place.y);
-    if (x >= width || y >= size.height) {
+    if (x >= width || y >= height) {
         return;
     }
-    int height = size.height;
 
     /* %1: affine map W0 from 2160 to 32 */
     float v1[32];

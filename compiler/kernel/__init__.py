@@ -1,0 +1,1 @@
+"""Kernels as data: between a program (one pixel) and its source (one language)."""

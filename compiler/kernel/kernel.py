@@ -1,0 +1,436 @@
+"""The kernel IR: loops, arrays, loads and stores of one work item, as data.
+
+    Program (what one pixel computes) -> Kernel (in which order, from which memory) -> source
+
+1. A schedule builds a kernel from a program and names no language. A renderer prints a kernel in one language
+   and knows no schedule [languages/renderer.py].
+2. A kernel is a tree of statements. Memory changes by `Store` alone; `add=True` is the only way to sum, so
+   the order of each sum can be read from the kernel.
+3. Every kernel runs in NumPy [run.py], and is checked for names, types and constant indices [verify.py].
+
+Indices count elements of an array's own type. An array of vectors may also be read as single components: then
+the one index counts components. An image has the indices (row, column, channel), or (row, position) where a
+position counts the components of a row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+from .interface import Interface
+
+Index = tuple["Expr", ...]
+
+
+@dataclass(frozen=True)
+class Type:
+    """`lanes` values of one kind."""
+
+    dtype: str = "float32"
+    lanes: int = 1
+
+    def of(self, lanes: int) -> Type:
+        """Return the type of so many of these."""
+        return Type(self.dtype, lanes)
+
+
+FLOAT, INT, BOOL, BYTE = Type(), Type("int32"), Type("bool"), Type("uint8")
+
+
+@dataclass(frozen=True)
+class Expr:
+    """A value without effect.
+
+    `const` and `name` have a `value`; `load` has an array's name and its index as arguments; `component` has
+    the lane, `convert` the kind, `call` a function's name; `splat` repeats a value in all lanes. All others
+    are rows of core/ops.py.
+    """
+
+    op: str
+    args: tuple[Expr, ...] = ()
+    type: Type = INT
+    value: Any = None
+
+    def __add__(self, other: Expr | int) -> Expr:
+        return apply("add", self, other)
+
+    def __radd__(self, other: int) -> Expr:
+        return apply("add", other, self)
+
+    def __sub__(self, other: Expr | int) -> Expr:
+        return apply("subtract", self, other)
+
+    def __rsub__(self, other: int) -> Expr:
+        return apply("subtract", other, self)
+
+    def __mul__(self, other: Expr | int) -> Expr:
+        return apply("multiply", self, other)
+
+    def __rmul__(self, other: int) -> Expr:
+        return apply("multiply", other, self)
+
+    def __floordiv__(self, other: Expr | int) -> Expr:
+        return apply("divide", self, other)
+
+    def __mod__(self, other: Expr | int) -> Expr:
+        return apply("remainder", self, other)
+
+    def __lt__(self, other: Expr | int) -> Expr:
+        return apply("less", self, other)
+
+    def __le__(self, other: Expr | int) -> Expr:
+        return apply("less_equal", self, other)
+
+    def __ge__(self, other: Expr | int) -> Expr:
+        return apply("greater_equal", self, other)
+
+    def __and__(self, other: Expr) -> Expr:
+        return apply("logical_and", self, other)
+
+    def lane(self, lane: int) -> Expr:
+        """Return one component of a vector."""
+        return Expr("component", (self,), self.type.of(1), lane)
+
+
+# ---- statements ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Comment:
+    """A line of comment; the listing reads the nodes that it names [core/listing.py]."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Let:
+    """A value that never changes; `kept`: its operations must stay in order (`precise`)."""
+
+    name: str
+    value: Expr
+    kept: bool = False
+
+
+@dataclass(frozen=True)
+class Array:
+    """Memory of an item, or of its group; without `sizes` it is one variable, with its first value.
+
+    `register`: all of its indices are known once its loops are unrolled, so that compilers keep it in
+    registers.
+    """
+
+    name: str
+    type: Type
+    sizes: tuple[int | Expr, ...] = ()
+    space: Literal["item", "group"] = "item"
+    kept: bool = False
+    value: Expr | None = None
+    register: bool = False
+
+
+@dataclass(frozen=True)
+class Store:
+    """array[index] = value, or += value."""
+
+    array: str
+    index: Index
+    value: Expr
+    add: bool = False
+
+
+@dataclass(frozen=True)
+class Write:
+    """All channels of a pixel of the result."""
+
+    row: Expr
+    column: Expr
+    values: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class For:
+    """A counted loop; `how`: `loop` as it stands, `unroll` as a demand on the compiler.
+
+    `until`: it ends before the first turn in which this is false.
+    """
+
+    name: str
+    count: Expr
+    body: tuple[Statement, ...]
+    how: Literal["loop", "unroll"] = "loop"
+    start: Expr = field(default_factory=lambda: const(0))
+    step: Expr = field(default_factory=lambda: const(1))
+    until: Expr | None = None
+
+
+@dataclass(frozen=True)
+class If:
+    """A branch."""
+
+    condition: Expr
+    body: tuple[Statement, ...]
+    otherwise: tuple[Statement, ...] = ()
+
+
+@dataclass(frozen=True)
+class Block:
+    """Statements whose names end with them."""
+
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """All items of a group wait here for each other."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Part of an array as a function's argument: from `index` on, in steps of `step` elements."""
+
+    array: str
+    index: Index
+    step: Expr
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of a function on views."""
+
+    function: str
+    views: tuple[View, ...]
+
+
+Statement = Comment | Let | Array | Store | Write | For | If | Block | Barrier | Call
+Body = tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of values (`takes`: names and types, with a `result`), or of views."""
+
+    name: str
+    takes: tuple[tuple[str, Type], ...]
+    body: Body
+    result: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A named integer of the source."""
+
+    name: str
+    value: Expr
+    comment: str = ""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Statements of one work item.
+
+    `step`: columns and rows of pixels of an item; `group`: the items (x, y) of a work group, which share
+    memory, or none; `place`: names of an item's first column and row; `weights`: the type of an element of
+    the weights.
+    """
+
+    interface: Interface
+    body: Body
+    constants: tuple[Constant, ...] = ()
+    functions: tuple[Function, ...] = ()
+    step: tuple[Expr, Expr] = field(default_factory=lambda: (const(1), const(1)))
+    group: tuple[int, int] | None = None
+    place: tuple[str, str] = ("x", "y")
+    weights: Type = FLOAT
+    tables: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def shared(self) -> tuple[Array, ...]:
+        """Return the arrays that a group shares."""
+        return tuple(s for s in self.body if isinstance(s, Array) and s.space == "group")
+
+
+# ---- making expressions ----------------------------------------------------------------------------------
+
+COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
+"""Operations on numbers that give truth."""
+
+LOGICAL = ("logical_and", "logical_or", "logical_not")
+"""Operations on truth."""
+
+INTEGERS: Mapping[str, Callable[[int, int], int]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a // b,
+    "remainder": lambda a, b: a % b,
+    "minimum": min,
+    "maximum": max,
+}
+"""Arithmetic of indices, which are never negative where they are divided."""
+
+
+def const(value: float, kind: Type | None = None) -> Expr:
+    """Return a constant: of a bool, an int or a float."""
+    if kind is None:
+        kind = BOOL if isinstance(value, bool) else INT if isinstance(value, int) else FLOAT
+    return Expr("const", (), kind, value)
+
+
+def name(text: str, kind: Type = INT) -> Expr:
+    """Return a value by its name."""
+    return Expr("name", (), kind, text)
+
+
+def load(array: str, *index: Expr | int, kind: Type = FLOAT) -> Expr:
+    """Return an element of an array."""
+    return Expr("load", tuple(map(expr, index)), kind, array)
+
+
+def call(function: str, args: Sequence[Expr], kind: Type) -> Expr:
+    """Return what a function of values returns."""
+    return Expr("call", tuple(args), kind, function)
+
+
+def splat(value: Expr, lanes: int) -> Expr:
+    """Return a value in all lanes."""
+    return value if value.type.lanes == lanes else Expr("splat", (value,), value.type.of(lanes))
+
+
+def stack(values: Sequence[Expr]) -> Expr:
+    """Return a vector of single values."""
+    return Expr("stack", tuple(values), values[0].type.of(len(values)))
+
+
+def expr(value: Expr | float) -> Expr:
+    """Return an expression; a Python number is a constant."""
+    return value if isinstance(value, Expr) else const(value)
+
+
+def apply(what: str, *args: Expr | float, value: Any = None) -> Expr:
+    """Return an operation on values; integers that are known are computed."""
+    given = tuple(map(expr, args))
+    kinds = [each.type for each in given[what == "select" :]]
+    kind = max(kinds, key=lambda each: each.lanes)
+    if what in (*COMPARISONS, *LOGICAL):
+        kind = Type("bool", kind.lanes)
+    elif what == "convert":
+        kind = Type(value, kind.lanes)
+    elif kind == INT and len(given) == 2 and (folded := _folded(what, *given)) is not None:
+        return folded
+    return Expr(what, given, kind, value)
+
+
+def _folded(what: str, a: Expr, b: Expr) -> Expr | None:
+    """Return what is known of an operation on integers, if anything is."""
+    one, other = (each.value if each.op == "const" else None for each in (a, b))
+    if one is not None and other is not None and what in INTEGERS:
+        return const(INTEGERS[what](one, other))
+    if (what == "add" and one == 0) or (what == "multiply" and one == 1):
+        return b
+    if (what in ("add", "subtract") and other == 0) or (what in ("multiply", "divide") and other == 1):
+        return a
+    return const(0) if what == "multiply" and 0 in (one, other) else None
+
+
+# ---- walking ---------------------------------------------------------------------------------------------
+
+
+def inside(statement: Statement) -> tuple[Body, ...]:
+    """Return the bodies of a statement."""
+    if isinstance(statement, For | Block):
+        return (statement.body,)
+    return (statement.body, statement.otherwise) if isinstance(statement, If) else ()
+
+
+def walk(body: Body) -> list[Statement]:
+    """Return all statements, outer ones first."""
+    found: list[Statement] = []
+    for statement in body:
+        found.append(statement)
+        for inner in inside(statement):
+            found += walk(inner)
+    return found
+
+
+def values(statement: Statement) -> list[Expr]:
+    """Return the expressions of a statement itself."""
+    if isinstance(statement, Let):
+        return [statement.value]
+    if isinstance(statement, Store):
+        return [*statement.index, statement.value]
+    if isinstance(statement, Write):
+        return [statement.row, statement.column, *statement.values]
+    if isinstance(statement, Array):
+        sizes = [size for size in statement.sizes if isinstance(size, Expr)]
+        return [*sizes, *([statement.value] if statement.value else [])]
+    if isinstance(statement, For):
+        return [
+            statement.start,
+            statement.count,
+            statement.step,
+            *([statement.until] if statement.until else []),
+        ]
+    if isinstance(statement, If):
+        return [statement.condition]
+    if isinstance(statement, Call):
+        return [each for view in statement.views for each in (*view.index, view.step)]
+    return []
+
+
+def parts(value: Expr) -> list[Expr]:
+    """Return an expression and all inside it."""
+    found = [value]
+    for each in value.args:
+        found += parts(each)
+    return found
+
+
+def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
+    """Return statements with a function applied to each of their expressions."""
+
+    def each(statement: Statement) -> Statement:
+        if isinstance(statement, Let):
+            return replace(statement, value=change(statement.value))
+        if isinstance(statement, Store):
+            index = tuple(map(change, statement.index))
+            return replace(statement, index=index, value=change(statement.value))
+        if isinstance(statement, Write):
+            return Write(
+                change(statement.row), change(statement.column), tuple(map(change, statement.values))
+            )
+        if isinstance(statement, Array):
+            return replace(statement, value=statement.value and change(statement.value))
+        if isinstance(statement, For):
+            until = statement.until and change(statement.until)
+            ends = {"count": change(statement.count), "start": change(statement.start), "until": until}
+            return replace(statement, body=rewritten(statement.body, change), **ends)  # type: ignore[arg-type]
+        if isinstance(statement, If):
+            bodies = {
+                "body": rewritten(statement.body, change),
+                "otherwise": rewritten(statement.otherwise, change),
+            }
+            return replace(statement, condition=change(statement.condition), **bodies)
+        if isinstance(statement, Block):
+            return Block(rewritten(statement.body, change))
+        if isinstance(statement, Call):
+            views = (
+                replace(v, index=tuple(map(change, v.index)), step=change(v.step)) for v in statement.views
+            )
+            return replace(statement, views=tuple(views))
+        return statement
+
+    return tuple(map(each, body))
+
+
+def substituted(value: Expr, known: Mapping[str, Expr]) -> Expr:
+    """Return an expression with names replaced, and integers computed that are now known."""
+    if value.op == "name":
+        return known.get(value.value, value)
+    if not value.args:
+        return value
+    args = tuple(substituted(each, known) for each in value.args)
+    if value.op in INTEGERS and value.type == INT:
+        return apply(value.op, *args)
+    return replace(value, args=args)

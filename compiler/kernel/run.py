@@ -1,0 +1,343 @@
+"""Runs a kernel in NumPy: all work items at once, with a mask of those that are active.
+
+1. A value of one lane is an array (items,), or one number where it is the same for all items; a vector is an
+   array (lanes, items). Branches and loops whose bounds depend on the item only change the mask.
+2. Floats belong to a domain [domain.py]: float32 rounded after every operation gives the bits of the C source
+   compiled without contraction.
+3. Every access is checked [memory.py]: an index beyond its array, a value that is read before it is written,
+   two items of a group that use one element without a barrier between, a pixel written twice or never.
+   Integers are exact in 64 bits while expressions compute, and must fit when they are stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.ops import OPS
+from .domain import STORED, Domain, computed
+from .interface import IMAGE, RESULT, WEIGHTS
+from .kernel import (
+    FLOAT,
+    INTEGERS,
+    Array,
+    Body,
+    Call,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    Write,
+    apply,
+    const,
+)
+from .memory import Items, Memory, Part
+from .sizes import integer
+from .verify import STEPS, KernelError, verify
+
+Values = Any
+"""A number for all items, an array (items,) or (lanes, items)."""
+
+
+def run(
+    kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain | None = None
+) -> NDArray[Any]:
+    """Return the result (H, W, C) for images (H, W, channels) by name, or raise a KernelError."""
+    verify(kernel)
+    with np.errstate(all="ignore"):
+        runner = Runner(kernel, images, weights, domain or Domain())
+        runner.body(kernel.body)
+        return runner.result.image()
+
+
+class Runner:
+    """One run: the items, what they name, and the memory that they see."""
+
+    def __init__(
+        self, kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain
+    ) -> None:
+        self.kernel, self.domain = kernel, domain
+        self.functions = {each.name: each for each in kernel.functions}
+        self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
+        self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
+        self.numbers: dict[int, Values] = {}
+        height, width = next(iter(images.values())).shape[:2]
+        self.items, places = self._items(width, height)
+        self.names: dict[str, Values] = {**self.constants, "width": width, "height": height, **places}
+        self.memory: dict[str, Memory | Part] = {WEIGHTS: self._weights(weights)}
+        for key, image in images.items():
+            self.memory[f"{IMAGE}{key}"] = Memory.of_image(f"{IMAGE}{key}", domain.lift(image))
+        result = kernel.interface.named(RESULT)
+        assert result is not None, "a kernel that runs has a result"
+        sizes = (height, width, int(result.shape[-1]))
+        self.result = Memory(RESULT, np.zeros((int(np.prod(sizes)), 1), domain.dtype), FLOAT, sizes, "result")
+        self.memory[RESULT] = self.result
+        self.evaluators: dict[str, Callable[[Expr], Values]] = {
+            key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")
+        }
+
+    def _items(self, width: int, height: int) -> tuple[Items, dict[str, Values]]:
+        """Return the work items, and names of their places; only groups reach beyond the image."""
+        across, down = (integer(self.kernel, each) for each in self.kernel.step)
+        columns, rows = self.kernel.group or (1, 1)
+        groups = -(-width // (across * columns)), -(-height // (down * rows))
+        row, column = (each.ravel() for each in np.mgrid[: groups[1] * rows, : groups[0] * columns])
+        local_x, local_y = column % columns, row % rows
+        x = column // columns * (columns * across) + local_x
+        y = row // rows * (rows * down) + local_y
+        places: dict[str, Values] = dict(zip(self.kernel.place, (x, y), strict=True))
+        if self.kernel.group:
+            places |= {"local_x": local_x, "local_y": local_y, "item": local_y * columns + local_x}
+        return Items(x, y, row // rows * groups[0] + column // columns), places
+
+    def _weights(self, weights: NDArray[Any]) -> Memory:
+        """Return the memory of the weights, which may be words bit by bit."""
+        flat, lanes = np.ascontiguousarray(weights).ravel(), self.kernel.weights.lanes
+        data = self.domain.lift(flat.view(np.float32))[:, None]
+        memory = Memory(WEIGHTS, data, FLOAT.of(lanes), (len(flat) // lanes,), "read")
+        memory.words = flat.view(np.int32)[:, None]
+        return memory
+
+    # ---- statements --------------------------------------------------------------------------------------
+
+    def body(self, body: Body) -> None:
+        """Run statements."""
+        for statement in body:
+            self.statement(statement)
+
+    def statement(self, statement: Statement) -> None:
+        """Run a statement."""
+        getattr(self, f"_run_{type(statement).__name__.lower()}")(statement)
+
+    def _under(self, mask: NDArray[np.bool_], body: Body) -> None:
+        """Run statements for some of the active items."""
+        before = self.items.mask
+        if mask.any():
+            self.items.only(mask)
+            self.body(body)
+            self.items.only(before)
+
+    def _run_comment(self, statement: Statement) -> None:
+        """Skip a comment."""
+
+    def _run_let(self, statement: Let) -> None:
+        """Name a value."""
+        self.names[statement.name] = self.value(statement.value)
+
+    def _run_array(self, statement: Array) -> None:
+        """Make new memory, of which nothing is written."""
+        shared, kind = statement.space == "group", statement.type
+        columns = self.items.groups if shared else self.items.count
+        sizes = tuple(integer(self.kernel, each) for each in statement.sizes)
+        dtype = self.domain.dtype if kind.dtype == "float32" else STORED[kind.dtype]
+        data = np.zeros((int(np.prod(sizes)) * kind.lanes, columns), dtype)
+        self.names.pop(statement.name, None)
+        made = Memory(statement.name, data, kind, sizes, statement.space)
+        self.memory[statement.name] = made
+        if statement.value is not None:
+            made.write(self.items, 0, kind, self.value(statement.value))
+
+    def _run_store(self, statement: Store) -> None:
+        """Write an element, or add to it."""
+        kind, value = statement.value.type, self.value(statement.value)
+        memory, place = self._place(statement.array, statement.index, kind)
+        if statement.add:
+            read = memory.read(self.items, place, kind)
+            value = (
+                self.domain.apply(Expr("add", (), kind), [read, value])
+                if kind.dtype == "float32"
+                else read + value
+            )
+        memory.write(self.items, place, kind, value)
+
+    def _run_write(self, statement: Write) -> None:
+        """Write all channels of a pixel."""
+        for channel, value in enumerate(statement.values):
+            self._run_store(Store(RESULT, (statement.row, statement.column, const(channel)), value))
+
+    def _run_for(self, statement: For) -> None:
+        """Run a loop: at once for all items where its bounds are theirs, else while any is in it."""
+        ends = (statement.start, statement.count, statement.step)
+        start, count, step = map(self.value, ends)
+        if not np.all(np.asarray(step) > 0):
+            raise KernelError(f"the loop over {statement.name} has a step that is not positive")
+        if statement.until is None and all(isinstance(each, int) for each in (start, count, step)):
+            for turn in range(start, count, step):
+                self.names[statement.name] = turn
+                self.body(statement.body)
+            return
+        before, turn = self.items.mask, start
+        mask = before
+        while True:
+            self.names[statement.name] = turn
+            mask = mask & (turn < count)
+            if statement.until is not None and mask.any():
+                self.items.only(mask)
+                mask = mask & self.value(statement.until)
+                self.items.only(before)
+            if not mask.any():
+                return
+            self._under(mask, statement.body)
+            turn = turn + step
+
+    def _run_if(self, statement: If) -> None:
+        """Run each branch for the items that take it."""
+        condition = np.asarray(self.value(statement.condition))
+        mask = self.items.mask
+        self._under(mask & condition, statement.body)
+        self._under(mask & ~condition, statement.otherwise)
+
+    def _run_block(self, statement: Any) -> None:
+        """Run statements whose names end with them."""
+        self.body(statement.body)
+
+    def _run_barrier(self, statement: Statement) -> None:
+        """Let all items of each group wait for each other."""
+        active = np.bincount(self.items.group[self.items.mask], minlength=self.items.groups)
+        size = self.items.count // self.items.groups
+        if ((active > 0) & (active < size)).any():
+            raise KernelError(
+                f"a barrier is reached by {active[active > 0].min()} of {size} items of a group"
+            )
+        for memory in self.memory.values():
+            memory.settle(active > 0)
+
+    def _run_call(self, statement: Call) -> None:
+        """Run a function on views."""
+        function = self.functions[statement.function]
+        names: dict[str, Values] = {}
+        memory: dict[str, Memory | Part] = {}
+        for (array, kind), view, step in zip(function.takes, statement.views, STEPS, strict=False):
+            names[step] = self.value(view.step)
+            memory[array] = Part(*self._place(view.array, view.index, kind))
+        self._inside(function, names, memory)
+
+    def _inside(
+        self, function: Function, names: dict[str, Values], memory: dict[str, Memory | Part]
+    ) -> Values:
+        """Run a function, and return its result."""
+        outer = self.names, self.memory
+        self.names, self.memory = {**self.constants, **names}, memory
+        self.body(function.body)
+        result = None if function.result is None else self.value(function.result)
+        self.names, self.memory = outer
+        return result
+
+    # ---- values ------------------------------------------------------------------------------------------
+
+    def value(self, value: Expr) -> Values:
+        """Return the values of an expression."""
+        evaluate = self.evaluators.get(value.op)
+        return (
+            evaluate(value) if evaluate else self._operation(value, [self.value(each) for each in value.args])
+        )
+
+    def _operation(self, value: Expr, args: list[Values]) -> Values:
+        """Return an operation on values."""
+        if value.type.dtype == "float32" or any(each.type.dtype == "float32" for each in value.args):
+            return self.domain.apply(value, args)
+        if value.op in ("divide", "remainder"):
+            return self._divided(value.op, *args)
+        if value.op in ("divide", "remainder"):
+            return self._divided(value.op, *args)
+        if value.op in INTEGERS and all(isinstance(each, int) for each in args):
+            return INTEGERS[value.op](*args)
+        if value.op == "convert":
+            return self.domain.apply(value, args)
+        return OPS[value.op].definition(*args)
+
+    def _divided(self, what: str, a: Values, b: Values) -> Values:
+        """Return a quotient or remainder of indices, which are not negative."""
+        wrong = (np.asarray(a) < 0) | (np.asarray(b) <= 0)
+        if np.any(wrong):
+            self.items.refuse(wrong, f"{what} of a negative index, or by 0")
+            b = np.where(np.asarray(b) == 0, 1, b)
+        return a // b if what == "divide" else a % b
+
+    def _value_const(self, value: Expr) -> Values:
+        """Return a constant."""
+        if value.type.dtype == "int32":
+            return int(value.value)
+        kind, key = value.type.dtype, id(value)
+        if key not in self.numbers and kind == "float32":
+            self.numbers[key] = self.domain.lift(np.float32(value.value))
+        elif key not in self.numbers:
+            self.numbers[key] = computed(np.asarray(value.value, STORED[kind]))
+        return self.numbers[key]
+
+    def _value_name(self, value: Expr) -> Values:
+        """Return a named value, or that of a variable."""
+        if value.value in self.names:
+            return self.names[value.value]
+        return self._value_load(Expr("load", (), value.type, value.value))
+
+    def _value_load(self, value: Expr) -> Values:
+        """Return an element of an array."""
+        memory, place = self._place(value.value, value.args, value.type)
+        return memory.read(self.items, place, value.type)
+
+    def _place(self, array: str, index: Sequence[Expr], kind: Type) -> tuple[Memory, Values]:
+        """Return the memory of an array, and the component where an access begins."""
+        return self.memory[array].place(self.items, [self.value(each) for each in index], kind)
+
+    def _value_take(self, value: Expr) -> Values:
+        """Return an entry of a table."""
+        table, index = self.tables[value.value], self.value(value.args[0])
+        return table[self.items.checked(value.value, index, len(table))]
+
+    def _value_component(self, value: Expr) -> Values:
+        """Return one component of a vector."""
+        vector = self.value(value.args[0])
+        return vector[value.value] if np.ndim(vector) == 2 else vector
+
+    def _value_splat(self, value: Expr) -> Values:
+        """Return a value in all lanes: it is the same array, which NumPy repeats."""
+        return self.value(value.args[0])
+
+    def _value_stack(self, value: Expr) -> Values:
+        """Return a vector of single values."""
+        lanes = np.broadcast_arrays(*(np.atleast_1d(self.value(each)) for each in value.args))
+        return np.stack(lanes)
+
+    def _value_clamp(self, value: Expr) -> Values:
+        """Return an index within limits."""
+        index, low, high = map(self.value, value.args)
+        if isinstance(index, int) and isinstance(low, int) and isinstance(high, int):
+            return min(max(index, low), high)
+        return np.where(index < low, low, np.where(index > high, high, index))
+
+    def _value_bits(self, value: Expr) -> Values:
+        """Return the bits of words as floats."""
+        return self.domain.cast(value, [self.value(value.args[0])])
+
+    def _value_pack4(self, value: Expr) -> Values:
+        """Return the bytes of four floats as a word, the first one the lowest."""
+        as_word = [apply("convert", each, value="int32") for each in value.args]
+        whole = [self.domain.apply(each, [self.value(each.args[0])]) for each in as_word]
+        word = sum((np.asarray(each) & 255) << (8 * k) for k, each in enumerate(whole))
+        return computed(np.asarray(word).astype(np.uint32).view(np.int32))
+
+    def _value_dot4(self, value: Expr) -> Values:
+        """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""
+        words, four = map(self.value, value.args)
+        factors = four if value.args[1].type.lanes == 4 else [signed_byte(four, k) for k in range(4)]
+        return sum(signed_byte(words, k) * factors[k] for k in range(4))
+
+    def _value_call(self, value: Expr) -> Values:
+        """Return the result of a function of values."""
+        function = self.functions[value.value]
+        names = {key: self.value(each) for (key, _), each in zip(function.takes, value.args, strict=True)}
+        return self._inside(function, names, {})
+
+
+def signed_byte(word: Values, k: int) -> Values:
+    """Return byte `k` of a word, as it is with its sign."""
+    return ((np.asarray(word) >> (8 * k)) & 255 ^ 128) - 128

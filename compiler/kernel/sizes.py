@@ -1,0 +1,39 @@
+"""How large a kernel is: its named integers, the bytes of an item's arrays, the bytes that a group shares."""
+
+from __future__ import annotations
+
+from .kernel import INTEGERS, Array, Expr, Kernel, walk
+
+BYTES = {"float32": 4, "int32": 4, "uint32": 4, "bool": 4, "uint8": 1, "int8": 1}
+"""Bytes of a value of each kind."""
+
+
+def integer(kernel: Kernel, value: Expr | int) -> int:
+    """Return an integer that the kernel's constants determine."""
+    if isinstance(value, int):
+        return value
+    if value.op == "const":
+        return int(value.value)
+    if value.op == "name":
+        return integer(kernel, next(each.value for each in kernel.constants if each.name == value.value))
+    return INTEGERS[value.op](*(integer(kernel, each) for each in value.args))
+
+
+def bytes_of(kernel: Kernel, array: Array) -> int:
+    """Return the bytes of an array."""
+    count = BYTES[array.type.dtype] * array.type.lanes
+    for size in array.sizes:
+        count *= integer(kernel, size)
+    return count
+
+
+def item_bytes(kernel: Kernel) -> int:
+    """Return the bytes of an item's arrays in memory; those in registers, and single values, do not count."""
+    arrays = [s for s in walk(kernel.body) if isinstance(s, Array) and s.space == "item"]
+    held = [s for s in arrays if not s.register and (s.sizes or s.type.lanes > 1)]
+    return sum(bytes_of(kernel, s) for s in held)
+
+
+def shared_bytes(kernel: Kernel) -> int:
+    """Return the bytes that a group shares."""
+    return sum(bytes_of(kernel, s) for s in walk(kernel.body) if isinstance(s, Array) and s.space == "group")

@@ -1,0 +1,466 @@
+"""Checks a kernel before it is printed or run: names, types and lanes, constant indices, loops, barriers.
+
+A name is declared before it is used and once in its scope, and no inner scope hides one; functions see
+constants and what they take. Everything that depends on values is checked while a kernel runs [run.py].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core import ir
+from ..core.ops import OPS, TypeRuleError
+from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
+from .kernel import (
+    BOOL,
+    BYTE,
+    FLOAT,
+    INT,
+    INTEGERS,
+    Array,
+    Barrier,
+    Body,
+    Call,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    Write,
+    walk,
+)
+from .sizes import BYTES
+
+LIMITS = {
+    dtype: (int(np.iinfo(dtype).min), int(np.iinfo(dtype).max))
+    for dtype in ("int32", "uint32", "uint8", "int8")
+}
+"""The least and the largest integer of each kind."""
+
+
+class KernelError(Exception):
+    """A kernel that no device runs as it is meant."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A name: a value without `sizes`, or an array; `limits` are None where only a run has them."""
+
+    type: Type
+    sizes: tuple[int | None, ...] | None = None
+    written: bool = True
+    variable: bool = False
+
+
+def verify(kernel: Kernel) -> None:
+    """Raise a KernelError unless the kernel is well formed."""
+    Verifier(kernel).all()
+
+
+STEPS = ("step", "leap")
+"""What a function on views calls the steps of its first and its second view."""
+
+
+class Verifier:
+    """Checks one kernel."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self.kernel = kernel
+        self.scopes: list[dict[str, Declared]] = [{}]
+        self.constants: dict[str, int] = {}
+        self.functions: dict[str, Function] = {}
+        self.tables = {key: np.asarray(table) for key, table in kernel.tables}
+        self.branches = 0
+        self.rules: dict[str, Callable[[Expr], Type]] = {
+            key.removeprefix("_type_"): getattr(self, key) for key in dir(self) if key.startswith("_type_")
+        }
+
+    def all(self) -> None:
+        """Check constants, functions and the body."""
+        kernel = self.kernel
+        for constant in kernel.constants:
+            self.declare(constant.name, Declared(INT))
+            self.check(constant.value, INT, f"constant {constant.name}")
+            self.constants[constant.name] = self.known(constant.value, f"constant {constant.name}")
+        for step in kernel.step:
+            self.positive(step, "the step of an item")
+        for function in kernel.functions:
+            self.function(function)
+        self.interface()
+        self.body(kernel.body, 0)
+
+    def interface(self) -> None:
+        """Declare what every item is given."""
+        kernel = self.kernel
+        integers = dict.fromkeys((*kernel.place, "width", "height", *kernel.interface.integers), INT)
+        integers |= {each: Type("uint32") for each in kernel.interface.integers if each in UNSIGNED}
+        integers |= dict.fromkeys(("local_x", "local_y", "item"), INT) if kernel.group else {}
+        for each, kind in integers.items():
+            self.declare(each, Declared(kind))
+        for array in kernel.interface.arrays:
+            if array.is_image or array.name == RESULT:
+                self.declare(
+                    array.name, Declared(FLOAT, (None, None, int(array.shape[-1])), array.name == RESULT)
+                )
+        self.declare(WEIGHTS, Declared(kernel.weights, (None,), False))
+
+    # ---- names -------------------------------------------------------------------------------------------
+
+    def declare(self, name: str, declared: Declared) -> None:
+        """Declare a name in the innermost scope."""
+        if any(name in scope for scope in self.scopes) or name in self.functions:
+            raise KernelError(f"{name} is declared twice")
+        if declared.type.dtype not in BYTES or declared.type.lanes < 1:
+            raise KernelError(f"{name} has the type {declared.type}, which does not exist")
+        self.scopes[-1][name] = declared
+
+    def named(self, name: str) -> Declared:
+        """Return what a name stands for."""
+        for scope in reversed(self.scopes):
+            if name in scope:
+                return scope[name]
+        raise KernelError(f"{name} is used before it is declared")
+
+    def array(self, name: str) -> Declared:
+        """Return an array by its name."""
+        declared = self.named(name)
+        if declared.sizes is None:
+            raise KernelError(f"{name} is not an array")
+        return declared
+
+    def constant(self, value: Expr) -> int | None:
+        """Return an integer that constants determine, or None."""
+        if value.op == "const":
+            return int(value.value) if value.type == INT else None
+        if value.op == "name":
+            return self.constants.get(value.value)
+        args = [self.constant(each) for each in value.args]
+        if (
+            value.op not in INTEGERS
+            or not args
+            or None in args
+            or (value.op in ("divide", "remainder") and not args[1])
+        ):
+            return None
+        return INTEGERS[value.op](*args)  # type: ignore[arg-type]
+
+    def known(self, value: Expr, what: str) -> int:
+        """Return an integer that constants must determine."""
+        number = self.constant(value)
+        if number is None:
+            raise KernelError(f"{what} is not determined by constants")
+        return number
+
+    def positive(self, value: Expr | int, what: str) -> int:
+        """Return a constant integer that must be positive."""
+        number = value if isinstance(value, int) else self.known(value, what)
+        if number <= 0:
+            raise KernelError(f"{what} is {number}, which is not positive")
+        return number
+
+    # ---- statements --------------------------------------------------------------------------------------
+
+    def function(self, function: Function) -> None:
+        """Check a function, which sees constants, earlier functions and what it takes."""
+        self.scopes.append({})
+        on_views = function.result is None
+        for key, kind in function.takes:
+            self.declare(key, Declared(kind, (None,) if on_views else None))
+        for key in STEPS[: len(function.takes)] if on_views else ():
+            self.declare(key, Declared(INT))
+        if any(isinstance(statement, Barrier) for statement in walk(function.body)):
+            raise KernelError(f"function {function.name} has a barrier")
+        for statement in function.body:
+            self.statement(statement, 1)
+        if function.result is not None:
+            self.type(function.result)
+        self.scopes.pop()
+        self.declare(function.name, Declared(FLOAT))
+        self.functions[function.name] = function
+        del self.scopes[-1][function.name]
+
+    def body(self, body: Body, depth: int = 1) -> None:
+        """Check statements in a scope."""
+        self.scopes.append({})
+        for statement in body:
+            self.statement(statement, depth)
+        self.scopes.pop()
+
+    def statement(self, statement: Statement, depth: int) -> None:
+        """Check a statement; `depth`: the statements around it."""
+        getattr(self, f"_check_{type(statement).__name__.lower()}")(statement, depth)
+
+    def _check_comment(self, statement: Statement, depth: int) -> None:
+        """Pass a comment."""
+
+    def _check_let(self, statement: Let, depth: int) -> None:
+        """Check a value, and declare its name behind it."""
+        self.declare(statement.name, Declared(self.type(statement.value)))
+
+    def _check_array(self, statement: Array, depth: int) -> None:
+        """Check the sizes, or the first value of a variable."""
+        name, kind, value = statement.name, statement.type, statement.value
+        sizes = tuple(self.positive(size, f"a size of {name}") for size in statement.sizes)
+        if statement.space == "group" and (depth or not self.kernel.group or not sizes or value is not None):
+            raise KernelError(f"{name} is memory of a group, which a kernel with groups declares at its top")
+        if value is not None:
+            if sizes:
+                raise KernelError(f"{name} is an array with a first value")
+            self.check(value, kind, f"the first value of {name}")
+        self.declare(name, Declared(kind, sizes, variable=not sizes))
+
+    def _check_store(self, statement: Store, depth: int) -> None:
+        """Check the element, and the type of the value."""
+        array, kind = statement.array, self.type(statement.value)
+        if not self.array(array).written:
+            raise KernelError(f"{array} is written, which is read only")
+        self.element(array, statement.index, kind)
+        if statement.add and (array == RESULT or kind.dtype not in ("float32", "int32", "uint32")):
+            raise KernelError(f"a value of type {kind} is added to {array}")
+
+    def _check_write(self, statement: Write, depth: int) -> None:
+        """Check all channels of a pixel."""
+        channels = self.array(RESULT).sizes
+        if channels is None or len(statement.values) != channels[-1]:
+            raise KernelError(f"a pixel is written with {len(statement.values)} channels")
+        for each in (statement.row, statement.column):
+            self.check(each, INT, "the place of a pixel")
+        for each in statement.values:
+            self.check(each, FLOAT, "a channel of a pixel")
+
+    def _check_for(self, statement: For, depth: int) -> None:
+        """Check the bounds of a loop; a barrier inside needs bounds that all items share."""
+        name = statement.name
+        for each in (statement.start, statement.count, statement.step):
+            self.check(each, INT, f"a bound of the loop over {name}")
+        self.positive(statement.step, f"the step of the loop over {name}")
+        apart = statement.until is not None or None in map(self.constant, (statement.start, statement.count))
+        self.scopes.append({})
+        self.declare(name, Declared(INT))
+        if statement.until is not None:
+            self.check(statement.until, BOOL, f"the condition of the loop over {name}")
+        self.branches += apart
+        self.body(statement.body, depth + 1)
+        self.branches -= apart
+        self.scopes.pop()
+
+    def _check_if(self, statement: If, depth: int) -> None:
+        """Check a branch."""
+        self.check(statement.condition, BOOL, "a condition")
+        self.branches += 1
+        self.body(statement.body, depth + 1)
+        self.body(statement.otherwise, depth + 1)
+        self.branches -= 1
+
+    def _check_block(self, statement: Any, depth: int) -> None:
+        """Check statements whose names end with them."""
+        self.body(statement.body, depth + 1)
+
+    def _check_barrier(self, statement: Barrier, depth: int) -> None:
+        """Refuse a barrier that some items of a group may miss."""
+        if not self.kernel.group:
+            raise KernelError("a barrier in a kernel without groups")
+        if self.branches:
+            raise KernelError("a barrier inside a branch, or a loop whose bounds are not constants")
+
+    def _check_call(self, statement: Call, depth: int) -> None:
+        """Check the views that a function is given."""
+        function = self.functions.get(statement.function)
+        if function is None or function.result is not None:
+            raise KernelError(f"{statement.function} is not a function on views")
+        if len(function.takes) != len(statement.views) or len(statement.views) > len(STEPS):
+            count = len(statement.views)
+            raise KernelError(f"{statement.function} takes {len(function.takes)} views, not {count}")
+        stored = {each.array for each in walk(function.body) if isinstance(each, Store)}
+        for (key, kind), view in zip(function.takes, statement.views, strict=True):
+            self.element(view.array, view.index, kind)
+            self.check(view.step, INT, "the step of a view")
+            if key in stored and not self.array(view.array).written:
+                raise KernelError(f"{view.array} is written by {statement.function}, and is read only")
+
+    # ---- expressions -------------------------------------------------------------------------------------
+
+    def check(self, value: Expr, kind: Type, what: str) -> None:
+        """Refuse an expression of another type."""
+        if (actual := self.type(value)) != kind:
+            raise KernelError(f"{what} has type {shown(actual)} instead of {shown(kind)}")
+
+    def type(self, value: Expr) -> Type:
+        """Return the type of an expression, which must be the one that it states."""
+        kind = self.rules.get(value.op, self._operation)(value)
+        if kind != value.type:
+            raise KernelError(f"{value.op} of type {shown(kind)} is said to have type {shown(value.type)}")
+        return kind
+
+    def element(self, name: str, index: Sequence[Expr], kind: Type) -> None:
+        """Check an access to an element of an array."""
+        declared = self.array(name)
+        for each in index:
+            self.check(each, INT, f"an index of {name}")
+        if name == WEIGHTS and kind.dtype in ("float32", "int32"):  # words, bit by bit
+            declared = Declared(Type(kind.dtype, declared.type.lanes), declared.sizes)
+        sizes, whole = declared.sizes, kind == declared.type
+        assert sizes is not None, "an array has sizes"
+        if name.startswith(IMAGE) and len(index) == 2:
+            if kind not in (FLOAT, FLOAT.of(sizes[-1] or 1)):
+                raise KernelError(f"{name} is read as {shown(kind)}")
+            return
+        if not whole and (len(index) != 1 or not reads_as(declared.type, kind) or len(sizes) != 1):
+            raise KernelError(f"{name} has elements of type {shown(declared.type)}, not {shown(kind)}")
+        if len(index) != len(sizes):
+            raise KernelError(f"{name} has {len(sizes)} indices, not {len(index)}")
+        for each, size in zip(index, sizes, strict=True):
+            number = self.constant(each)
+            if size is not None and not whole:
+                size = limit(size, declared.type, kind)
+            if number is not None and (number < 0 or (size is not None and number >= size)):
+                raise KernelError(f"index {number} is beyond {name}, which has {size}")
+
+    def _type_const(self, value: Expr) -> Type:
+        """Return the type of a constant, whose value it must hold."""
+        kind, number = value.type, value.value
+        fits = {"bool": (bool,), "float32": (int, float)}.get(kind.dtype, (int,))
+        truth = isinstance(number, bool) != (kind.dtype == "bool")
+        least, most = LIMITS.get(kind.dtype, (-np.inf, np.inf))
+        if kind.lanes != 1 or not isinstance(number, fits) or truth or not least <= number <= most:
+            raise KernelError(f"{number!r} is not a constant of type {shown(kind)}")
+        return kind
+
+    def _type_name(self, value: Expr) -> Type:
+        """Return the type of a named value, or of a variable."""
+        declared = self.named(value.value)
+        if declared.sizes:
+            raise KernelError(f"{value.value} is an array without its index")
+        return declared.type
+
+    def _type_load(self, value: Expr) -> Type:
+        """Return the type of an element."""
+        if value.value == RESULT:
+            raise KernelError("the result is read")
+        self.element(value.value, value.args, value.type)
+        return value.type
+
+    def _type_component(self, value: Expr) -> Type:
+        """Return the type of one component."""
+        vector = self.type(value.args[0])
+        if not 0 <= value.value < vector.lanes or vector.lanes == 1:
+            raise KernelError(f"component {value.value} does not exist in a value of type {shown(vector)}")
+        return vector.of(1)
+
+    def _type_splat(self, value: Expr) -> Type:
+        """Return the type of a value in all lanes."""
+        self.check(value.args[0], value.type.of(1), "a value in all lanes")
+        return value.type
+
+    def _type_stack(self, value: Expr) -> Type:
+        """Return the type of a vector of values."""
+        for each in value.args:
+            self.check(each, value.type.of(1), "a lane of a vector")
+        return value.type.of(len(value.args))
+
+    def _type_clamp(self, value: Expr) -> Type:
+        """Return the type of an index within limits."""
+        self.arity(value, 3)
+        for each in value.args:
+            self.check(each, INT, "an operand of clamp")
+        return INT
+
+    def _type_convert(self, value: Expr) -> Type:
+        """Return the type of a value of another kind."""
+        self.arity(value, 1)
+        if value.value not in BYTES:
+            raise KernelError(f"a value is converted to {value.value}, which is not a kind of value")
+        return Type(value.value, self.type(value.args[0]).lanes)
+
+    def _type_bits(self, value: Expr) -> Type:
+        """Return the type of the same bits as floats."""
+        self.arity(value, 1)
+        self.check(value.args[0], INT.of(value.type.lanes), "the words that are read as floats")
+        return FLOAT.of(value.type.lanes)
+
+    def _type_take(self, value: Expr) -> Type:
+        """Return the type of an entry of a table."""
+        if value.value not in self.tables:
+            raise KernelError(f"{value.value} is not a table")
+        self.check(value.args[0], INT, f"the index of {value.value}")
+        number, size = self.constant(value.args[0]), len(self.tables[value.value])
+        if number is not None and not 0 <= number < size:
+            raise KernelError(f"index {number} is beyond {value.value}, which has {size}")
+        return Type(str(self.tables[value.value].dtype))
+
+    def _type_dot4(self, value: Expr) -> Type:
+        """Return the type of products of bytes of words with four bytes, or with those of a word."""
+        self.arity(value, 2)
+        four = self.type(value.args[1])
+        if four not in (BYTE.of(4), INT):
+            raise KernelError(f"dot4 with {shown(four)}, which is neither four bytes nor a word")
+        self.check(value.args[0], INT.of(value.type.lanes), "an operand of dot4")
+        return INT.of(value.type.lanes)
+
+    def _type_pack4(self, value: Expr) -> Type:
+        """Return the type of a word of four floats' bytes."""
+        self.arity(value, 4)
+        for each in value.args:
+            self.check(each, FLOAT, "a byte of a word")
+        return INT
+
+    def _type_call(self, value: Expr) -> Type:
+        """Return the type of a function's result."""
+        function = self.functions.get(value.value)
+        if function is None or function.result is None:
+            raise KernelError(f"{value.value} is not a function of values")
+        if len(value.args) != len(function.takes):
+            raise KernelError(f"{value.value} takes {len(function.takes)} values, not {len(value.args)}")
+        for each, (key, kind) in zip(value.args, function.takes, strict=True):
+            self.check(each, kind, f"argument {key} of {value.value}")
+        return function.result.type
+
+    def _operation(self, value: Expr) -> Type:
+        """Return the type of an operation on equal lanes; one condition may choose between vectors."""
+        args = [self.type(each) for each in value.args]
+        if value.op == "select" and len(args) == 3 and args[0] == BOOL:
+            args[0] = BOOL.of(args[1].lanes)
+        if value.op in ("divide", "remainder") and args == [INT, INT]:
+            return INT
+        rule = OPS.get(value.op)
+        if rule is None or not rule.elementwise or value.op == "convert":
+            raise KernelError(f"{value.op} is not an operation")
+        self.arity(value, rule.arity or 0)
+        if len({each.lanes for each in args}) != 1:
+            raise KernelError(f"{value.op} of {', '.join(map(shown, args))}: lanes differ")
+        try:
+            kind = rule.type_rule([ir.Type(each.dtype) for each in args], {}, {})
+        except TypeRuleError as error:
+            raise KernelError(f"{value.op}: {error}") from None
+        return Type(kind.dtype, args[0].lanes)
+
+    def arity(self, value: Expr, count: int) -> None:
+        """Refuse an operation with another number of operands."""
+        if len(value.args) != count:
+            raise KernelError(f"{value.op} has {len(value.args)} operands, not {count}")
+
+
+def shown(kind: Type) -> str:
+    """Return a type as messages name it."""
+    return kind.dtype if kind.lanes == 1 else f"{kind.dtype} x {kind.lanes}"
+
+
+def limit(size: int, declared: Type, kind: Type) -> int:
+    """Return how many indices an array of elements of one type has that is accessed as another.
+
+    Several elements at once begin at any one of them; else the index counts components.
+    """
+    return size - kind.lanes + 1 if declared.lanes == 1 else size * declared.lanes // kind.lanes
+
+
+def reads_as(declared: Type, kind: Type) -> bool:
+    """Return whether memory of one type may be accessed as another: by component, or several at once."""
+    return declared.dtype == kind.dtype and 1 in (declared.lanes, kind.lanes)

@@ -1,0 +1,491 @@
+"""From a kernel to its source: one walk over the IR for all languages, with the words of a dialect.
+
+1. Expressions have as few parentheses as the order of operations needs [`Renderer.text`]; a dialect's
+   template of an operation says how strongly it binds.
+2. Images, weights and the result are where a language has them: buffers, textures, tables [`Renderer._load`,
+   `Renderer._store`].
+3. Statements are printed one by one [`Renderer.statement`]; only the layout of vectors in memory needs a look
+   at the whole kernel: an array of vectors that is also read by components [`Renderer.mixed`].
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.lines import Lines
+from ..kernel.interface import DENOISE, IMAGE, READ, RESULT, TABLE, WEIGHTS, Interface
+from ..kernel.interface import Array as Memory
+from ..kernel.kernel import (
+    FLOAT,
+    INT,
+    Array,
+    Barrier,
+    Block,
+    Body,
+    Call,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    View,
+    Write,
+    const,
+    parts,
+    substituted,
+    values,
+    walk,
+)
+from .dialect import Dialect, Parts
+
+BINDING: Mapping[str, int] = {
+    "||": 2, "&&": 3, "|": 4, "^": 5, "&": 6, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8,
+    "<<": 9, ">>": 9, "+": 10, "-": 10, "*": 11, "/": 11, "%": 11,
+}  # fmt: skip
+"""How strongly operators bind, as in C."""
+
+CHOICE, UNARY, ATOM = 1, 12, 13
+"""The same of `a ? b : c`, of operators of one operand, and of what needs no parentheses."""
+
+INFIX = re.compile(r"^\{\d\} (\S+) \{\d\}$|^1\.0f (/) \{0\}$")
+"""A template of an operator of two operands."""
+
+SIMPLE = re.compile(r"[^(]*\((\{\d\})(, \{\w+\})*\)")
+"""A template of a function whose arguments stand alone."""
+
+
+def binding(template: str) -> int:
+    """Return how strongly a template binds."""
+    if found := INFIX.match(template):
+        return BINDING[found[1] or found[2]]
+    if " ? " in template and not template.endswith(")"):
+        return CHOICE
+    return UNARY if template[0] in "-!" else ATOM
+
+
+def framed(
+    dialect: Dialect, kernel: Interface, parts: Parts, header: Sequence[str], lines: Sequence[str]
+) -> str:
+    """Return a kernel's source: a comment, what the kernel is bound to, its statements, its end."""
+    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+    begin, end = dialect.begin(kernel, parts), dialect.ends[kernel.role]
+    return dialect.finished("\n".join([*dialect.first, *comment, begin, *lines, end])) + "\n"
+
+
+def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
+    """Yield the arrays that statements read and write, and the types of what is read and written."""
+    for statement in walk(body):
+        if isinstance(statement, Store):
+            yield statement.array, statement.value.type
+        for value in values(statement):
+            yield from ((each.value, each.type) for each in parts(value) if each.op == "load")
+
+
+def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32]) -> Kernel:
+    """Return a kernel whose weights and integers are where a language has them."""
+    images = [array for array in kernel.interface.arrays if array.is_image]
+    result = kernel.interface.named(RESULT)
+    assert result is not None
+    weights = [] if dialect.home == TABLE else [Memory(WEIGHTS, READ, (packed.size,), dialect.home)]
+    tables = kernel.tables if weights else (*kernel.tables, (WEIGHTS, packed))
+    interface = Interface(DENOISE, (*images, *weights, result), tuple(dialect.integers[DENOISE]))
+    return replace(kernel, interface=interface, tables=tables)
+
+
+class Renderer(Lines):
+    """Prints one kernel in one language."""
+
+    def __init__(self, dialect: Dialect, kernel: Kernel, bounded: bool, packed: NDArray[np.float32]) -> None:
+        self.dialect, self.bounded = dialect.fitted(kernel), bounded
+        kernel = self.kernel = housed(kernel, dialect, packed)
+        self.lines: list[str] = []
+        self.depth = 1
+        everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
+        self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
+        self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
+
+    def _narrower(self, array: str, kind: Type) -> bool:
+        """Return whether an access is to a component of an array of vectors by its own index."""
+        return array in self.arrays and kind.lanes < self.arrays[array].type.lanes
+
+    def source(self, header: Sequence[str]) -> str:
+        """Return the whole source, under the lines of a comment."""
+        dialect, kernel = self.dialect, self.kernel
+        for function in kernel.functions:
+            self.function(function)
+        functions, self.lines = self.lines, []
+        self.body(kernel.body)
+        top = [*map(self.constant, kernel.constants), *self.tables(), *functions]
+        begin = dialect.begin(kernel.interface, Parts("\n".join(top), self.bounded, kernel=kernel))
+        comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
+        lines = [*dialect.first, *comment, begin, *self.lines, dialect.ends[kernel.interface.role]]
+        return dialect.finished("\n".join(lines)) + "\n"
+
+    def constant(self, constant: Constant) -> str:
+        """Return the definition of a named integer."""
+        value = self.text(constant.value)
+        value = f"({value})" if constant.value.args else value
+        line = self.dialect.define.format(name=constant.name, value=value)
+        return f"{line} /* {constant.comment} */" if constant.comment else line
+
+    def tables(self) -> list[str]:
+        """Return the declarations of constant tables."""
+        return [self.dialect.table_declaration(name, array) for name, array in self.kernel.tables]
+
+    def function(self, function: Function) -> None:
+        """Write a function above the kernel."""
+        takes = [(name, self.kind(kind)) for name, kind in function.takes]
+        result = function.result
+        if result is None:
+            self.lines.append(self.dialect.transform_head(function.name, self.kind(function.takes[0][1])))
+        else:
+            self.lines += [self.dialect.function_head(function.name, takes, self.kind(result.type))]
+        self.depth = 1
+        self.body(function.body)
+        if result is not None:
+            self._line(f"return {self.text(result)};")
+        self.lines.append("}")
+
+    # ---- types -------------------------------------------------------------------------------------------
+
+    def kind(self, kind: Type) -> str:
+        """Return the name of a type."""
+        if kind.lanes == 1:
+            return self.dialect.byte if kind.dtype == "uint8" else self.dialect.scalars[kind.dtype]
+        return self.dialect.vector_kind(kind.dtype, kind.lanes)
+
+    def variable(self, kind: Type, kept: bool) -> str:
+        """Return the words before the name of a variable."""
+        return (self.dialect.qualifiers.get(kind.dtype, "") if kept else "") + self.kind(kind)
+
+    # ---- expressions -------------------------------------------------------------------------------------
+
+    def text(self, value: Expr, least: int = 0) -> str:
+        """Return the text of an expression that binds at least as strongly as `least`, or in parentheses."""
+        form: Callable[[Expr], tuple[str, int]] = getattr(self, f"_{value.op}", self._operation)
+        text, binds = form(value)
+        return text if binds >= least else f"({text})"
+
+    def _const(self, value: Expr) -> tuple[str, int]:
+        """Return a constant."""
+        return self.dialect.number(
+            value.value, "int32" if value.type.dtype == "uint8" else value.type.dtype
+        ), ATOM
+
+    def _name(self, value: Expr) -> tuple[str, int]:
+        """Return a name."""
+        return str(value.value), ATOM
+
+    def _component(self, value: Expr) -> tuple[str, int]:
+        """Return one component of a vector."""
+        return f"{self.text(value.args[0], ATOM)}.{'xyzw'[value.value]}", ATOM
+
+    def _splat(self, value: Expr) -> tuple[str, int]:
+        """Return a value in all lanes."""
+        number = self.text(value.args[0])
+        number = number[1:-1] if number.startswith("(-") else number
+        return self.dialect.vector_of(self.kind(value.type), [number]), ATOM
+
+    def _stack(self, value: Expr) -> tuple[str, int]:
+        """Return a vector of values."""
+        return self.dialect.vector_of(self.kind(value.type), [self.text(each) for each in value.args]), ATOM
+
+    def _call(self, value: Expr) -> tuple[str, int]:
+        """Return a call of a function of values."""
+        return f"{value.value}({', '.join(self.text(each) for each in value.args)})", ATOM
+
+    def _clamp(self, value: Expr) -> tuple[str, int]:
+        """Return an index within limits."""
+        return f"{self.dialect.clamp}({', '.join(self.text(each) for each in value.args)})", ATOM
+
+    def _remainder(self, value: Expr) -> tuple[str, int]:
+        """Return the remainder of indices."""
+        return self._filled("{0} % {1}", value)
+
+    def _take(self, value: Expr) -> tuple[str, int]:
+        """Return an entry of a table."""
+        return f"{value.value}[{self.text(value.args[0])}]", ATOM
+
+    def _operation(self, value: Expr) -> tuple[str, int]:
+        """Return an operation of the program."""
+        dialect, kind = self.dialect, value.args[-1].type
+        if min(kind.lanes, value.args[0].type.lanes) > 1 and (vectors := dialect.vector_operations):
+            for key in (f"{value.op}.{kind.dtype}", value.op):
+                if key in vectors:
+                    return self._filled(vectors[key], value)
+        template = dialect.operations.get(f"{value.op}.{kind.dtype}") or dialect.operations[value.op]
+        return self._filled(template, value)
+
+    def _filled(self, template: str, value: Expr) -> tuple[str, int]:
+        """Return a template with operands as strongly bound as their places need."""
+        binds, infix = binding(template), bool(INFIX.match(template))
+        args = list(value.args)
+        if infix and self.dialect.widens:  # a language with such operators widens a single value by itself
+            single = [a.args[0] if a.op == "splat" else a for a in args]
+            args = single if any(a.type.lanes > 1 for a in single) else args
+        texts = [self.text(a, place) for a, place in zip(args, self._places(template, value), strict=False)]
+        return template.format(*texts, type=self.kind(value.type), lanes=value.type.lanes), binds
+
+    def _places(self, template: str, value: Expr) -> list[int]:
+        """Return how strongly each operand of a template must bind."""
+        binds = binding(template)
+        if INFIX.match(template):
+            in_any_order = value.op == "add" and value.type.dtype == "int32"
+            return [binds, binds + (not in_any_order), 0]
+        if binds in (CHOICE, UNARY):
+            return [2 if binds == CHOICE else ATOM] * 3  # two signs side by side would be another operator
+        return [0 if SIMPLE.fullmatch(template) else UNARY] * 3
+
+    # ---- memory ------------------------------------------------------------------------------------------
+
+    def _load(self, value: Expr) -> tuple[str, int]:
+        """Return an element of an image, of the weights, or of an array."""
+        array, index = str(value.value), value.args
+        if array.startswith(IMAGE):
+            return self._pixel(array, index, value.type.lanes), ATOM
+        if array == WEIGHTS:
+            lanes = value.type.lanes
+            place = self.text(index[0])
+            return (self.dialect.weight if lanes == 1 else self.dialect.weight_vector).format(
+                index=place, kind=self.kind(value.type)
+            ), ATOM
+        return self.element(array, index, value.type.lanes), ATOM
+
+    def _pixel(self, array: str, index: Sequence[Expr], lanes: int) -> str:
+        """Return a channel of an image's pixel, all of its channels, or the value at a position of a row."""
+        found = self.kernel.interface.named(array)
+        assert found is not None, array
+        channels = int(found.shape[-1])
+        if lanes > 1:
+            y, x = map(self.text, index)
+            return self.dialect.texel.format(
+                image=array.removeprefix(IMAGE), row=y, column=x, part="rgba"[:lanes]
+            )
+        if len(index) == 2:
+            row, position = index
+            assert position.op == "add", (
+                "a position in a row is the first of a pixel's, and a distance from it"
+            )
+            first, beyond = position.args
+            index = [row, first if channels == 1 else first.args[0], beyond]
+        y, x, c = map(self.text, index)
+        return self.dialect.pixel.format(
+            image=array.removeprefix(IMAGE), channels=channels, row=y, column=x, c=c
+        )
+
+    def element(self, array: str, index: Sequence[Expr], lanes: int) -> str:
+        """Return an element of an array of the kernel."""
+        declared = self.arrays.get(array)
+        if declared and array in self.mixed:
+            number = lanes < declared.type.lanes
+            return self.dialect.mixed_element(array, self.text(index[0]), self.kind(declared.type), number)
+        return array + "".join(f"[{self.text(each)}]" for each in index)
+
+    # ---- statements --------------------------------------------------------------------------------------
+
+    def body(self, body: Body) -> None:
+        """Write statements."""
+        for statement in body:
+            self.statement(statement)
+
+    def statement(self, statement: Statement) -> None:
+        """Write a statement."""
+        getattr(self, f"_write_{type(statement).__name__.lower()}")(statement)
+
+    def _write_comment(self, statement: Comment) -> None:
+        """Write a comment on a line of its own, after an empty one."""
+        self._comment(statement.text)
+
+    def _write_let(self, statement: Let) -> None:
+        """Write a value that never changes."""
+        kind = statement.value.type
+        if kind == INT and not statement.kept:
+            self._line(self.dialect.index(statement.name, self.text(statement.value)))
+            return
+        if kind.lanes > 1 and self.dialect.calls_vectors:
+            factors = kind.dtype == "int32"
+            self._line(f"{'wamnet_bytes' if factors else self.kind(kind)} {statement.name};")
+            self._vector_call(f"&{statement.name}", statement.value, False, not factors)
+            return
+        text = self.text(statement.value)
+        self._line(self.dialect.let_value(self.variable(kind, statement.kept), statement.name, text))
+
+    def _write_array(self, statement: Array) -> None:
+        """Write a declaration of memory."""
+        if statement.space == "group":
+            return  # declared where the language wants it [dialects' `shared_array`]
+        kind = self.variable(statement.type, statement.kept)
+        sizes = [self.text(size) if isinstance(size, Expr) else str(size) for size in statement.sizes]
+        if statement.name in self.mixed:
+            size = statement.sizes[0]
+            count = self.text(size, 11) if isinstance(size, Expr) else str(size)
+            self._line(self.dialect.mixed_array(kind, statement.name, count, statement.type.lanes))
+            return
+        first = self.text(statement.value) if statement.value else ""
+        self._line(self.dialect.memory(kind, statement.name, sizes, first))
+
+    def _write_store(self, statement: Store) -> None:
+        """Write a change of memory."""
+        value, index = statement.value, statement.index
+        if statement.array == RESULT:
+            self._result(index, value)
+            return
+        target = self.element(statement.array, index, value.type.lanes)
+        if value.op == "dot4":
+            self._line(self._dotted(target, *value.args))
+            return
+        if value.type.lanes > 1 and self.dialect.calls_vectors:
+            self._vector_call(target if statement.array in self.mixed else f"&{target}", value, statement.add)
+            return
+        sign = "+" if statement.add else ""
+        if sign and value.op == "negative":
+            sign, value = "-", value.args[0]
+        self._line(f"{target} {sign}= {self.text(value)};")
+
+    def _dotted(self, total: str, weights: Expr, four: Expr) -> str:
+        """Return the statement that adds products of bytes to a sum."""
+        if four.op == "load" and four.type.lanes > 1:
+            place = f"{four.value} + {self.text(four.args[0], 10)}"
+            return self.dialect.dot_of_bytes.format(total=total, weights=self.text(weights), place=place)
+        return f"{total} = wamnet_dots({total}, {self.text(weights)}, {self.text(four)});"
+
+    def _pack4(self, value: Expr) -> tuple[str, int]:
+        """Return four values as the bytes of a word."""
+        return f"wamnet_packed({', '.join(self.text(each) for each in value.args)})", ATOM
+
+    def _bits(self, value: Expr) -> tuple[str, int]:
+        """Return words of weights read as floats."""
+        function = "wamnet_numbers" if self.kernel.group else f"as_{self.kind(value.type)}"
+        return f"{function}({self.text(value.args[0])})", ATOM
+
+    def _convert(self, value: Expr) -> tuple[str, int]:
+        """Return values of another kind."""
+        sums = value.args[0].type.dtype == "int32" and value.type == FLOAT.of(4)
+        if self.kernel.group and self.kernel.weights.dtype == "int32" and sums:
+            return f"wamnet_floats({self.text(value.args[0])})", ATOM
+        if value.type.lanes == 1 and self.dialect.casts:
+            return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY
+        return self._operation(value)
+
+    def _vector_call(self, target: str, value: Expr, add: bool, starts: bool = True) -> None:
+        """Write a change of a vector as a call of one of the language's own functions.
+
+        `starts`: words of weights are where a sum begins, not factors.
+        """
+        if value.op == "convert":
+            place = self.element(value.args[0].value, value.args[0].args, value.type.lanes)
+            call, given = "floats", [f"&{place}"]
+        elif value.op == "splat":
+            call, given = "clear", []
+        elif value.op == "multiply":
+            factor, number = value.args
+            call, given = "add_product", [f"&{self.text(factor)}", self.text(number.args[0])]
+        elif value.value == WEIGHTS:
+            call = {"float32": "load", "int32": "start"}[value.type.dtype] if starts else "weights"
+            given = [f"weights + {self.text(value.args[0], 11)} * LANES"]
+        else:
+            place = self.element(value.value, value.args, value.type.lanes)
+            call = "add" if add else "load" if value.value in self.mixed else "store"
+            given = [place if value.value in self.mixed else f"&{place}"]
+        self._line(f"wamnet_{call}({', '.join([target, *given])});")
+
+    def _result(self, index: Sequence[Expr], value: Expr) -> None:
+        """Write a channel of the result."""
+        row, column, channel = index
+        shown = {"row": self.text(row, 11), "column": self.text(column, 10), "i": self.text(channel, 10)}
+        result, channels = RESULT, self.channels
+        each = self.dialect.channels_per_result
+        if each and channels > each:
+            number, of = divmod(int(channel.value), each)
+            result, shown["i"] = f"{RESULT}_{number}", str(of)
+        self._line(
+            self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown)
+        )
+
+    def _write_write(self, statement: Write) -> None:
+        """Write all channels of a pixel."""
+        for line in self.dialect.pixel_begin:
+            self._line(line)
+        for channel, value in enumerate(statement.values):
+            self._result((statement.row, statement.column, const(channel)), value)
+        row, column = self.text(statement.row), self.text(statement.column)
+        for line in self.dialect.pixel_end:
+            self._line(line.format(row=row, column=column))
+
+    @property
+    def channels(self) -> int:
+        """Return the channels of the result."""
+        result = self.kernel.interface.named(RESULT)
+        assert result is not None
+        return int(result.shape[-1])
+
+    def _write_for(self, statement: For) -> None:
+        """Write a loop; one over channels of several results is written out."""
+        if self._splits(statement):
+            for number in range(int(statement.count.value)):
+                known = {statement.name: const(number)}
+                for each in statement.body:
+                    assert isinstance(each, Store)
+                    index = tuple(substituted(e, known) for e in each.index)
+                    self.statement(replace(each, index=index, value=substituted(each.value, known)))
+            return
+        if statement.how == "unroll" and self.dialect.unroll:
+            self._line(self.dialect.unroll)
+        start, count, step = (self.text(e) for e in (statement.start, statement.count, statement.step))
+        until = f" && {self.text(statement.until, 4)}" if statement.until else ""
+        self._open(self.dialect.for_loop(statement.name, start, count + until, step))
+        self.body(statement.body)
+        self._close()
+
+    def _splits(self, statement: For) -> bool:
+        """Return whether a loop chooses among results that no variable may choose of."""
+        dialect = self.dialect
+        stores = all(isinstance(each, Store) and each.array == RESULT for each in statement.body)
+        several = dialect.channels_per_result and self.channels > dialect.channels_per_result
+        return stores and bool(several or not dialect.indexes_results)
+
+    def _write_if(self, statement: If) -> None:
+        """Write a branch."""
+        self._open(f"if ({self.text(statement.condition)}) {{")
+        self.body(statement.body)
+        self._close()
+        if statement.otherwise:
+            self._open("else {")
+            self.body(statement.otherwise)
+            self._close()
+
+    def _write_block(self, statement: Block) -> None:
+        """Write statements whose names end with them."""
+        self._open("{")
+        self.body(statement.body)
+        self._close()
+
+    def _write_barrier(self, statement: Barrier) -> None:
+        """Write that all items of a group wait."""
+        self._line(self.dialect.wait)
+
+    def _write_call(self, statement: Call) -> None:
+        """Write a call of a function on views."""
+        given = ", ".join(text for view in statement.views for text in self.view(view))
+        self._line(f"{self.dialect.own}{statement.function}({given});")
+
+    def view(self, view: View) -> tuple[str, str]:
+        """Return the address of a view, and its step."""
+        array, index = self.arrays[view.array], view.index
+        rows = "".join(f"[{self.text(each)}]" for each in index[:-1])
+        last = self.text(index[-1], 10)
+        if view.array in self.mixed:
+            place = self.dialect.mixed_address(view.array, self.text(index[-1], 11), self.kind(array.type))
+            return place, self.text(view.step)
+        return f"{view.array}{rows}" + (f" + {last}" if last != "0" else ""), self.text(view.step)

@@ -1,0 +1,240 @@
+"""What all schedules share: which program a kernel can hold, groups of nodes, and elementwise statements.
+
+1. Nodes are grouped in their order [`groups_of`]: neighbouring elementwise nodes of one shape share a loop,
+   an affine node is a loop nest of its own.
+2. A value that another group reads is an array `v<node>`; a value that only its own loop reads is `t<node>`
+   [`Nest`]. The numbers are those of the printed program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from ...refimpl.errors import CompileError
+from ..core.ir import Gather, Image, Node, Program, users
+from ..core.ops import LOOPS, OPS
+from ..core.weights import Slot, tables
+from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
+from ..kernel.kernel import (
+    FLOAT,
+    INT,
+    Body,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    apply,
+    const,
+    expr,
+    load,
+    name,
+    splat,
+)
+
+X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
+"""An item's first pixel, and the size of the images."""
+
+ROWS, COLUMNS = name("WINDOW_ROWS"), name("WINDOW_COLUMNS")
+"""Taps of a window along both axes: one name where it is square [`Nest.window`]."""
+
+
+def kernel_gather(program: Program) -> Gather:
+    """Return how the window is filled, or refuse a program that no kernel of a denoiser can hold."""
+    if program.gather is None or len(program.outputs) != 1:
+        raise CompileError(
+            f"the program has {len(program.outputs)} outputs and {'a' if program.gather else 'no'} gathered "
+            "window: a kernel needs one output and a window; lower a model, or trace with a Gather"
+        )
+    if any(node.op in LOOPS for node in program.nodes):
+        raise CompileError(
+            "the program has a loop over the rows of tables, which this skeleton does not hold: trace it "
+            "without `most_unrolled`"
+        )
+    return program.gather
+
+
+def output_channels(program: Program) -> int:
+    """Return the number of channels of the only output."""
+    shape = program.nodes[program.outputs[0][1]].type.shape
+    return shape[0] if shape else 1
+
+
+def groups_of(program: Program) -> list[tuple[int, ...]]:
+    """Return groups of node indices in order: nodes that share a loop, or one other node."""
+    groups: list[list[int]] = []
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter"):
+            continue
+        last = program.nodes[groups[-1][-1]] if groups else node
+        if groups and _loops(node) and _loops(last) and node.type.shape == last.type.shape:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    return [tuple(group) for group in groups]
+
+
+def _loops(node: Node) -> bool:
+    """Return whether the node is one statement, in a loop over components or in straight code."""
+    return OPS[node.op].elementwise or node.op in ("component", "take")
+
+
+def weight(index: Expr | int, kind: Type = FLOAT) -> Expr:
+    """Return an element of the weights."""
+    return load(WEIGHTS, index, kind=kind)
+
+
+def loop(counter: str, count: Expr | int, *body: Statement) -> For:
+    """Return a loop."""
+    return For(counter, expr(count), body)
+
+
+Read = Callable[[int], Expr]
+"""The expression of a value that another group has computed."""
+
+
+class Nest:
+    """Builds the statements of one program."""
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], lanes: int = 1) -> None:
+        self.program, self.slots, self.lanes = program, slots, lanes
+        self.gather, self.groups, self.readers = kernel_gather(program), groups_of(program), users(program)
+        self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
+
+    def window(self) -> list[Constant]:
+        """Return the constants of the window."""
+        gather, pixel = self.gather, "the tap that lies on the pixel itself"
+        if gather.axes == (0, 1):
+            self.rows = self.columns = name("WINDOW_SIZE")
+            self.row = self.column = name("WINDOW_CENTRE")
+        else:
+            self.rows, self.columns = ROWS, COLUMNS
+            self.row, self.column = name("CENTRE_ROW"), name("CENTRE_COLUMN")
+        found = {self.rows.value: (gather.rows, ""), self.columns.value: (gather.columns, "")}
+        found |= {self.row.value: (gather.rows // 2, pixel)}
+        found = {
+            **found,
+            self.column.value: (gather.columns // 2, ""),
+            self.row.value: (gather.rows // 2, pixel),
+        }
+        return [Constant(name, const(value), text) for name, (value, text) in found.items()]
+
+    def kernel(self, body: Sequence[Statement], constants: Sequence[Constant], **more: object) -> Kernel:
+        """Return the kernel of statements; where its weights are is a matter of the language."""
+        interface = denoiser(self.gather.images, 0, output_channels(self.program), BUFFER, ())
+        found = tuple(tables(self.program).items())
+        return Kernel(interface, tuple(body), tuple(constants), tables=found, **more)  # type: ignore[arg-type]
+
+    # ---- values ------------------------------------------------------------------------------------------
+
+    def is_array(self, index: int) -> bool:
+        """Return whether something outside the node's own loop reads this vector component by component."""
+        node = self.program.nodes[index]
+        readers = [r for r in self.readers[index] if self.group_of[r] != self.group_of[index]]
+        if node.op == "input":
+            readers = [r for r in readers if self.program.nodes[r].op != "affine"]
+        return bool(readers) or any(index == output for _, output in self.program.outputs)
+
+    def constant(self, node: Node) -> Expr:
+        """Return the value of a constant node."""
+        dtype = node.type.dtype
+        value = node["value"]
+        return const(float(value) if dtype == "float32" else value, Type(dtype))  # type: ignore[arg-type]
+
+    def statements(self, group: Sequence[int], read: Read, lanes: int) -> list[Let]:
+        """Return a statement for each node of an elementwise group; `read`: values of other groups."""
+        found: dict[int, Expr] = {}
+        lines = []
+        for index in group:
+            node = self.program.nodes[index]
+            value = self._value(node, found, read, lanes if node.type.shape else 1)
+            found[index] = value if self.fuses(index) else name(f"t{index}", value.type)
+            lines += [] if self.fuses(index) else [Let(f"t{index}", value, kept=True)]
+        return lines
+
+    def fuses(self, index: int) -> bool:
+        """Return whether a value has no name: its expression is part of the only one that reads it."""
+        return False
+
+    def _value(self, node: Node, own: Mapping[int, Expr], read: Read, lanes: int) -> Expr:
+        """Return what an elementwise node computes."""
+        args = [own[a] if a in own else self.operand(a, read) for a in node.args]
+        if node.op == "component":
+            return self.component(node)
+        if node.op == "take":
+            return Expr("take", tuple(args), Type(node.type.dtype), node["table"])
+        kind = node.get("dtype")
+        return apply(node.op, *(splat(a, lanes) for a in args), value=kind)
+
+    def component(self, node: Node) -> Expr:
+        """Return one component of another group's vector."""
+        raise NotImplementedError
+
+    def operand(self, index: int, read: Read) -> Expr:
+        """Return a constant, or what another group has computed."""
+        node = self.program.nodes[index]
+        return self.constant(node) if node.op == "constant" else read(index)
+
+    def span(self, group: Sequence[int]) -> Comment:
+        """Return the comment above an elementwise group."""
+        nodes = f"%{group[0]}" if len(group) == 1 else f"%{group[0]} to %{group[-1]}"
+        return Comment(f"{nodes}: elementwise on {self.program.nodes[group[0]].type.shape[0]} numbers")
+
+    def mapped(self, index: int, node: Node) -> Comment:
+        """Return the comment above an affine map."""
+        n_in = self.program.parameters[str(node["weight"])].shape[1]
+        return Comment(f"%{index}: affine map {node['weight']} from {n_in} to {node.type.shape[0]}")
+
+    def offset(self, parameter: object) -> int:
+        """Return the place of a parameter's first weight."""
+        return self.slots[str(parameter)].offset
+
+    # ---- the window --------------------------------------------------------------------------------------
+
+    def tap_row(self) -> Let:
+        """Return the row of a tap, inside the image."""
+        return Let("row", clamp(Y + name("dy") - self.row, HEIGHT))
+
+    def tap_column(self) -> list[Let]:
+        """Return the column of a tap, and whether the tap is inside the image where that matters."""
+        column = Let("column", clamp(X + name("dx") - self.column, WIDTH))
+        if self.gather.window.border == "clamp":
+            return [column]
+        same = apply("equal", name("row"), Y + name("dy") - self.row)
+        along = apply("equal", name("column"), X + name("dx") - self.column)
+        return [column, Let("inside", same & along)]
+
+    def pixel(self, image: Image, channel: Expr | int) -> Expr:
+        """Return a channel at `row` and `column` under the border rule; no read leaves the image."""
+        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), channel)
+        if self.gather.window.border == "clamp":
+            return value
+        return apply("select", name("inside", Type("bool")), value, const(0.0))
+
+    def texel(self, image: Image) -> Expr:
+        """Return all channels at `row` and `column` under the border rule."""
+        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), kind=FLOAT.of(image.channels))
+        if image.channels == 1:
+            return self.pixel(image, 0)
+        if self.gather.window.border == "clamp":
+            return value
+        return apply("select", name("inside", Type("bool")), value, splat(const(0.0), image.channels))
+
+
+def clamp(value: Expr, count: Expr) -> Expr:
+    """Return the nearest index below `count`."""
+    return Expr("clamp", (value, const(0), count - 1), INT)
+
+
+def output(program: Program, row: Expr, column: Expr, read: Callable[[Expr], Expr]) -> Body:
+    """Return the statements that write the only output of a pixel; `read`: a channel of it."""
+    name_of, index = program.outputs[0]
+    if not program.nodes[index].type.shape:
+        return Comment(f"output {name_of}"), Store(RESULT, (row, column, const(0)), read(const(0)))
+    i = name("i")
+    write = loop("i", output_channels(program), Store(RESULT, (row, column, i), read(i)))
+    return Comment(f"output {name_of}"), write

@@ -1,0 +1,446 @@
+"""The FFT schedule: sums over the window as products of spectra, tile by tile; then the tiled schedule.
+
+1. A work item computes `tiles` tiles side by side, each of OUT x OUT pixels, OUT = POINTS - WINDOW_SIZE + 1:
+   those whose windows lie in POINTS x POINTS pixels of the images (overlap-save: what wraps around is not
+   computed). Its patch is gathered row by row, under the border rule [`Spectral.rows_forward`].
+2. Two channels are one complex image, and a vector holds such pairs of all tiles: `LANES` transforms at once,
+   none of which needs a shuffle. Rows are transformed as they come, columns when they are needed.
+3. A column k and its mirror image -k give both channels' spectra; each is multiplied with the spectra of the
+   neurons' weights and summed over channels, with all tiles' sums in registers [`Spectral.products`].
+4. The sums of neurons j and j + LANES are one complex image again: one inverse transform of the columns, of
+   whose rows OUT are kept, and one of each row give both.
+5. What a row of all tiles gives goes through the other layers as in the tiled schedule, PIXELS at a time.
+
+The transforms are functions of the kernel, traced from `fourier.transform` [`codelet`]. Weights are
+transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is that of fourier.py.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.ir import Node, Program
+from ..core.weights import Slot
+from ..kernel.interface import RESULT
+from ..kernel.kernel import (
+    FLOAT,
+    Array,
+    Body,
+    Call,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    View,
+    apply,
+    const,
+    load,
+    name,
+    splat,
+)
+from . import fourier
+from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
+from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, placed, readers_of_window
+
+PARTS = 2
+"""Values of a complex one: its real and its imaginary part."""
+
+POINTS, OUT, TILES, PAIRS, INPUTS, NEURONS, STRIDE = map(
+    name, ("POINTS", "OUT", "TILES", "PAIRS", "INPUTS", "NEURONS", "STRIDE")
+)
+OF_BLOCK = name("BLOCK")
+"""Pairs of channels whose products are added up by themselves."""
+
+TILE, TILE_X, TILE_Y, K, F, G, Q, T, APART, LINE = map(
+    name, ("tile", "tile_x", "tile_y", "k", "f", "g", "q", "t", "apart", "line")
+)
+STEP, LEAP = name("step"), name("leap")
+
+PRODUCTS = {
+    "real": (("+", 0, "a"), ("-", 1, "b"), ("+", 2, "c"), ("-", 3, "d")),
+    "imaginary": (("+", 1, "a"), ("+", 0, "b"), ("+", 3, "c"), ("+", 2, "d")),
+}
+"""What each part adds up: sign, two vectors of weights, and part of a pair's spectra a + i b and c + i d."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Channel pairs, vectors that hold all tiles' pairs, pairs of neuron vectors, rows of a tile.
+
+    `block`: pairs of channels whose products are added up by themselves.
+    """
+
+    pairs: int
+    inputs: int
+    neurons: int
+    out: int
+    block: int
+
+
+def sizes_of(program: Program, lanes: int, points: int, tiles: int) -> Sizes:
+    """Return the sizes of a program's kernel."""
+    gather, (layer,) = kernel_gather(program), readers_of_window(program)
+    pairs = -(-gather.channels // 2)
+    neurons = -(-layer.type.shape[0] // (2 * lanes))
+    return Sizes(
+        pairs, -(-tiles * pairs // lanes), neurons, points - gather.rows + 1, fourier.block_of(pairs)
+    )
+
+
+def spectra_stored(
+    program: Program, lanes: int, points: int, tiles: int
+) -> Mapping[str, NDArray[np.float32]]:
+    """Return all weights as they are stored: of the matrix that reads the window its spectra.
+
+    Those are columns, groups, rows, pairs, channels, parts and neurons.
+    """
+    (layer,), s = readers_of_window(program), sizes_of(program, lanes, points, tiles)
+    columns = points // 2 + 1
+    matrix = program.parameters[str(layer["weight"])].astype(np.float64)
+    spectra = fourier.spectrum(matrix, kernel_gather(program).rows, points).transpose(2, 1, 3, 0)[:columns]
+    # Frequencies that are their own negatives have real spectra; float64 leaves some 2^-53 there.
+    spectra[:: points // 2, :: points // 2] = spectra[:: points // 2, :: points // 2].real
+    filled = np.zeros((columns, points, 2 * s.pairs, s.neurons * 2 * lanes), np.complex128)
+    filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
+    # Channel j of the first half and channel j of the second are a pair.
+    split = filled.reshape(columns, points, 2, s.pairs, s.neurons, 2 * lanes).transpose(0, 4, 1, 3, 2, 5)
+    both = np.stack([split.real, split.imag], axis=5).astype(np.float32)
+    return {**all_stored(program, lanes, 2), str(layer["weight"]): both}
+
+
+# ---- transforms ------------------------------------------------------------------------------------------
+
+
+class Traced:
+    """The operations of a transform, in the order in which they are made."""
+
+    def __init__(self) -> None:
+        self.made: list[Expr] = []
+
+    def add(self, value: Expr) -> Number:
+        """Return a new value."""
+        self.made.append(value)
+        return Number(name(f"t{len(self.made) - 1}", value.type), self)
+
+    def needed(self, outputs: list[Expr]) -> list[Let]:
+        """Return what outputs depend on; a sum contains the products that only it reads."""
+        readers = Counter(each.value for each in outputs)
+        kept = []
+        for number, value in reversed(list(enumerate(self.made))):
+            if readers[f"t{number}"]:
+                readers.update(arg.value for arg in value.args if arg.op == "name" and value.op != "load")
+                kept.append(number)
+        known: dict[str, Expr] = {}
+        lets = []
+        wanted = {each.value for each in outputs}
+        for number in kept[::-1]:
+            value, own = self.made[number], f"t{number}"
+            if value.op != "load":
+                value = apply(value.op, *(known.get(str(arg.value), arg) for arg in value.args))
+            if value.op == "multiply" and readers[own] == 1 and own not in wanted:
+                known[own] = value
+            else:
+                lets.append(Let(own, value))
+        return lets
+
+
+@dataclass(frozen=True)
+class Number:
+    """A value that an operation of a transform makes."""
+
+    value: Expr
+    traced: Traced
+
+    def __add__(self, other: Number) -> Number:
+        return self.traced.add(apply("add", self.value, other.value))
+
+    def __sub__(self, other: Number) -> Number:
+        return self.traced.add(apply("subtract", self.value, other.value))
+
+    def __mul__(self, factor: float) -> Number:
+        wide = splat(const(factor), self.value.type.lanes)
+        return self.traced.add(apply("multiply", self.value, wide))
+
+
+def codelet(title: str, points: int, kept: int, sign: int, kind: Type) -> Function:
+    """Return the function that transforms `points` complex values and keeps the first `kept`."""
+    traced = Traced()
+    places = [(STEP * (PARTS * k), STEP * (PARTS * k) + 1) for k in range(points)]
+    inputs = [tuple(traced.add(load("from", at, kind=kind)) for at in pair) for pair in places]
+    found = fourier.transform(inputs, sign)[:kept]  # type: ignore[arg-type]
+    outputs = [part.value for number in found for part in number]
+    stores = [
+        Store("to", (LEAP * (PARTS * k) + i,), part.value)
+        for k, number in enumerate(found)
+        for i, part in enumerate(number)
+    ]
+    return Function(title, (("from", kind), ("to", kind)), (*traced.needed(outputs), *stores))
+
+
+# ---- statements ------------------------------------------------------------------------------------------
+
+
+def fft(program: Program, lanes: int, pixels: int, points: int, tiles: int, wide: bool) -> Kernel:
+    """Return the kernel; `wide`: the language has elementwise operations on vectors."""
+    slots = placed(spectra_stored(program, lanes, points, tiles))
+    return Spectral(program, slots, lanes, pixels, points, tiles, wide).built()
+
+
+class Spectral(Tiled):
+    """Builds the kernel with Fourier transforms."""
+
+    def __init__(
+        self,
+        program: Program,
+        slots: Mapping[str, Slot],
+        lanes: int,
+        pixels: int,
+        points: int,
+        tiles: int,
+        wide: bool,
+    ) -> None:
+        super().__init__(program, slots, lanes, pixels, 2, wide)
+        self.points, self.tiles = points, tiles
+        self.sizes = sizes_of(program, lanes, points, tiles)
+        self.centres = fourier.arrangement(program, lanes).centres
+
+    def constants(self) -> list[Constant]:
+        """Return the sizes of tiles and transforms."""
+        s = self.sizes
+        return [
+            *self.window(),
+            Constant("POINTS", const(self.points), "rows and columns of a tile with what its windows reach"),
+            Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            Constant("TILES", const(self.tiles), "neighbours in a row that a work item computes"),
+            Constant("PIXELS", const(self.pixels), "pixels of a row that go through the layers together"),
+            Constant("LANES", const(self.lanes), "components of a vector"),
+            Constant("PAIRS", const(s.pairs), "of channels"),
+            Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
+            Constant("INPUTS", const(s.inputs), "vectors that hold the pairs of all tiles"),
+            Constant("NEURONS", const(s.neurons), "pairs of vectors of neurons"),
+            Constant("STRIDE", 2 * (POINTS + 1), "vectors from row to row: not a multiple of 4096 bytes"),
+        ]
+
+    def built(self) -> Kernel:
+        """Return the kernel."""
+        constants = self.constants()
+        body: list[Statement] = [*self.rows_forward(), *self.columns_of_frequencies(), *self.layers()]
+        functions = (
+            codelet("forward", self.points, self.points, -1, self.vector),
+            codelet("backward", self.points, self.sizes.out, 1, self.vector),
+        )
+        return self.kernel(
+            body,
+            constants,
+            functions=functions,
+            step=(TILES * OUT, OUT),
+            place=("tile_x", "tile_y"),
+            weights=self.vector,
+        )
+
+    def transform(self, function: str, source: View, target: View) -> Call:
+        """Return a call of a transform."""
+        return Call(function, (source, target))
+
+    def rows_forward(self) -> list[Statement]:
+        """Return the gathering and transformation of rows."""
+        top, left, row, column = map(name, ("top", "left", "row", "column"))
+        lines: list[Statement] = [
+            Let("left", TILE_X + TILE * OUT + name("dx") - self.column),
+            Let("column", clamp(left, WIDTH)),
+        ]
+        if self.gather.window.border == "zero":
+            lines.append(Let("inside", apply("equal", row, top) & apply("equal", column, left)))
+        first = 0
+        for image in self.gather.images:
+            for c in range(image.channels):
+                part, pair = divmod(first + c, self.sizes.pairs)
+                value = self.pixel(image, c)
+                if centre := self.centres[first + c]:
+                    value = apply("subtract", value, const(centre))
+                lane, at = TILE * PAIRS + pair, name("dx") * 2 + part
+                place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
+                lines.append(Store("gathered", (place,), value))
+            first += image.channels
+        start, count = COUNTER * POINTS * 2, INPUTS * POINTS * 2
+        to = View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,), const(1))
+        call = self.transform("forward", View("gathered", (start,), const(1)), to)
+        gather = loop("tile", TILES, loop("dx", POINTS, *lines))
+        return [
+            Comment("rows of the images around the tiles, transformed"),
+            Array("gathered", self.vector, (count,)),
+            Array("rows", self.vector, (INPUTS * POINTS * STRIDE,)),
+            loop("i", count, Store("gathered", (COUNTER,), self.zero)),
+            loop(
+                "dy",
+                POINTS,
+                Let("top", TILE_Y + name("dy") - self.row),
+                Let("row", clamp(top, HEIGHT)),
+                gather,
+                loop("i", INPUTS, call),
+            ),
+        ]
+
+    def columns_of_frequencies(self) -> list[Statement]:
+        """Return the loop over columns of frequencies: forward, products with the weights, back."""
+        vector, opposite = self.vector, name("opposite")
+        row, one = COUNTER * POINTS * STRIDE, const(1)
+        forward = [
+            self.transform(
+                "forward",
+                View("rows", (row + 2 * k,), POINTS + 1),
+                View("columns", (const(n), const(0)), one),
+            )
+            for n, k in enumerate((K, opposite))
+        ]
+        a, b = (load("columns", const(0), 2 * F + part, kind=vector) for part in (0, 1))
+        c, d = (load("columns", APART, 2 * G + part, kind=vector) for part in (0, 1))
+        lets = [Let(n, value) for n, value in zip("abcd", (a, b, c, d), strict=True)]
+        a, b, c, d = (name(n, vector) for n in "abcd")
+        both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
+        place = (COUNTER * POINTS + F) * 4
+        stores = [Store("spectra", (place + n,), value) for n, value in enumerate(both)]
+        unpack = loop("f", POINTS, Let("g", (POINTS - F) % POINTS), *lets, *stores)
+        mirrored = apply("not_equal", opposite, K)
+        back = (TILE * NEURONS + Q) * OUT * STRIDE
+        backward = [
+            self.transform(
+                "backward",
+                View("product", (TILE * 2 + n, const(0)), one),
+                View("back", (back + 2 * k,), POINTS + 1),
+            )
+            for n, k in enumerate((K, opposite))
+        ]
+        # A column that is its own mirror image is mirrored, not computed twice: both parts of each complex
+        # image stay apart to the bit.
+        return [
+            Comment("columns: transformed, multiplied with the weights' spectra, transformed back"),
+            Array("columns", vector, (2, POINTS * 2)),
+            Array("spectra", vector, (INPUTS * POINTS * 4,)),
+            Array("product", vector, (TILES * 2, POINTS * 2)),
+            Array("back", vector, (TILES * NEURONS * OUT * STRIDE,)),
+            loop(
+                "k",
+                POINTS // 2 + 1,
+                Let("opposite", (POINTS - K) % POINTS),
+                Let("apart", apply("select", mirrored, const(1), const(0))),
+                loop("i", INPUTS, forward[0], If(mirrored, (forward[1],)), unpack),
+                loop(
+                    "q",
+                    NEURONS,
+                    loop("f", POINTS, *self.products()),
+                    loop("tile", TILES, backward[0], If(mirrored, (backward[1],))),
+                ),
+            ),
+        ]
+
+    def products(self) -> list[Statement]:
+        """Return the products of a column of frequencies for all tiles."""
+        split = self.sizes.block < self.sizes.pairs
+        pair = BLOCK * OF_BLOCK + name("pair") if split else name("pair")
+        (layer,) = readers_of_window(self.program)
+        first = self.offset(layer["weight"]) // self.lanes
+        at = first + (((K * NEURONS + Q) * POINTS + F) * PAIRS + pair) * 8
+        weights = [Let(f"w{j}", weight(at + j, self.vector)) for j in range(8)]
+        lane = T * PAIRS + pair
+        place = (lane // LANES * POINTS + F) * 4 * LANES + lane % LANES
+        lines: list[Statement] = [
+            Let("at", place),
+            *(Let(n, load("spectra", name("at") + LANES * k)) for k, n in enumerate("abcd")),
+        ]
+        for v in range(2):
+            for part, terms in PRODUCTS.items():
+                for sign, number, value in terms:
+                    factor = splat(name(value, FLOAT), self.lanes)
+                    product = apply("multiply", name(f"w{2 * number + v}", self.vector), factor)
+                    product = product if sign == "+" else apply("negative", product)
+                    lines.append(Store(part, (T, const(v)), product, add=True))
+        names = ("real", "imaginary")
+        sums: list[Statement] = [loop("pair", OF_BLOCK, *weights, self.each_tile(lines))]
+        whole = names
+        if split:
+            whole = ("whole_real", "whole_imaginary")
+            adds: list[Statement] = [
+                Store(total, (T, const(v)), load(part, T, const(v), kind=self.vector), add=True)
+                for total, part in zip(whole, names, strict=True)
+                for v in range(2)
+            ]
+            sums = [loop("block", PAIRS // OF_BLOCK, *self.zeros(names), *sums, self.each_tile(adds))]
+        (a, c), (b, d) = ([load(part, T, const(v), kind=self.vector) for v in range(2)] for part in whole)
+        ends = (
+            (T * 2, 2 * F, apply("subtract", a, d)),
+            (T * 2, 2 * F + 1, apply("add", b, c)),
+            (T * 2 + APART, 2 * G, apply("add", a, d)),
+            (T * 2 + APART, 2 * G + 1, apply("subtract", c, b)),
+        )
+        stores = self.each_tile([Store("product", (image, place), value) for image, place, value in ends])
+        return [*self.zeros(whole), *sums, Let("g", (POINTS - F) % POINTS), stores]
+
+    def zeros(self, names: tuple[str, ...]) -> list[Statement]:
+        """Return the sums of all tiles, which start with zeros."""
+        arrays = [Array(part, self.vector, (TILES, 2), register=True) for part in names]
+        return [
+            *arrays,
+            self.each_tile([Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]),
+        ]
+
+    def each_tile(self, lines: list[Statement]) -> For:
+        """Return a loop over tiles that keeps each tile's sums in registers of their own."""
+        return For("t", TILES, tuple(lines), "unroll")
+
+    def layers(self) -> list[Statement]:
+        """Return the rows back, and the other layers for blocks of pixels."""
+        of_row = self.tiles * self.sizes.out
+        blocks = -(-of_row // self.pixels)
+        found: list[Statement] = [
+            Comment("rows back, and the other layers"),
+            Array("sums", self.vector, (blocks * PIXELS * NEURONS * 2,)),
+        ]
+        if blocks * self.pixels > of_row:
+            # The last block reaches beyond the tiles: its values there are read, and none is written.
+            beyond = (blocks * PIXELS - TILES * OUT) * NEURONS * 2
+            found.append(loop("i", beyond, Store("sums", (TILES * OUT * NEURONS * 2 + COUNTER,), self.zero)))
+        at = (TILE // NEURONS * OUT * NEURONS + TILE % NEURONS) * 2
+        source = View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
+        rows = loop("tile", TILES * NEURONS, self.transform("backward", source, View("sums", (at,), NEURONS)))
+        lines: list[Statement] = [
+            Let("x", TILE_X + BLOCK * PIXELS),
+            Let("last", apply("minimum", TILE_X + TILES * OUT, WIDTH)),
+        ]
+        for group in self.groups:
+            lines += self.of_group(group)
+        lines += self.outputs()
+        body = (rows, Let("y", TILE_Y + LINE), loop("block", blocks, *lines))
+        return [*found, For("line", OUT, body, until=TILE_Y + LINE < HEIGHT)]
+
+    def affine(self, index: int, node: Node) -> list[Statement]:
+        """Return the copy of the sums of a block of pixels, or what the tiled schedule does."""
+        if self.program.nodes[node.args[0]].op != "input":
+            return super().affine(index, node)
+        bias, total = node.get("bias"), self.total(index)
+        lines = []
+        for j in range(total):
+            value = load("sums", (BLOCK * PIXELS + P) * NEURONS * 2 + j, kind=self.vector)
+            if bias:
+                value = apply("add", value, weight(self.offset(bias) // self.lanes + j, self.vector))
+            lines.append(Store(f"v{index}", (P * total + j,), value))
+        return [Comment(f"%{index}: the sums, and their bias"), self.array(index), loop("p", PIXELS, *lines)]
+
+    def outputs(self) -> Body:
+        """Return the statements that write the output of each pixel of the block in tiles and image."""
+        output, index = self.program.outputs[0]
+        value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
+        write = loop("i", self.program.nodes[index].type.shape[0], Store(RESULT, (Y, X + P, COUNTER), value))
+        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=name("last") > X + P)

@@ -1,0 +1,132 @@
+"""The inlined schedule: straight code of one pixel, weights are constants of the source.
+
+For a renderer on a processor (Mesa's llvmpipe) a constant is an operand, while every other read of a weight
+is a chain of checks and gathers: measured, a weight in a texture costs 23 times as much, one in a uniform
+block 5 times. The price is paid once, when the driver compiles, in proportion to the number of weights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.ir import Image, Node, Program
+from ..core.sums import is_split
+from ..kernel.kernel import (
+    Array,
+    Block,
+    Expr,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    apply,
+    const,
+    name,
+    splat,
+    stack,
+)
+from .common import HEIGHT, WIDTH, X, Y, clamp
+from .straight import VECTOR, ZERO, Straight, variables
+
+LARGEST_WEIGHTS = 2**16
+"""Most weights of a kernel: llvmpipe compiles some two thousand a second."""
+
+
+def inlined(program: Program) -> Kernel:
+    """Return the kernel."""
+    return Inlined(program, {}, 4).built()
+
+
+def numbers(array: NDArray[np.float32], vector: int) -> Expr:
+    """Return four values of a vector (n,) from 4 * vector on, 0 behind the end, as a constant."""
+    held = array[4 * vector : 4 * vector + 4].tolist()
+    return stack([const(float(value)) for value in held + [0.0] * (4 - len(held))])
+
+
+class Inlined(Straight):
+    """Builds the inlined kernel."""
+
+    def built(self) -> Kernel:
+        """Return the kernel."""
+        constants = self.window()
+        body: list[Statement] = []
+        for nodes in self.groups:
+            node = self.program.nodes[nodes[0]]
+            if node.op != "input":
+                body += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
+        body += [self.output_comment(), self.written(Y, X, 0)]
+        return self.kernel(body, constants, functions=tuple(self.functions()))
+
+    def parameter(self, node: Node, vector: int) -> Expr:
+        """Return four values of a parameter that is a vector."""
+        return numbers(self.program.parameters[str(node["name"])], vector)
+
+    # ---- affine maps -------------------------------------------------------------------------------------
+
+    def affine(self, index: int, node: Node) -> list[Statement]:
+        """Return v = W x + b, one constant column of weights times one input after another."""
+        matrix, bias = self.program.parameters[str(node["weight"])], node.get("bias")
+        found: list[Statement] = [self.mapped(index, node)]
+        for j in range(self.vectors(index)):
+            start = numbers(self.program.parameters[str(bias)], j) if bias else ZERO
+            found.append(Array(self.variable(index, 0, j), VECTOR, value=start))
+        if self.program.nodes[node.args[0]].op == "input":
+            return [*found, *self.of_window(index, matrix)]
+        for i, column in enumerate(matrix.T):
+            found += self.added(f"v{index}", column, self.at(node.args[0], 0, i // 4).lane(i % 4))
+        return found
+
+    def added(self, sums: str, column: NDArray[np.float32], value: Expr) -> list[Statement]:
+        """Return the additions of a column of weights (D_out,) times a value to all vectors."""
+        products = [
+            apply("multiply", numbers(column, j), splat(value, 4)) for j in range(-(-len(column) // 4))
+        ]
+        return [Store(f"{sums}_{j}", (), product, add=True) for j, product in enumerate(products)]
+
+    def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[Statement]:
+        """Return the products of all taps: a partial sum for each row of taps of an image."""
+        gather, split = self.gather, is_split(self.gather)
+        part = f"part{index}"
+        found: list[Statement] = []
+        for group in gather.groups:
+            for row in range(gather.rows):
+                lines: list[Statement] = []
+                if split:
+                    lines += variables([f"{part}_{j}" for j in range(self.vectors(index))], ZERO)
+                for column in range(gather.columns):
+                    tap = (row * gather.columns + column) * gather.channels
+                    lines.append(
+                        self.tap(
+                            row,
+                            column,
+                            [(image, matrix[:, tap + first :]) for image, first in group],
+                            part if split else f"v{index}",
+                        )
+                    )
+                if split:
+                    names = [
+                        (self.variable(index, 0, j), name(f"{part}_{j}", VECTOR))
+                        for j in range(self.vectors(index))
+                    ]
+                    lines += [Store(total, (), value, add=True) for total, value in names]
+                found.append(Block(tuple(lines)))
+        return found
+
+    def tap(
+        self, row: int, column: int, images: list[tuple[Image, NDArray[np.float32]]], sums: str
+    ) -> Statement:
+        """Return the products of a tap's channels with their columns of weights."""
+        at = Y + row - self.gather.rows // 2, X + column - self.gather.columns // 2
+        lines: list[Statement] = [Let("row", clamp(at[0], HEIGHT)), Let("column", clamp(at[1], WIDTH))]
+        if self.gather.window.border == "zero":
+            lines.append(
+                Let("inside", apply("equal", name("row"), at[0]) & apply("equal", name("column"), at[1]))
+            )
+        for image, columns in images:
+            value = self.texel(image)
+            texel = name(image.name, value.type)
+            lines.append(Let(image.name, value))
+            for c in range(image.channels):
+                lines += self.added(sums, columns[:, c], texel.lane(c) if image.channels > 1 else texel)
+        return Block(tuple(lines))

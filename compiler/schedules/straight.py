@@ -1,0 +1,147 @@
+"""Straight code: layers as variables of four neurons, every statement written out; no array, so no index.
+
+A compiler keeps all of a layer in registers. Elementwise groups are functions of vectors where a language has
+arithmetic on vectors; elsewhere of single values, called for each component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..core.ir import Node
+from ..kernel.kernel import (
+    FLOAT,
+    Array,
+    Block,
+    Comment,
+    Expr,
+    Function,
+    Let,
+    Statement,
+    Store,
+    Type,
+    Write,
+    apply,
+    call,
+    const,
+    name,
+    splat,
+    stack,
+)
+from .common import Nest
+
+VECTOR = FLOAT.of(4)
+"""Four neurons side by side."""
+
+
+class Straight(Nest):
+    """Builds straight code of one or several pixels; `wide`: the language has arithmetic on vectors."""
+
+    pixels = 1
+    wide = True
+
+    def vectors(self, index: int) -> int:
+        """Return the vectors of four that hold a value."""
+        return -(-self.program.nodes[index].type.shape[0] // 4)
+
+    def places(self, index: int) -> list[tuple[int, int]]:
+        """Return all (pixel, vector) of a value."""
+        return [(p, j) for p in range(self.pixels) for j in range(self.vectors(index))]
+
+    def variable(self, index: int, p: int, j: int) -> str:
+        """Return the name of a vector of a value at a pixel."""
+        return f"v{index}_{p}_{j}" if self.pixels > 1 or self.pixel_names else f"v{index}_{j}"
+
+    pixel_names = False
+
+    def at(self, index: int, p: int, j: int) -> Expr:
+        """Return a vector of a value at a pixel: a variable, or part of a parameter."""
+        node = self.program.nodes[index]
+        return self.parameter(node, j) if node.op == "parameter" else name(self.variable(index, p, j), VECTOR)
+
+    def parameter(self, node: Node, vector: int) -> Expr:
+        """Return four values of a parameter that is a vector."""
+        raise NotImplementedError
+
+    # ---- elementwise groups ------------------------------------------------------------------------------
+
+    def operands(self, group: Sequence[int]) -> list[int]:
+        """Return the vectors from outside that a group reads."""
+        read = {arg for index in group for arg in self.program.nodes[index].args} - set(group)
+        return sorted(index for index in read if self.program.nodes[index].op != "constant")
+
+    def results(self, group: Sequence[int]) -> list[int]:
+        """Return the values of a group that others read."""
+        return [index for index in group if self.is_array(index)]
+
+    def functions(self) -> list[Function]:
+        """Return the functions of elementwise groups."""
+        elementwise = [g for g in self.groups if self.program.nodes[g[0]].op not in ("input", "affine")]
+        return [
+            f for group in elementwise for result in self.results(group) for f in self.function(group, result)
+        ]
+
+    def function(self, group: Sequence[int], result: int) -> list[Function]:
+        """Return the function that computes one value of a group, and that of its components where needed."""
+        kind, taken = VECTOR if self.wide else FLOAT, self.operands(group)
+        takes = tuple((f"v{k}", kind) for k in taken)
+        lets = self.statements(group, lambda k: name(f"v{k}", kind), kind.lanes)
+        own = [let for let in lets if int(let.name[1:]) <= result]
+        title = f"elementwise_{result}"
+        if self.wide:
+            return [Function(title, takes, tuple(own), name(f"t{result}", kind))]
+        one = Function(f"{title}_of_one", takes, tuple(own), name(f"t{result}", kind))
+        lanes = [[name(f"v{k}", VECTOR).lane(lane) for k in taken] for lane in range(4)]
+        whole = stack([call(one.name, given, FLOAT) for given in lanes])
+        return [one, Function(title, tuple((n, VECTOR) for n, _ in takes), (), whole)]
+
+    def elementwise(self, group: tuple[int, ...]) -> list[Statement]:
+        """Return the calls of a group's functions, one for each pixel and vector."""
+        found: list[Statement] = [self.span(group)]
+        for result in self.results(group):
+            for p, j in self.places(group[0]):
+                given = [self.at(k, p, j) for k in self.operands(group)]
+                value = call(f"elementwise_{result}", given, VECTOR)
+                found.append(Array(self.variable(result, p, j), VECTOR, value=value))
+        return found
+
+    # ---- sums --------------------------------------------------------------------------------------------
+
+    def multiplied(
+        self, weights: Sequence[Expr], sums: Sequence[Sequence[str]], factors: Sequence[Expr]
+    ) -> list[Statement]:
+        """Return the additions of a row of weights times each pixel's value, each weight read once.
+
+        `sums`: names, by vector and pixel.
+        """
+        found: list[Statement] = []
+        for weight, names in zip(weights, sums, strict=True):
+            m = name("m", weight.type)
+            adds = [
+                Store(s, (), self.product(m, x, s), add=True) for s, x in zip(names, factors, strict=True)
+            ]
+            found.append(Block((Let("m", weight), *adds)))
+        return found
+
+    def product(self, weight: Expr, factor: Expr, total: str) -> Expr:
+        """Return what a weight adds to a sum."""
+        return apply("multiply", weight, splat(factor, 4))
+
+    def written(self, row: Expr, column: Expr, p: int) -> Statement:
+        """Return the statement that writes the output of a pixel."""
+        index = self.program.outputs[0][1]
+        channels = range(self.program.nodes[index].type.shape[0])
+        return Write(row, column, tuple(self.at(index, p, i // 4).lane(i % 4) for i in channels))
+
+    def output_comment(self) -> Comment:
+        """Return the comment above the output."""
+        return Comment(f"output {self.program.outputs[0][0]}")
+
+
+def variables(names: Sequence[str], value: Expr, kind: Type = VECTOR) -> list[Array]:
+    """Return variables with one first value."""
+    return [Array(each, kind, value=value, register=True) for each in names]
+
+
+ZERO = splat(const(0.0), 4)
+"""What a sum starts with."""

@@ -1,0 +1,406 @@
+"""The tiled schedule: a work item computes a row of pixels, and keeps their sums in vector registers.
+
+1. The images around the pixels are copied to a patch that belongs to the work item; the border rule is
+   applied there, and the loops that follow know no border [`Tiled.patches`].
+2. The neurons of a layer stand side by side in vectors of `lanes`, the last one filled up with neurons whose
+   weights are 0: nothing reads them.
+3. An affine map works on blocks of `vectors` vectors: all pixels' sums of a block are in registers while the
+   inputs pass by, each weight is loaded once for all pixels, each input is one value for all lanes. With
+   14 pixels and 2 vectors there are 28 independent sums for 3 loads a step and input: arithmetic units, not
+   loads, set the pace (the register tile of K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix
+   Multiplication, 2008, section 4).
+4. Weights are stored in the order in which the loops need them [`tiled_layout`].
+5. Elementwise operations run on vectors, or on components where a language has no arithmetic on vectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import weights
+from ..core.ir import DTYPES, Image, Node, Program
+from ..core.sums import is_split
+from ..core.weights import Slot
+from ..kernel.interface import IMAGE, RESULT
+from ..kernel.kernel import (
+    FLOAT,
+    Array,
+    Block,
+    Body,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    apply,
+    const,
+    load,
+    name,
+    splat,
+)
+from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, groups_of, kernel_gather, loop, output_channels, weight
+
+PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
+COUNTER, J, P, DX, DY, LEFT, TOP, BLOCK = map(name, ("i", "j", "p", "dx", "dy", "left", "top", "block"))
+
+
+LARGEST_PRIVATE = 2**20
+"""Most bytes of arrays in a work item: half of the smallest stack that glibc gives a thread, which executors
+grant. A quarter kept spectra from layers of 64 neurons, which take a third of the time with them."""
+
+ON_VECTORS = (
+    *("add", "subtract", "multiply", "divide", "negative", "absolute", "minimum", "maximum", "floor"),
+    *("reciprocal", "sqrt", "sin", "cos", "less", "less_equal", "greater", "greater_equal", "select"),
+    *("bitwise_and", "bitwise_xor", "right_shift", "convert"),
+)
+"""Operations that languages have on vectors."""
+
+
+def refused_by_vectors(program: Program, most_channels: int) -> str:
+    """Return why the values of a program cannot all be vectors, or nothing."""
+    for index, node in enumerate(program.nodes):
+        if node.op in ("constant", "parameter", "input", "affine"):
+            continue
+        if node.op not in ON_VECTORS:
+            return f"%{index} is {node.op}, which has no form on vectors"
+        if not node.type.shape:
+            return f"%{index} is {node.type}: vectors hold {', '.join(f'{t}[n]' for t in DTYPES)}"
+    if reason := _others_between_loops(program):
+        return reason
+    output = program.nodes[program.outputs[0][1]]
+    if (channels := output_channels(program)) > most_channels:
+        return f"it writes {channels} channels, of at most {most_channels}"
+    if any(node.op != "affine" for node in readers_of_window(program)):
+        return "something besides an affine map reads the window"
+    if output.op in ("constant", "parameter", "input"):
+        return "the output is not computed"
+    return ""
+
+
+def _others_between_loops(program: Program) -> str:
+    """Return which value that is not a float another loop would have to read from an array, or nothing."""
+    group_of = {index: number for number, group in enumerate(groups_of(program)) for index in group}
+    for reader, node in enumerate(program.nodes):
+        for index in node.args:
+            known = program.nodes[index]
+            other = known.op != "constant" and known.type.dtype != "float32"
+            if other and group_of.get(index) != group_of[reader]:
+                return f"%{index} is {known.type}, which %{reader} in another loop reads"
+    return ""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """How n neurons fill vectors: `count` blocks of `vectors` vectors."""
+
+    vectors: int
+    count: int
+
+    @property
+    def total(self) -> int:
+        """Return the number of vectors."""
+        return self.vectors * self.count
+
+
+def blocks_of(neurons: int, lanes: int, vectors: int) -> Blocks:
+    """Return how so many neurons fill blocks of at most `vectors` vectors of `lanes`."""
+    count = -(-neurons // lanes)
+    most = min(vectors, count)
+    return Blocks(most, -(-count // most))
+
+
+# ---- weights ---------------------------------------------------------------------------------------------
+
+
+def readers_of_window(program: Program) -> list[Node]:
+    """Return the nodes that read the window."""
+    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
+    return [node for node in program.nodes if inputs & set(node.args)]
+
+
+def matrices(nodes: Iterable[Node]) -> set[str]:
+    """Return the names of the matrices that affine maps among these nodes apply."""
+    return {str(node["weight"]) for node in nodes if node.op == "affine"}
+
+
+def shared_matrix(program: Program) -> str:
+    """Return a refusal where one matrix is needed in two orders."""
+    used = readers_of_window(program)
+    if matrices(used) & matrices(node for node in program.nodes if node not in used):
+        return "a matrix is applied to the window and to a layer, which need it in two orders"
+    return ""
+
+
+def stored(program: Program, parameter: str, lanes: int, vectors: int) -> NDArray[np.float32]:
+    """Return a parameter as it is stored: blocks x inputs x neurons of a block, or all neurons."""
+    rows = np.atleast_2d(program.parameters[parameter].T)  # (D_in, D_out), or (1, D_out)
+    if parameter in matrices(readers_of_window(program)):
+        rows = rows[np.asarray(kernel_gather(program).by_image, np.intp)]
+    blocks = blocks_of(rows.shape[1], lanes, vectors)
+    filled = np.zeros((len(rows), blocks.total * lanes), np.float32)
+    filled[:, : rows.shape[1]] = rows
+    if program.parameters[parameter].ndim == 1:
+        return filled.ravel()
+    ordered = filled.reshape(len(rows), blocks.count, -1).transpose(1, 0, 2)
+    found: NDArray[np.float32] = np.ascontiguousarray(ordered)
+    return found
+
+
+def placed(arrays: Mapping[str, NDArray[np.float32]]) -> Mapping[str, Slot]:
+    """Return the slots of arrays one after another."""
+    slots: dict[str, Slot] = {}
+    offset = 0
+    for key, array in arrays.items():
+        slots[key] = Slot(key, array.shape, offset)
+        offset += array.size
+    return slots
+
+
+def all_stored(program: Program, lanes: int, vectors: int) -> dict[str, NDArray[np.float32]]:
+    """Return all weights as they are stored, by name."""
+    return {key: stored(program, key, lanes, vectors) for key in weights.weights(program)}
+
+
+# ---- statements ------------------------------------------------------------------------------------------
+
+
+def tile(program: Program, lanes: int, pixels: int, vectors: int, wide: bool) -> Kernel:
+    """Return the kernel; `wide`: the language has elementwise operations on vectors."""
+    slots = placed(all_stored(program, lanes, vectors))
+    return Tiled(program, slots, lanes, pixels, vectors, wide).built()
+
+
+class Tiled(Nest):
+    """Builds the tiled kernel."""
+
+    def __init__(
+        self, program: Program, slots: Mapping[str, Slot], lanes: int, pixels: int, vectors: int, wide: bool
+    ) -> None:
+        super().__init__(program, slots, lanes)
+        self.pixels, self.vectors, self.wide = pixels, vectors, wide
+        self.vector = self.sum_type = Type("float32", lanes)
+        self.element = self.vector if wide else FLOAT
+
+    def blocks(self, neurons: int) -> Blocks:
+        """Return how neurons fill blocks."""
+        return blocks_of(neurons, self.lanes, self.vectors)
+
+    def total(self, index: int) -> int:
+        """Return the vectors of a value."""
+        return self.blocks(self.program.nodes[index].type.shape[0]).total
+
+    def constants(self) -> list[Constant]:
+        """Return the sizes of the window, the tile and the patch."""
+        return [
+            *self.window(),
+            Constant("PIXELS", const(self.pixels), "neighbours in a row that a work item computes"),
+            Constant("LANES", const(self.lanes), "components of a vector"),
+            Constant("PATCH_WIDTH", self.columns + PIXELS - 1, "columns that all windows touch"),
+        ]
+
+    def built(self) -> Kernel:
+        """Return the kernel."""
+        constants = self.constants()
+        body = self.patches()
+        for group in self.groups:
+            body += self.of_group(group)
+        body += self.outputs()
+        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weight_type())
+
+    def weight_type(self) -> Type:
+        """Return the type of an element of the weights."""
+        return self.vector
+
+    # ---- the images around the pixels --------------------------------------------------------------------
+
+    def patches(self) -> list[Statement]:
+        """Return the copies of the images around the pixels, under the border rule."""
+        images = self.gather.images
+        size = self.rows * PATCH_WIDTH
+        arrays = [self.patch(image, size * image.channels) for image in images]
+        within = apply("less_equal", const(0), LEFT) & (LEFT + PATCH_WIDTH <= WIDTH)
+        within = within & apply("less_equal", const(0), TOP) & (TOP + self.rows <= HEIGHT)
+        row = Let("row", clamp(TOP + DY, HEIGHT))
+        return [
+            Comment("the images around the pixels: what lies beyond the border is filled in here"),
+            *arrays,
+            Let("left", X - self.column),
+            Let("top", Y - self.row),
+            Let("within", within),
+            loop("dy", self.rows, row, *map(self.copy, images)),
+        ]
+
+    def patch(self, image: Image, size: Expr) -> Array:
+        """Return the declaration of an image's patch."""
+        return Array(f"patch_{image.name}", FLOAT, (size,))
+
+    def copied(self, value: Expr) -> Expr:
+        """Return a value of an image as a patch holds it."""
+        return value
+
+    def copy(self, image: Image) -> Statement:
+        """Return the copy of a row of the patch: at once inside the image, else pixel by pixel."""
+        patch, channels, row = f"patch_{image.name}", image.channels, name("row")
+        first = DY * PATCH_WIDTH * channels
+        at_once = load(f"{IMAGE}{image.name}", row, LEFT * channels + COUNTER)
+        fast = loop("i", PATCH_WIDTH * channels, Store(patch, (first + COUNTER,), self.copied(at_once)))
+        column = [Let("column", clamp(LEFT + DX, WIDTH))]
+        if self.gather.window.border == "zero":
+            same = apply("equal", row, TOP + DY) & apply("equal", name("column"), LEFT + DX)
+            column.append(Let("inside", same))
+        c = name("c")
+        put = Store(patch, (first + DX * channels + c,), self.copied(self.pixel(image, c)))
+        slow = loop("dx", PATCH_WIDTH, *column, loop("c", channels, put))
+        return If(name("within", Type("bool")), (fast,), (slow,))
+
+    # ---- groups ------------------------------------------------------------------------------------------
+
+    def of_group(self, group: tuple[int, ...]) -> list[Statement]:
+        """Return the statements of an affine map, or of elementwise operations."""
+        index, node = group[0], self.program.nodes[group[0]]
+        if node.op == "input":
+            return []
+        return self.affine(index, node) if node.op == "affine" else self.elementwise(group)
+
+    def array(self, index: int) -> Array:
+        """Return the declaration of a value's array: vectors of all pixels."""
+        return Array(f"v{index}", self.vector, (PIXELS * self.total(index),))
+
+    def elementwise(self, group: tuple[int, ...]) -> list[Statement]:
+        """Return the loop of a group over all pixels' vectors, or their components."""
+        kept = [k for k in group if self.is_array(k)]
+        count = PIXELS * self.total(group[0])
+        lines: list[Statement] = []
+        for let in self.statements(group, self.read, self.element.lanes):
+            lines.append(let)
+            if int(let.name[1:]) in kept:
+                lines.append(Store(f"v{let.name[1:]}", (COUNTER,), name(let.name, self.element)))
+        return [
+            self.span(group),
+            *map(self.array, kept),
+            loop("i", count if self.wide else count * LANES, *lines),
+        ]
+
+    def read(self, index: int) -> Expr:
+        """Return element `i` of another group's value."""
+        node = self.program.nodes[index]
+        if node.op != "parameter":
+            return load(f"v{index}", COUNTER, kind=self.element)
+        total, offset = self.blocks(node.type.shape[0]).total, self.offset(node["name"])
+        if self.wide:
+            return weight(offset // self.lanes + COUNTER % total, self.vector)
+        return weight(offset + COUNTER % (total * LANES))
+
+    def fuses(self, index: int) -> bool:
+        """Return whether this is a product that one sum reads: compilers fuse what one expression holds."""
+        if self.program.nodes[index].op != "multiply" or len(self.readers[index]) != 1:
+            return False
+        (reader,) = self.readers[index]
+        inside = self.group_of.get(reader) == self.group_of[index] and not self.is_array(index)
+        return inside and self.program.nodes[reader].op in ("add", "subtract")
+
+    # ---- affine maps -------------------------------------------------------------------------------------
+
+    def affine(self, index: int, node: Node) -> list[Statement]:
+        """Return v = W x + b for all pixels, block by block."""
+        source, blocks = self.program.nodes[node.args[0]], self.blocks(node.type.shape[0])
+        block = BLOCK if blocks.count > 1 else const(0)
+        at, n_in = block * blocks.vectors, source.type.shape[0]
+        first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
+        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors), register=True)]
+        starts = [Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
+        if source.op == "input":
+            products = self.windowed(blocks, first)
+        else:
+            products = self.layer(blocks, first, node.args[0], n_in)
+        ends = [
+            Store(
+                f"v{index}",
+                (P * blocks.total + at + j,),
+                self.ended(load("sum", P, const(j), kind=self.sum_type)),
+            )
+            for j in range(blocks.vectors)
+        ]
+        body = (*sums, self.each_pixel(*starts), *products, self.each_pixel(*ends))
+        nest = loop("block", blocks.count, *body) if blocks.count > 1 else Block(body)
+        return [self.mapped(index, node), self.array(index), nest]
+
+    def inputs(self, node: Node) -> int:
+        """Return the rows of weights of an affine map."""
+        return int(self.program.parameters[str(node["weight"])].shape[1])
+
+    def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
+        """Return the products of a layer's values."""
+        value = load(f"v{source}", P * self.total(source) * LANES + COUNTER)
+        return [self.multiplied(blocks, const(numbers), first, value, "sum")]
+
+    @property
+    def zero(self) -> Expr:
+        """Return what a partial sum starts with."""
+        return splat(const(0.0), self.lanes)
+
+    def start(self, node: Node, vector: Expr) -> Expr:
+        """Return what a sum starts with."""
+        bias = node.get("bias")
+        return weight(self.offset(bias) // self.lanes + vector, self.vector) if bias else self.zero
+
+    def ended(self, total: Expr) -> Expr:
+        """Return a sum as a value of the layer."""
+        return total
+
+    def windowed(self, blocks: Blocks, first: Expr) -> list[Statement]:
+        """Return the sums over the window: a partial sum for each image and row, which stays in registers."""
+        found: list[Statement] = []
+        split, rows = is_split(self.gather), 0
+        each = range(blocks.vectors)
+        for image in self.gather.images:
+            inputs = self.gather.columns * image.channels
+            at = first + (DY * inputs + rows) * blocks.vectors
+            value = load(f"patch_{image.name}", (DY * PATCH_WIDTH + P) * image.channels + COUNTER)
+            sums = "part" if split else "sum"
+            lines: list[Statement] = [self.multiplied(blocks, self.columns * image.channels, at, value, sums)]
+            if split:
+                zero = self.each_pixel(*(Store("part", (P, const(j)), self.zero) for j in each))
+                part = [load("part", P, const(j), kind=self.vector) for j in each]
+                add = self.each_pixel(*(Store("sum", (P, const(j)), part[j], add=True) for j in each))
+                lines = [
+                    Array("part", self.vector, (PIXELS, blocks.vectors), register=True),
+                    zero,
+                    *lines,
+                    add,
+                ]
+            found.append(loop("dy", self.rows, *lines))
+            rows += self.gather.rows * inputs
+        return found
+
+    def multiplied(self, blocks: Blocks, inputs: Expr, first: Expr, value: Expr, sums: str) -> Statement:
+        """Return the loop over inputs: the row of weights of each, times its value at each pixel."""
+        each = range(blocks.vectors)
+        row = [Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.vector)) for j in each]
+        factor = splat(name("value", FLOAT), self.lanes)
+        products = [
+            Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True)
+            for j in each
+        ]
+        return loop("i", inputs, *row, self.each_pixel(Let("value", value), *products))
+
+    def each_pixel(self, *body: Statement) -> For:
+        """Return a loop over pixels that keeps each pixel's sums in registers of their own."""
+        return For("p", PIXELS, body, "unroll")
+
+    def outputs(self) -> Body:
+        """Return the statements that write the output of each pixel that lies in the image."""
+        output, index = self.program.outputs[0]
+        channels = self.program.nodes[index].type.shape[0]
+        value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
+        write = loop("i", channels, Store(RESULT, (Y, X + P, COUNTER), value))
+        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=X + P < WIDTH)

@@ -1,0 +1,145 @@
+"""Kernels as devices see them: what each role has, parts of a render, and arrays on a device."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.core.ir import Image
+from ...compiler.kernel.interface import DENOISE, UNSIGNED, Interface
+from ...refimpl.errors import InputError
+
+if TYPE_CHECKING:
+    from ...compiler.scenes.path_kernel import PathArtifact
+    from ...compiler.scenes.plane_kernel import PlaneArtifact
+
+Size = tuple[int, int]
+"""Height and width."""
+
+
+class Kernel(Protocol):
+    """A kernel of any role, as a device sees it."""
+
+    @property
+    def target(self) -> str:
+        """Return the name of the target."""
+
+    @property
+    def digest(self) -> str:
+        """Return the hash that names the kernel."""
+
+    @property
+    def source(self) -> str:
+        """Return the source."""
+
+    @property
+    def entry_point(self) -> str:
+        """Return the name of the kernel's function."""
+
+    @property
+    def interface(self) -> Interface:
+        """Return the arrays and integers that the kernel takes."""
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """Return the manifest, as JSON's types."""
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """Return the kernels in the order in which they run: this one, or two passes."""
+
+
+class Denoiser(Kernel, Protocol):
+    """The kernel of a network: it fills windows from images, and writes so many channels."""
+
+    @property
+    def weights(self) -> NDArray[np.float32]:
+        """Return the weights in the kernel's order."""
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Return the images that the window is filled from, in order."""
+
+    @property
+    def channels(self) -> int:
+        """Return the number of channels of the result."""
+
+    @property
+    def kernels(self) -> tuple[Denoiser, ...]:
+        """Return the kernels in the order in which they run: this one, or two passes."""
+
+
+def is_denoiser(kernel: Kernel) -> TypeGuard[Denoiser]:
+    """Tell whether a kernel is that of a network."""
+    return kernel.interface.role == DENOISE
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a render: rows [first_row, first_row + rows) of an image, samples from first_sample on."""
+
+    width: int
+    height: int
+    first_row: int
+    rows: int
+    first_sample: int
+    samples: int
+    seed: int
+
+    @property
+    def integers(self) -> dict[str, int]:
+        """Return what a path kernel is given, by the names of its interface."""
+        return {"seed_number" if name == "seed" else name: value for name, value in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class Memory:
+    """An array on a device: an image (H, W, C), or sums (planes, rows, columns); `held` is what holds it."""
+
+    shape: tuple[int, ...]
+    held: Any
+
+
+def in_order(kernel: Interface, given: Mapping[str, int]) -> list[np.integer[Any]]:
+    """Return a kernel's integers in the order and of the types in which it takes them."""
+    return [(np.uint32 if name in UNSIGNED else np.int32)(given[name]) for name in kernel.integers]
+
+
+def words(kernel: Interface, given: Mapping[str, int]) -> NDArray[np.uint32]:
+    """Return a kernel's integers in its order, as words of 32 bits."""
+    return np.array([int(n) % 2**32 for n in in_order(kernel, given)], np.uint32)
+
+
+def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """Return the numbers (n,) of a scene for a path kernel, those of its own scene by default."""
+    if numbers is None:
+        return kernel.scene_numbers
+    wanted = len(kernel.programs.inputs)
+    if numbers.dtype != np.float32 or numbers.shape != (wanted,):
+        raise InputError(
+            "numbers of the scene",
+            f"{numbers.dtype} of shape {numbers.shape}",
+            f"must be float32 of shape ({wanted},)",
+            "read them by the inputs that the kernel was compiled with",
+        )
+    return numbers.copy()
+
+
+def shapes(artifact: Denoiser, size: Size) -> list[tuple[int, ...]]:
+    """Return the shapes (H, W, C) of what an artifact's kernels write."""
+    return [(*size, kernel.channels) for kernel in artifact.kernels]
+
+
+def plane_integers(kernel: PlaneArtifact, size: Size) -> dict[str, int]:
+    """Return a kernel's integers for an image: rows of planes are whole work items."""
+    height, width = size
+    return {"width": width, "height": height, "row_stride": -(-width // kernel.lanes) * kernel.lanes}
+
+
+def plane_shape(named: tuple[int | str, ...], integers: Mapping[str, int]) -> tuple[int, ...]:
+    """Return an array's shape in numbers."""
+    return tuple(integers[n] if isinstance(n, str) else n for n in named)

@@ -1,0 +1,397 @@
+"""Models and checkpoints as files: safetensors with the facts about them in the header.
+
+1. A file holds named tensors and, in its header, named texts; the text `format` says which kind of file it is
+   and `version` how to read it [`save_model`], [`save_checkpoint`].
+2. The same content gives the same bytes: the header is written with sorted keys [`_encode`]. The safetensors
+   library writes its metadata in the order of a hash table, so it only reads here.
+3. A file appears under its name when it is complete [`_write`, writing.py].
+4. Nothing in a file is believed: what is missing, of another kind, too large, not finite or not fitting is
+   refused with one line [`load_model`], [`load_checkpoint`].
+
+The format of the container is safetensors' own: 8 bytes of header length, little-endian; a JSON header,
+padded with spaces to a multiple of 8; the tensors' bytes. Versions of the library differ in what they take:
+entries and types are checked here too [`_check_entry`].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, deserialize
+
+from ..refimpl.errors import InputError
+from ..refimpl.network import train
+from ..refimpl.network.activation import SINE, activation_named
+from ..refimpl.network.dataset import Normalization, Window, normalization_from_json
+from ..refimpl.network.denoise import Model, check_model
+from ..refimpl.network.imported import Imported, Source, Step
+from ..refimpl.network.siren import Siren
+from ..refimpl.network.train import TrainState
+from ..refimpl.network.whole import Whole
+from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
+from .writing import write_bytes
+
+Tensors = Mapping[str, NDArray[Any]]
+Texts = Mapping[str, str]
+
+MODEL_FORMAT = "wamnet-model"
+"""Value of the header's text `format` in a model file."""
+
+CHECKPOINT_FORMAT = "wamnet-checkpoint"
+"""Value of the header's text `format` in a checkpoint file."""
+
+VERSION = "1"
+"""Value of the header's text `version`; it changes when older readers would misread the file."""
+
+ACTIVATION_VERSION = "2"
+"""Version of models that name their activation, which readers of version 1 take to be the sine."""
+
+WHOLE_VERSION = "3"
+"""Version of models of integers."""
+
+IMPORTED_VERSION = "4"
+"""Version of networks that were imported."""
+
+INFO_PREFIX = "info."
+"""Put before the names of a model's own facts in the header, so that they cannot hide a field."""
+
+WHOLE_TEXTS = ("amplitude", "fraction")
+"""Fields of a network of integers that are texts of the header."""
+
+_WHOLE = re.compile(r"-?(0|[1-9][0-9]*)")
+"""An integer in a text (MOD-2)."""
+
+_DECIMAL = re.compile(_WHOLE.pattern + r"(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+"""A decimal number in a text (MOD-2)."""
+
+_DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "int8": "I8"}
+"""Element types that are written, by NumPy's name, as safetensors names them."""
+
+_TYPES = {
+    "BOOL": "?", "U8": "u1", "I8": "i1", "F8_E5M2": "V1", "F8_E4M3": "V1",
+    "U16": "<u2", "I16": "<i2", "F16": "<f2", "BF16": "V2",
+    "U32": "<u4", "I32": "<i4", "F32": "<f4", "U64": "<u8", "I64": "<i8", "F64": "<f8",
+}  # fmt: skip
+"""Element types that a file may have, as NumPy reads them; of those that NumPy lacks, only the size."""
+
+_ENTRY = {"dtype", "shape", "data_offsets"}
+"""Keys of a tensor in the header."""
+
+
+def save_model(path: str | os.PathLike[str], model: Model) -> None:
+    """Write a model that [`load_model`] reads back to the same bits."""
+    check_model(model)
+    _write(Path(path), model_bytes(model))
+
+
+def model_bytes(model: Model) -> bytes:
+    """Return a model as the content of its file, the same for equal models."""
+    tensors: dict[str, NDArray[Any]] = {}
+    for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
+        tensors[f"layer{layer}.weight"], tensors[f"layer{layer}.bias"] = weight, bias
+    if isinstance(model.siren, Whole):
+        tensors = {n: a.astype(np.int8 if n.endswith("weight") else np.int32) for n, a in tensors.items()}
+        factors = enumerate(model.siren.factors)
+        tensors |= {f"layer{layer}.factor": factor.astype(np.int32) for layer, factor in factors}
+    texts = {
+        "window": json.dumps(asdict(model.window), sort_keys=True),
+        **{INFO_PREFIX + name: text for name, text in model.info.items()},
+    }
+    if isinstance(model.siren, Imported):
+        texts |= _imported_texts(model.siren) | {"version": IMPORTED_VERSION}
+        return _encode(MODEL_FORMAT, tensors, texts)
+    texts |= {
+        "features": json.dumps(model.features),
+        "omega_0_first": repr(model.siren.omega_0_first),
+        "omega_0_hidden": repr(model.siren.omega_0_hidden),
+        "normalization": json.dumps(asdict(model.normalization), sort_keys=True),
+    }
+    if isinstance(model.siren, Whole):
+        texts |= {name: repr(getattr(model.siren, name)) for name in WHOLE_TEXTS} | {"version": WHOLE_VERSION}
+    if model.siren.activation != SINE:
+        texts |= {"activation": model.siren.activation, "version": ACTIVATION_VERSION}
+    return _encode(MODEL_FORMAT, tensors, texts)
+
+
+def load_model(path: str | os.PathLike[str]) -> Model:
+    """Read a model, or raise InputError that says what is wrong with the file."""
+    path = Path(path)
+    versions = (VERSION, ACTIVATION_VERSION, WHOLE_VERSION, IMPORTED_VERSION)
+    tensors, texts = _read(path, MODEL_FORMAT, versions)
+    window = _parsed(path, texts, "window", _window)
+    info = {
+        name.removeprefix(INFO_PREFIX): text
+        for name, text in sorted(texts.items())
+        if name.startswith(INFO_PREFIX)
+    }
+    if texts["version"] == IMPORTED_VERSION:
+        network = _imported(path, tensors, texts)
+        model = imported_model(network, window, info)
+    else:
+        model = Model(
+            siren=_network(path, tensors, texts),
+            features=_parsed(path, texts, "features", _names),
+            window=window,
+            normalization=_parsed(path, texts, "normalization", normalization_from_json),
+            info=info,
+        )
+    _check(path, check_model, model)
+    return model
+
+
+def imported_model(network: Imported, window: Window, info: Texts) -> Model:
+    """Return the model of an imported network, whose features are its images."""
+    return Model(network, tuple(source.name for source in network.sources), window, Normalization(), info)
+
+
+def _imported_texts(network: Imported) -> dict[str, str]:
+    """Return the texts of an imported network."""
+    ends = (network.low, network.high)
+    return {
+        "images": json.dumps([asdict(source) for source in network.sources], sort_keys=True),
+        "steps": json.dumps([asdict(step) for step in network.steps], sort_keys=True),
+        "clip": json.dumps([end if math.isfinite(end) else None for end in ends]),
+    }
+
+
+def _imported(path: Path, tensors: Tensors, texts: Texts) -> Imported:
+    """Return the imported network of a model file."""
+    weights, biases = _layers(path, tensors)
+    sources = _parsed(path, texts, "images", lambda text: _records(Source, text, "images"))
+    steps = _parsed(path, texts, "steps", lambda text: _records(Step, text, "steps"))
+    low, high = _parsed(path, texts, "clip", _ends)
+    return Imported(weights, biases, 1.0, 1.0, SINE, steps, low, high, sources)
+
+
+def _records(kind: type[Any], text: str, name: str) -> tuple[Any, ...]:
+    """Return the records of a JSON list of objects."""
+    held = parse_json(text, name, "import the network again")
+    if not isinstance(held, list):
+        raise ValueError("a list of objects is needed")
+    return tuple(to_dataclass(kind, each, f"{name}[{i}]", whole=True) for i, each in enumerate(held))
+
+
+def _ends(text: str) -> tuple[float, float]:
+    """Return both ends of a JSON list of two numbers, or null where there is none."""
+    held = parse_json(text, "clip", "import the network again")
+    if (
+        not isinstance(held, list)
+        or len(held) != 2
+        or any(type(x) not in (int, float, type(None)) for x in held)
+    ):
+        raise ValueError("a list of two numbers, or null, is needed")
+    low, high = held
+    return -math.inf if low is None else float(low), math.inf if high is None else float(high)
+
+
+def _layers(path: Path, tensors: Tensors) -> tuple[tuple[NDArray[Any], ...], tuple[NDArray[Any], ...]]:
+    """Return weights and biases of all layers."""
+    layers = range(max(sum(name.endswith(".weight") for name in tensors), 1))
+    weights, biases = (
+        tuple(_tensor(path, tensors, f"layer{layer}.{name}") for layer in layers)
+        for name in ("weight", "bias")
+    )
+    return weights, biases
+
+
+def _network(path: Path, tensors: Tensors, texts: Texts) -> Siren:
+    """Return the network of a model file."""
+    weights, biases = _layers(path, tensors)
+    first, hidden = (_parsed(path, texts, name, _decimal) for name in ("omega_0_first", "omega_0_hidden"))
+    omegas = first, hidden
+    if texts.get("version") != WHOLE_VERSION:
+        return Siren(weights, biases, *omegas, _activation(path, texts))
+    factors = tuple(_tensor(path, tensors, f"layer{layer}.factor") for layer in range(len(weights)))
+    for array in (*weights, *biases, *factors):
+        if array.dtype.kind != "i":
+            rule = "a model of integers has tensors of I8 and I32"
+            raise InputError(f"{path}: type of a tensor", str(array.dtype), rule, "round the model again")
+    held = (tuple(array.astype(np.float32) for array in some) for some in (weights, biases, factors))
+    kept, shifts, scales = held
+    fields = (_parsed(path, texts, name, _whole) for name in WHOLE_TEXTS)
+    return Whole(kept, shifts, *omegas, SINE, scales, *fields)
+
+
+def save_checkpoint(path: str | os.PathLike[str], state: TrainState) -> None:
+    """Write a state of training that [`load_checkpoint`] reads back to the same bits."""
+    tensors, texts = train.state_to_arrays(state)
+    _write(Path(path), _encode(CHECKPOINT_FORMAT, tensors, texts))
+
+
+def load_checkpoint(path: str | os.PathLike[str]) -> TrainState:
+    """Read a state of training, or raise InputError that says what is wrong with the file."""
+    path = Path(path)
+    tensors, texts = _read(path, CHECKPOINT_FORMAT)
+    try:
+        state = train.state_from_arrays(tensors, texts)
+    except KeyError as error:
+        what = f"{path}: list of entries"
+        rule = f"{error.args[0]!r} must be among them"
+        raise InputError(what, ", ".join(sorted({*tensors, *texts})), rule, "start a new run") from None
+    except BROKEN as error:
+        raise _inside(path, error) from None
+    _check(path, train.check_state, state)
+    return state
+
+
+def _encode(kind: str, tensors: Tensors, texts: Texts) -> bytes:
+    """Return the file's bytes: header with sorted keys, then the tensors in the order of their names."""
+    header: dict[str, Any] = {"__metadata__": {"format": kind, "version": VERSION, **texts}}
+    data, end = [], 0
+    # Eight-byte elements first: every tensor then starts at a multiple of its element's size.
+    for name in sorted(tensors, key=lambda name: (-tensors[name].dtype.itemsize, name)):
+        values = np.ascontiguousarray(tensors[name])
+        raw = values.astype(values.dtype.newbyteorder("<")).tobytes()
+        span = [end, end + len(raw)]
+        header[name] = {"dtype": _DTYPES[values.dtype.name], "shape": values.shape, "data_offsets": span}
+        data.append(raw)
+        end += len(raw)
+    text = json.dumps(header, sort_keys=True, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    return b"".join([len(text).to_bytes(8, "little"), text, *data])
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Give `path` the content, whole or not at all."""
+    try:
+        write_bytes(path, content)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError("output file", str(path), f"cannot be written: {reason}", "choose another") from None
+
+
+def _read(
+    path: Path, kind: str, versions: Sequence[str] = (VERSION,)
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return tensors and texts of a file of this kind and one of these versions."""
+    content = read_file(path, f"{kind} file")
+    way_out = "write it with `wamnet train`"
+    try:
+        found = deserialize(content)  # type: ignore[no-untyped-call]
+    except (SafetensorError, *BROKEN) as error:
+        raise InputError(f"{kind} file", str(path), f"is not a safetensors file: {error}", way_out) from None
+    texts = _header_texts(path, content)
+    tensors = {
+        name: np.frombuffer(entry["data"], _TYPES[entry["dtype"]]).reshape(entry["shape"])
+        for name, entry in found
+    }
+    _check_kind(path, texts, kind, versions)
+    return tensors, texts
+
+
+def _header_texts(path: Path, content: bytes) -> dict[str, str]:
+    """Return the header's texts; the library has found the header sound, but keeps them to itself."""
+    length, way_out = int.from_bytes(content[:8], "little"), "write it with `wamnet train`"
+    text = content[8 : 8 + length]
+    if not text.startswith(b"{"):
+        raise InputError(f"{path}: header", text[:20], "its first byte must be {", way_out)
+    header = parse_json(text, f"{path}: header", way_out)
+    texts: dict[str, str] = header.pop("__metadata__", None) or {}
+    for name, entry in header.items():
+        _check_entry(f"{path}: header: {name}", entry, way_out)
+    return texts
+
+
+def _check_entry(what: str, entry: Any, way_out: str) -> None:
+    """Refuse a tensor's entry with other keys than these three, or a type that is not known."""
+    if not isinstance(entry, dict) or set(entry) != _ENTRY:
+        rule = f"must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
+        raise InputError(what, entry, rule, way_out)
+    if entry["dtype"] not in _TYPES:
+        raise InputError(f"{what}.dtype", entry["dtype"], f"must be one of {', '.join(_TYPES)}", way_out)
+
+
+def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) -> None:
+    """Refuse a file of another kind or version."""
+    found = texts.get("format", "missing")
+    if found != kind:
+        raise InputError(f"{path}: format", found, f"must be {kind}", "give a file that wamnet wrote")
+    version = texts.get("version", "missing")
+    if version not in versions:
+        rule = f"this program reads version {' and '.join(versions)}"
+        raise InputError(f"{path}: version", version, rule, "use the wamnet that wrote it")
+
+
+def _tensor(path: Path, tensors: Tensors, name: str) -> NDArray[Any]:
+    """Return a tensor, or say that it is missing."""
+    if name not in tensors:
+        present = ", ".join(sorted(tensors)) or "empty"
+        raise InputError(f"{path}: list of tensors", present, f"{name!r} must be among them", "train again")
+    return tensors[name]
+
+
+def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) -> Any:
+    """Return the header's text `name` as `parse` reads it, or say that it is missing or unreadable."""
+    if name not in texts:
+        present = ", ".join(sorted(texts))
+        raise InputError(
+            f"{path}: list of header texts", present, f"{name!r} must be among them", "train again"
+        )
+    try:
+        return parse(texts[name])
+    except InputError as error:
+        raise _inside(path, error) from None
+    except BROKEN as error:
+        raise InputError(f"{path}: {name}", texts[name], f"cannot be read: {error}", "train again") from None
+
+
+def _activation(path: Path, texts: Texts) -> str:
+    """Return the name of the activation; files of version 1 have the sine."""
+    if texts["version"] == VERSION:
+        name = texts.get("activation", SINE)
+        if name != SINE:
+            rule = f"a model of version {VERSION} has the {SINE}"
+            raise InputError(f"{path}: activation", name, rule, "train again")
+        return name
+    return str(_parsed(path, texts, "activation", lambda name: activation_named(name).name))
+
+
+def _window(text: str) -> Window:
+    """Return the window of a JSON object."""
+    return to_dataclass(Window, parse_json(text, "window", "train again"), "window", whole=True)
+
+
+def _decimal(text: str) -> float:
+    """Return a number as JSON writes it; Python would also take spaces, underscores and words."""
+    if not _DECIMAL.fullmatch(text):
+        raise ValueError("a decimal number is needed")
+    return float(text)
+
+
+def _whole(text: str) -> int:
+    """Return an integer as JSON writes it."""
+    if not _WHOLE.fullmatch(text):
+        raise ValueError("a decimal integer is needed")
+    return int(text)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Return a JSON list of strings."""
+    names = parse_json(text, "features", "train again")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError("a list of names is needed")
+    return tuple(names)
+
+
+def _check(path: Path, check: Callable[[Any], None], content: Any) -> None:
+    """Run a check of the reference, and name the file in what it refuses."""
+    try:
+        check(content)
+    except InputError as error:
+        raise _inside(path, error) from None
+
+
+def _inside(path: Path, error: Exception) -> InputError:
+    """Return the error with the file's name before the thing that it names."""
+    if isinstance(error, InputError):
+        return InputError(f"{path}: {error.what}", error.value, error.rule, error.way_out)
+    return InputError(f"{path}: content", str(error), "cannot be read", "start a new run")

@@ -1,0 +1,250 @@
+"""A scene for other formats: plain parts, numbers as text, and what cannot be said.
+
+1. [`parts_of`] gives boxes, spheres and sheets; a room is six sheets, and each lamp one that emits to its
+   front.
+2. [`meshes_of`] gives the same parts as triangles, for formats that have nothing else; [`sky_of`] a sky as a
+   closed surface around them.
+3. A writer refuses what its format cannot say with [`NotExpressed`], and the cases are "not tested" for that
+   reason. Nothing is left out in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
+from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
+from wamnet.refimpl.light.shapes.quad import light_radiance
+from wamnet.refimpl.light.shapes.shape import Vector
+
+Array = NDArray[np.float64]
+
+MATTE, MIRROR, METAL, GLASS = "matte", "mirror", "metal", "glass"
+"""Kinds of surfaces."""
+
+RINGS, SEGMENTS = 128, 256
+"""Bands of a sphere of triangles from pole to pole, and around: what is between corners is at most 1.5e-4 of
+the radius below the sphere, a tenth of the slack of an answer."""
+
+FAR = 4.0
+"""Half of the edges of a sky that is a surface, in the largest coordinate of what it surrounds."""
+
+KINDS: dict[type[Any], str] = {Mirror: MIRROR, Conductor: METAL, Dielectric: GLASS}
+"""Kinds by material; a surface without one is matte, and so is any other material."""
+
+
+class NotExpressed(Exception):
+    """What a format cannot say of a scene, in a few words."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A surface: its kind, reflectance and emission (3,), and the material's number (roughness or index)."""
+
+    kind: str
+    reflectance: tuple[float, ...]
+    emission: tuple[float, ...]
+    number: float
+
+    @property
+    def emits(self) -> bool:
+        """Tell whether it emits."""
+        return any(self.emission)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A parallelogram: corner and edges (3,); `front`: it emits only to the side of edge_u x edge_v."""
+
+    corner: Array
+    edge_u: Array
+    edge_v: Array
+    look: Look
+    front: bool = False
+
+    @property
+    def corners(self) -> Array:
+        """The corners (4, 3), counter-clockwise as seen from the front."""
+        u, v = self.edge_u, self.edge_v
+        return np.stack([self.corner, self.corner + u, self.corner + u + v, self.corner + v])
+
+
+@dataclass(frozen=True)
+class Parts:
+    """All surfaces of a scene by shape, the closed ones with their looks."""
+
+    sheets: tuple[Sheet, ...]
+    boxes: tuple[tuple[Box, Look], ...]
+    spheres: tuple[tuple[Sphere, Look], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles: points and their unit normals (N, 3) in float32, corners (M, 3) by number, and a look.
+
+    Corners are counter-clockwise as seen from the front. `front`: there is only the front, and whatever sees
+    the back sees through it. `thick`: the least thickness of a closed body, 0 of a sheet.
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    corners: NDArray[np.uint32]
+    look: Look
+    front: bool
+    thick: float = 0.0
+
+
+def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
+    """Return corner and edges (3,) of the walls, in the order of WALLS, whose normals point inwards."""
+    low, edges = np.array(room.low), np.diag(np.subtract(room.high, room.low))
+    walls = []
+    for axis in range(3):
+        u, v = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
+        walls += [(low, u, v), (low + edges[axis], v, u)]
+    return walls
+
+
+def parts_of(scene: Scene) -> Parts:
+    """Return the parts of a scene; a sky that is not the same everywhere is not expressed by any writer."""
+    if scene.environment is not None:
+        raise NotExpressed("a sky that differs by direction")
+    sheets = [
+        Sheet(np.array(quad.corner), np.array(quad.edge_u), np.array(quad.edge_v), look_of(quad))
+        for quad in scene.quads
+    ]
+    if scene.room is not None:
+        room = scene.room
+        materials = room.materials or (None,) * len(room.reflectances)
+        looks = (_look(r, room.emission, m) for r, m in zip(room.reflectances, materials, strict=True))
+        walls = zip(room_walls(room), looks, strict=True)
+        sheets += [Sheet(np.array(corner), u, v, look, front=True) for (corner, u, v), look in walls]
+    for light in scene.lights:
+        radiance = tuple(map(float, light_radiance(light)))
+        look = Look(MATTE, (0.0, 0.0, 0.0), radiance, 0.0)
+        corner, u, v = (np.array(each) for each in (light.corner, light.edge_u, light.edge_v))
+        sheets.append(Sheet(corner, u, v, look, front=True))
+    boxes = tuple((box, look_of(box)) for box in scene.boxes)
+    return Parts(tuple(sheets), boxes, tuple((ball, look_of(ball)) for ball in scene.spheres))
+
+
+def look_of(part: Any) -> Look:
+    """Return the look of a box, a sphere or a quad."""
+    return _look(part.reflectance, part.emission, part.material)
+
+
+def _look(reflectance: Vector, emission: Vector, material: Material | None) -> Look:
+    """Return the look of a surface."""
+    number = 0.0 if material is None or material.parameter is None else material.parameter
+    return Look(KINDS.get(type(material), MATTE), reflectance, emission, float(number))
+
+
+def meshes_of(parts: Parts) -> list[Mesh]:
+    """Return all surfaces as triangles: sheets, boxes, spheres; what emits and is not matte is refused."""
+    found = [_sheet_mesh(sheet) for sheet in parts.sheets]
+    found += [_box_mesh(box, look) for box, look in parts.boxes]
+    found += [_sphere_mesh(ball, look) for ball, look in parts.spheres]
+    for mesh in found:
+        if mesh.look.emits and mesh.look.kind != MATTE:
+            raise NotExpressed(f"{mesh.look.kind} that emits")
+    return found
+
+
+def sky_of(scene: Scene, meshes: Iterable[Mesh]) -> list[Mesh]:
+    """Return a scene's sky as the inside of a black cube around it that emits, or nothing of a black sky.
+
+    From each direction it brings the radiance of the sky, however far it is.
+    """
+    if not any(scene.background):
+        return []
+    places = [np.abs(mesh.points).max() for mesh in meshes]
+    half = FAR * float(max(1.0, *np.abs(scene.camera.position), *places))
+    black = (0.0, 0.0, 0.0)
+    look = Look(MATTE, black, tuple(map(float, scene.background)), 0.0)
+    walls = room_walls(Room((-half,) * 3, (half,) * 3, (black,) * 6))
+    return [_sheet_mesh(Sheet(np.array(corner), u, v, look, front=True)) for corner, u, v in walls]
+
+
+def _sheet_mesh(sheet: Sheet) -> Mesh:
+    """Return two triangles."""
+    normal = np.cross(sheet.edge_u, sheet.edge_v)
+    normals = np.tile(normal / np.linalg.norm(normal), (4, 1))
+    return _mesh(sheet.corners, normals, [(0, 1, 2), (0, 2, 3)], sheet.look, sheet.front)
+
+
+def _box_mesh(box: Box, look: Look) -> Mesh:
+    """Return twelve triangles; each side has points of its own."""
+    axes = axes_of(box)
+    points, normals, corners = [], [], []
+    for number in range(6):
+        across, sign = number // 2, 1.0 - 2.0 * (number % 2)
+        out, u, v = (axes[:, (across + turn) % 3] for turn in range(3))
+        u = sign * u
+        middle = axes[:, 3] + sign * out
+        points += [middle - u - v, middle + u - v, middle + u + v, middle - u + v]
+        normals += [sign * out / np.linalg.norm(out)] * 4
+        corners += [
+            (4 * number, 4 * number + 1, 4 * number + 2),
+            (4 * number, 4 * number + 2, 4 * number + 3),
+        ]
+    return _mesh(points, normals, corners, look, True, 2.0 * float(np.min(box.half_extent)))
+
+
+def _sphere_mesh(ball: Sphere, look: Look) -> Mesh:
+    """Return a sphere with its own normals, in bands between two poles."""
+    theta = np.pi * np.arange(1, RINGS) / RINGS
+    phi = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    bands = np.stack(
+        np.broadcast_arrays(
+            np.outer(np.sin(theta), np.sin(phi)),
+            np.cos(theta)[:, None],
+            np.outer(np.sin(theta), np.cos(phi)),
+        ),
+        axis=-1,
+    )
+    normals = np.concatenate([bands.reshape(-1, 3), [(0.0, 1.0, 0.0), (0.0, -1.0, 0.0)]])
+    number = np.arange((RINGS - 1) * SEGMENTS).reshape(RINGS - 1, SEGMENTS)
+    beside = np.roll(number, -1, axis=1)
+    upper, lower = number[:-1], number[1:]
+    upper_beside, lower_beside = beside[:-1], beside[1:]
+    top, bottom = np.full(SEGMENTS, number.size), np.full(SEGMENTS, number.size + 1)
+    bands_of = [(upper, lower, lower_beside), (upper, lower_beside, upper_beside)]
+    caps = [(top, number[0], beside[0]), (bottom, beside[-1], number[-1])]
+    corners = np.concatenate([np.stack(each, axis=-1).reshape(-1, 3) for each in bands_of + caps])
+    points = np.array(ball.center) + ball.radius * normals
+    return _mesh(points, normals, corners, look, True, 2.0 * ball.radius)
+
+
+def _mesh(points: Any, normals: Any, corners: Any, look: Look, front: bool, thick: float = 0.0) -> Mesh:
+    """Return a mesh in the numbers of files."""
+    return Mesh(
+        np.asarray(points, np.float32),
+        np.asarray(normals, np.float32),
+        np.asarray(corners, np.uint32),
+        look,
+        front,
+        thick,
+    )
+
+
+def axes_of(box: Box) -> Array:
+    """Return the map (3, 4) from the cube [-1, 1]^3 to a box: columns are half axes, and the centre."""
+    return np.column_stack([np.array(box.rotation).T * box.half_extent, box.center])
+
+
+def frame_of(camera: Camera) -> Array:
+    """Return right, up, back and position of a camera as columns (3, 4)."""
+    forward = np.subtract(camera.look_at, camera.position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, camera.up)
+    right = right / np.linalg.norm(right)
+    return np.column_stack([right, np.cross(right, forward), -forward, camera.position])
+
+
+def text(values: Iterable[float], between: str = ", ") -> str:
+    """Return numbers that read back as they are."""
+    return between.join(repr(float(value)) for value in values)

@@ -1,0 +1,166 @@
+"""A shot as a glTF 2.0 file (.gltf, its buffer inside).
+
+1. Surfaces are triangles in world space with normals. Lamps, walls and bodies have a front only
+   (`doubleSided` false); other sheets have two sides. glTF has no lamps with an area: what emits is a surface
+   (`emissiveFactor`, with `KHR_materials_emissive_strength` above 1).
+2. Matte is the metallic-roughness material without its specular part (`KHR_materials_specular`, factor 0).
+   Metal and mirrors are metallic 1; glTF's roughness is the root of alpha. Their colour fades to white at
+   grazing angles by Schlick's formula, which is profile `schlick-metals`. Glass transmits all and has an
+   index and a volume.
+3. glTF has no sky: it is the inside of a black cube around everything that emits. Layers of what is missed
+   are not expressed, for nothing is missed then; nor is tinted glass, whose reflection glTF does not tint.
+4. Size, samples, depth and seed of a shot are in `extras` of the scene: glTF has no words for them. No
+   extension is required: a program that lacks one shows it by the rule that it breaks.
+
+Source: glTF 2.0 specification, sections 3.6 to 3.10 and appendix B; the extensions' specifications.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from wamnet.refimpl.light.scene import Camera
+
+from .case import Shot
+from .parts import (
+    GLASS,
+    MATTE,
+    METAL,
+    MIRROR,
+    Look,
+    Mesh,
+    NotExpressed,
+    frame_of,
+    meshes_of,
+    parts_of,
+    sky_of,
+)
+
+SUFFIX = ".gltf"
+"""Of the file's name."""
+
+FLOAT, UINT32 = 5126, 5125
+"""Types of the components of an accessor."""
+
+VERTICES, CORNERS = 34962, 34963
+"""What a view of the buffer is for: points and normals, or numbers of corners."""
+
+NEAR = 1e-4
+"""Distance of the near plane; there is no far one."""
+
+WHITE = (1.0, 1.0, 1.0)
+"""Reflectance of clear glass."""
+
+
+def write(shot: Shot, seed: int) -> str:
+    """Return the file of a shot for a seed; raises NotExpressed."""
+    scene = shot.scene
+    if shot.layers and any(scene.background):
+        raise NotExpressed("sky that is not a surface")
+    meshes = meshes_of(parts_of(scene))
+    meshes += sky_of(scene, meshes)
+    materials = [_material(mesh) for mesh in meshes]
+    used = sorted({name for material in materials for name in material["extensions"]})
+    asked = {"width": shot.size, "height": shot.size, "samples": shot.spp, "depth": shot.depth, "seed": seed}
+    named = {"name": "camera", "camera": 0, "matrix": _matrix(scene.camera)}
+    data = {
+        "asset": {"version": "2.0", "generator": "wamnet"},
+        "extensionsUsed": used,
+        "scene": 0,
+        "scenes": [{"name": shot.name, "nodes": list(range(len(meshes) + 1)), "extras": asked}],
+        "nodes": [{"name": f"part {i}", "mesh": i} for i in range(len(meshes))] + [named],
+        "cameras": [_camera(scene.camera)],
+        "meshes": [_primitives(i) for i in range(len(meshes))],
+        "materials": materials,
+        **_arrays(meshes),
+    }
+    # A list that is there has an entry.
+    return json.dumps({name: value for name, value in data.items() if value != []}, allow_nan=False) + "\n"
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    """Return the camera's angle of view; it looks along its own -z."""
+    angle = math.radians(camera.vertical_fov_deg)
+    return {"type": "perspective", "perspective": {"yfov": angle, "aspectRatio": 1.0, "znear": NEAR}}
+
+
+def _matrix(camera: Camera) -> list[float]:
+    """Return right, up, back and position, a column each."""
+    return [float(value) for value in np.vstack([frame_of(camera), (0.0, 0.0, 0.0, 1.0)]).T.ravel()]
+
+
+def _primitives(number: int) -> dict[str, Any]:
+    """Return a mesh by the numbers of its arrays, of which each has three, and of its material."""
+    attributes = {"POSITION": 3 * number, "NORMAL": 3 * number + 1}
+    return {"primitives": [{"attributes": attributes, "indices": 3 * number + 2, "material": number}]}
+
+
+def _arrays(meshes: Sequence[Mesh]) -> dict[str, Any]:
+    """Return accessors, views and the buffer; all components have four bytes, and so are aligned."""
+    accessors: list[dict[str, Any]] = []
+    views, parts, start = [], [], 0
+    for name, array in _each(meshes):
+        data = array.astype(array.dtype.newbyteorder("<")).tobytes()
+        target = CORNERS if name == "corners" else VERTICES
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data), "target": target})
+        accessor = {"bufferView": len(accessors), "type": "VEC3", "componentType": FLOAT, "count": len(array)}
+        if name == "corners":
+            accessor |= {"type": "SCALAR", "componentType": UINT32, "count": array.size}
+        if name == "points":
+            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        accessors.append(accessor)
+        parts.append(data)
+        start += len(data)
+    if not meshes:
+        return {}
+    text = base64.b64encode(b"".join(parts)).decode("ascii")
+    buffer = {"byteLength": start, "uri": f"data:application/octet-stream;base64,{text}"}
+    return {"accessors": accessors, "bufferViews": views, "buffers": [buffer]}
+
+
+def _each(meshes: Sequence[Mesh]) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays of each mesh with their names."""
+    for mesh in meshes:
+        yield from (("points", mesh.points), ("normals", mesh.normals), ("corners", mesh.corners))
+
+
+def _material(mesh: Mesh) -> dict[str, Any]:
+    """Return a material; a body of glass says how thick it is."""
+    look = mesh.look
+    rough = {METAL: math.sqrt(look.number), MATTE: 1.0}.get(look.kind, 0.0)
+    found: dict[str, Any] = {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*map(float, look.reflectance), 1.0],
+            "metallicFactor": 1.0 if look.kind in (METAL, MIRROR) else 0.0,
+            "roughnessFactor": rough,
+        },
+        "doubleSided": not mesh.front,
+        "extensions": {},
+    }
+    if look.kind == MATTE:
+        found["extensions"]["KHR_materials_specular"] = {"specularFactor": 0.0}
+    if look.kind == GLASS:
+        found["extensions"] |= _glass(look, mesh.thick)
+    if look.emits:
+        strength = max(1.0, *look.emission)
+        found["emissiveFactor"] = [channel / strength for channel in look.emission]
+        if strength > 1.0:
+            found["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
+    return found
+
+
+def _glass(look: Look, thick: float) -> dict[str, Any]:
+    """Return what makes a body refract; without a thickness it would be a film."""
+    if tuple(look.reflectance) != WHITE:
+        raise NotExpressed("tinted glass")
+    return {
+        "KHR_materials_transmission": {"transmissionFactor": 1.0},
+        "KHR_materials_ior": {"ior": look.number},
+        "KHR_materials_volume": {"thicknessFactor": thick},
+    }

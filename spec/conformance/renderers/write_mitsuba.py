@@ -1,0 +1,186 @@
+"""A shot as a scene file of Mitsuba 3 (XML, version 3.0.0).
+
+1. Integrator `path` without Russian roulette; it counts edges of a path, one more than scatterings. Where
+   layers are requested it is inside of `aov`: albedo, shading normal, depth, position.
+2. A sheet that reflects is two-sided. One that emits on both sides is two of them back to back: Mitsuba's
+   area emitters emit to the front. What emits and is a mirror, metal or glass is not expressed.
+3. Metal is `roughconductor` of GGX whose reflectance is the same at all angles (`material` none): questions
+   about the colour of tinted metal are not asked.
+
+Source: Mitsuba 3's documentation of plugins, https://mitsuba.readthedocs.io.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wamnet.refimpl.light.scene import Camera
+
+from .case import Shot
+from .parts import (
+    GLASS,
+    MATTE,
+    METAL,
+    MIRROR,
+    Array,
+    Look,
+    NotExpressed,
+    Parts,
+    Sheet,
+    axes_of,
+    parts_of,
+    text,
+)
+
+SUFFIX = ".xml"
+"""Of the file's name."""
+
+APART = 1e-4
+"""Distance of the two sides of what emits on both, in its shorter edge."""
+
+LAYERS = "albedo:albedo,normal:sh_normal,depth:depth,position:position"
+"""Names and kinds of arbitrary output variables."""
+
+
+def write(shot: Shot, seed: int) -> str:
+    """Return the scene file of a shot for a seed; raises NotExpressed."""
+    lines = ['<scene version="3.0.0">', *_integrator(shot), *_sensor(shot, seed)]
+    if any(shot.scene.background):
+        lines += ['<emitter type="constant">', _rgb("radiance", shot.scene.background), "</emitter>"]
+    lines += _shapes(parts_of(shot.scene))
+    return "\n".join([*lines, "</scene>", ""])
+
+
+def _integrator(shot: Shot) -> list[str]:
+    """Return how light is gathered."""
+    path = [
+        '<integrator type="path" name="image">',
+        f'<integer name="max_depth" value="{shot.depth + 1}"/>',
+        f'<integer name="rr_depth" value="{shot.depth + 2}"/>',
+        "</integrator>",
+    ]
+    if not shot.layers:
+        return path
+    return ['<integrator type="aov">', f'<string name="aovs" value="{LAYERS}"/>', *path, "</integrator>"]
+
+
+def _sensor(shot: Shot, seed: int) -> list[str]:
+    """Return camera, film and random numbers."""
+    camera: Camera = shot.scene.camera
+    place = f'origin="{text(camera.position)}" target="{text(camera.look_at)}" up="{text(camera.up)}"'
+    return [
+        '<sensor type="perspective">',
+        '<string name="fov_axis" value="y"/>',
+        f'<float name="fov" value="{camera.vertical_fov_deg!r}"/>',
+        '<float name="near_clip" value="1e-4"/>',
+        f'<transform name="to_world"><lookat {place}/></transform>',
+        '<sampler type="independent">',
+        f'<integer name="sample_count" value="{shot.spp}"/>',
+        f'<integer name="seed" value="{seed}"/>',
+        "</sampler>",
+        '<film type="hdrfilm">',
+        f'<integer name="width" value="{shot.size}"/>',
+        f'<integer name="height" value="{shot.size}"/>',
+        '<string name="pixel_format" value="rgb"/>',
+        '<string name="component_format" value="float32"/>',
+        '<rfilter type="box"/>',
+        "</film>",
+        "</sensor>",
+    ]
+
+
+def _shapes(parts: Parts) -> list[str]:
+    """Return all surfaces."""
+    lines: list[str] = []
+    for sheet in parts.sheets:
+        lines += _sheet(sheet)
+    for box, look in parts.boxes:
+        lines += ['<shape type="cube">', _matrix(axes_of(box)), *_look(look, closed=True), "</shape>"]
+    for ball, look in parts.spheres:
+        x, y, z = ball.center
+        lines += [
+            '<shape type="sphere">',
+            f'<point name="center" x="{x!r}" y="{y!r}" z="{z!r}"/>',
+            f'<float name="radius" value="{ball.radius!r}"/>',
+            *_look(look, closed=True),
+            "</shape>",
+        ]
+    return lines
+
+
+def _sheet(sheet: Sheet) -> list[str]:
+    """Return a parallelogram, or two of them where it emits on both sides."""
+    if not sheet.look.emits or sheet.front:
+        return _rectangle(sheet.corner, sheet.edge_u, sheet.edge_v, sheet.look)
+    u, v = sheet.edge_u, sheet.edge_v
+    normal = np.cross(u, v)
+    normal = normal / np.linalg.norm(normal)
+    apart = normal * (0.5 * APART * min(np.linalg.norm(u), np.linalg.norm(v)))
+    front = _rectangle(sheet.corner + apart, u, v, sheet.look)
+    return front + _rectangle(sheet.corner - apart, v, u, sheet.look)
+
+
+def _rectangle(corner: Array, edge_u: Array, edge_v: Array, look: Look) -> list[str]:
+    """Return a parallelogram that faces the side of edge_u x edge_v; Mitsuba's is [-1, 1]^2 at z = 0."""
+    u, v = 0.5 * edge_u, 0.5 * edge_v
+    normal = np.cross(u, v)
+    columns = np.column_stack([u, v, normal / np.linalg.norm(normal), corner + u + v])
+    return ['<shape type="rectangle">', _matrix(columns), *_look(look, closed=False), "</shape>"]
+
+
+def _matrix(columns: Array) -> str:
+    """Return a map to columns (3, 4)."""
+    rows = [*(text(row, " ") for row in columns), "0 0 0 1"]
+    return f'<transform name="to_world"><matrix value="{" ".join(rows)}"/></transform>'
+
+
+def _look(look: Look, closed: bool) -> list[str]:
+    """Return material and emitter of a shape."""
+    if look.emits and look.kind != MATTE:
+        raise NotExpressed(f"{look.kind} that emits")
+    bsdf = _BSDFS[look.kind](look)
+    if not closed and not look.emits:
+        bsdf = ['<bsdf type="twosided">', *bsdf, "</bsdf>"]
+    if look.emits:
+        bsdf += ['<emitter type="area">', _rgb("radiance", look.emission), "</emitter>"]
+    return bsdf
+
+
+def _matte(look: Look) -> list[str]:
+    return ['<bsdf type="diffuse">', _rgb("reflectance", look.reflectance), "</bsdf>"]
+
+
+def _mirror(look: Look) -> list[str]:
+    return ['<bsdf type="conductor">', _NO_METAL, _rgb("specular_reflectance", look.reflectance), "</bsdf>"]
+
+
+def _metal(look: Look) -> list[str]:
+    return [
+        '<bsdf type="roughconductor">',
+        _NO_METAL,
+        '<string name="distribution" value="ggx"/>',
+        f'<float name="alpha" value="{look.number!r}"/>',
+        _rgb("specular_reflectance", look.reflectance),
+        "</bsdf>",
+    ]
+
+
+def _glass(look: Look) -> list[str]:
+    tints = [_rgb(f"specular_{way}", look.reflectance) for way in ("reflectance", "transmittance")]
+    indices = [
+        f'<float name="int_ior" value="{look.number!r}"/>',
+        '<float name="ext_ior" value="1.0"/>',
+    ]
+    return ['<bsdf type="dielectric">', *indices, *tints, "</bsdf>"]
+
+
+_NO_METAL = '<string name="material" value="none"/>'
+"""A conductor that reflects everything."""
+
+_BSDFS = {MATTE: _matte, MIRROR: _mirror, METAL: _metal, GLASS: _glass}
+"""How each kind of surface is said."""
+
+
+def _rgb(name: str, color: tuple[float, ...]) -> str:
+    """Return a colour in linear RGB."""
+    return f'<rgb name="{name}" value="{text(color)}"/>'

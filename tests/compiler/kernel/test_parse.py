@@ -1,0 +1,282 @@
+"""Sources are read back as the kernels that they are; whatever else they may say is refused."""
+
+from __future__ import annotations
+
+import random
+import re
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler.core.ir import Image
+from wamnet.compiler.core.weights import pack
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.kernel import (
+    BOOL,
+    FLOAT,
+    INT,
+    Array,
+    Block,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    If,
+    Kernel,
+    Let,
+    Store,
+    apply,
+    const,
+    load,
+    name,
+)
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.cuda import CUDA
+from wamnet.compiler.languages.glsl import GLSL
+from wamnet.compiler.languages.glsl_buffers import Vulkan
+from wamnet.compiler.languages.metal import Metal
+from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.languages.renderer import Renderer
+from wamnet.compiler.languages.wgsl import WGSL
+from wamnet.compiler.parsing.canonical import canonical
+from wamnet.compiler.parsing.parse import Unread, parse
+from wamnet.compiler.plan import plan_program
+from wamnet.compiler.schedules.plain import plain
+from wamnet.compiler.schedules.tile import all_stored, tile
+from wamnet.refimpl.network.activation import RELU
+
+LANGUAGES = {
+    dialect.target: dialect for dialect in (OpenCL(), C(), CUDA(), Metal(), GLSL(), Vulkan(), WGSL())
+}
+X, Y, F, G, N, M = name("x"), name("y"), *(name(n, FLOAT) for n in "fg"), *map(name, "nm")
+
+
+def read(source, target, kernel):
+    """Return a source's kernel; textures do not state their channels."""
+    arrays = kernel.interface.arrays
+    return parse(source, target, {a.name: a.shape[-1] for a in arrays} if target == "opengl" else None)
+
+
+def tiled(program, target, lanes=4, pixels=3, vectors=2):
+    """Return a tile of a language and its weights."""
+    stored = all_stored(program, lanes, vectors).values()
+    kernel = tile(program, lanes, pixels, vectors, target == "opencl")
+    return kernel, np.concatenate([np.ravel(each) for each in stored])
+
+
+def rendered(kernel, target, weights, bounded=True):
+    """Return the source of a kernel."""
+    return Renderer(LANGUAGES[target], kernel, bounded, weights).source(["a comment", "of two lines"])
+
+
+@settings(max_examples=4)
+@given(
+    window=st.integers(1, 4),
+    hidden=st.lists(st.integers(1, 9), max_size=2),
+    border=st.sampled_from(["clamp", "zero"]),
+    relu=st.booleans(),
+    shape=st.tuples(st.sampled_from([2, 4, 16]), st.integers(1, 5), st.integers(1, 3)),
+    bounded=st.booleans(),
+)
+def test_round_trip(kit, window, hidden, border, relu, shape, bounded):
+    network = kit.network([window**2 * 4, *hidden, 3], (3.0, 5.0), activation=RELU if relu else "sine")
+    program = plan_program(kit.denoiser(network, {"a": 3, "b": 1}, window, border), "opencl").emitted
+    for target in LANGUAGES:
+        kernel = plain(program)
+        assert read(rendered(kernel, target, pack(program), bounded), target, kernel) == canonical(kernel)
+    for target in ("opencl", "c"):
+        kernel, weights = tiled(program, target, *shape)
+        assert read(rendered(kernel, target, weights, bounded), target, kernel) == canonical(kernel)
+
+
+# ---- what no schedule says ---------------------------------------------------------------------------------
+
+
+def small(*body, **more):
+    """Return a kernel with two images and one channel of a result."""
+    images = [Image("a", 3, -2.0, 2.0), Image("b", 1, -2.0, 2.0)]
+    first = [Let(each, load(f"image_{each}", Y, X, 0)) for each in "ab"]
+    return Kernel(denoiser(images, 0, 1, BUFFER, ()), (*first, *body), **more)
+
+
+WRITE = Store(RESULT, (Y, X, const(0)), F)
+STATEMENTS = small(
+    Comment("a comment"),
+    Array("v", FLOAT, (2, name("PIXELS") + 1)),
+    Let("n", (X + (Y - 2)) % 3),
+    Array("f", FLOAT, value=const(-0.25), kept=True),
+    Array("k", INT),
+    Store("k", (), const(3)),
+    If(apply("not_equal", N, 1), (Store("f", (), const(1.0), add=True),), (Block((Let("m", name("k")),)),)),
+    For("i", X, (Store("v", (const(1), name("i")), F),), start=N, step=const(2), until=name("i") < Y),
+    For("j", const(2), (Let("g", load("v", name("j"), 0), kept=True),), "unroll"),
+    Let("row", load("image_a", Y, X * 3 + (N - 1))),
+    WRITE,
+    constants=(Constant("PIXELS", const(3), "pixels"),),
+)
+
+
+@pytest.mark.parametrize("target", LANGUAGES)
+def test_statements(target):
+    kernel = STATEMENTS
+    if target == "opengl":  # textures have no positions of rows
+        kernel = replace(kernel, body=tuple(s for s in kernel.body if getattr(s, "name", "") != "row"))
+    assert read(rendered(kernel, target, np.zeros(4, np.float32)), target, kernel) == canonical(kernel)
+
+
+def floats(inner):
+    """Return a strategy of expressions of floats, of conditions, and of integers around smaller ones."""
+    operator = st.sampled_from(["add", "subtract", "multiply", "divide", "minimum", "maximum"])
+    compared = st.sampled_from(["less", "less_equal", "greater", "equal", "not_equal"])
+    both = st.tuples(inner, inner)
+    condition = st.builds(lambda op, ab: Expr(op, ab, BOOL), compared, both)
+    joined = st.builds(
+        lambda op, a, b: Expr(op, (a, b), BOOL),
+        st.sampled_from(["logical_and", "logical_or"]),
+        condition,
+        condition,
+    )
+    return st.one_of(
+        st.builds(lambda op, ab: Expr(op, ab, FLOAT), operator, both),
+        st.builds(lambda op, a: Expr(op, (a,), FLOAT), st.sampled_from(["absolute", "floor", "sqrt"]), inner),
+        st.builds(lambda c, ab: Expr("select", (c, *ab), FLOAT), st.one_of(condition, joined), both),
+    )
+
+
+def integers(inner):
+    """Return a strategy of expressions of integers around smaller ones."""
+    operator = st.sampled_from(["add", "subtract", "multiply", "divide", "remainder"])
+    return st.builds(lambda op, a, b: Expr(op, (a, b), INT), operator, inner, inner)
+
+
+FLOATS = st.recursive(
+    st.one_of(st.sampled_from([F, G]), st.floats(0.0, 1e6, width=32).map(const)), floats, max_leaves=9
+)
+INTEGERS = st.recursive(
+    st.one_of(st.sampled_from([N, M]), st.integers(0, 99).map(const)), integers, max_leaves=9
+)
+
+
+@settings(max_examples=25)
+@given(value=FLOATS, index=INTEGERS)
+def test_expressions(value, index):
+    """The parentheses that are left out are those that no language needs."""
+    lets = (
+        Let("n", X),
+        Let("m", Y),
+        Let("f", const(0.5)),
+        Let("g", const(1.5)),
+        Let("t", value),
+        Let("k", index),
+    )
+    kernel = small(*lets, WRITE)
+    for target in LANGUAGES:
+        assert read(rendered(kernel, target, np.zeros(4, np.float32)), target, kernel) == canonical(kernel)
+
+
+# ---- what is refused ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tiny(kit):
+    """The program of a small network."""
+    program = kit.denoiser(kit.network([8, 2, 2], (3.0, 5.0), activation=RELU), {"a": 1, "b": 1}, 2, "zero")
+    return plan_program(program, "opencl").emitted
+
+
+KINDS = [*((target, "plain") for target in LANGUAGES), ("opencl", "tile"), ("c", "tile")]
+SIGNS = re.findall(
+    r"\S+", "+ - * / < <= > && 0 1 2 i j x y dx row column width height ( ) [ ] { } ; , float int ="
+)
+ATTRIBUTES = ("PRECISE", "WAMNET_UNROLL", "pragma", "unroll")
+"""What says how a kernel is compiled, and not what it computes."""
+
+
+@pytest.mark.parametrize(("target", "schedule"), KINDS)
+def test_every_token_counts(tiny, target, schedule):
+    """A source in which one token is another, or is missing, is refused or another kernel."""
+    kernel, weights = (plain(tiny), pack(tiny)) if schedule == "plain" else tiled(tiny, target)
+    source = re.sub(r"/\*.*?\*/", "", rendered(kernel, target, weights), flags=re.S)
+    original = read(source, target, kernel)
+    drawn = random.Random(f"{target} {schedule}")
+    tokens = [token for token in re.finditer(r"\w+|[^\w\s]+", source) if token[0] not in ATTRIBUTES]
+    for _ in range(20):
+        token, other = drawn.choice(tokens), drawn.choice(["", *SIGNS])
+        changed = source[: token.start()] + other + source[token.end() :]
+        if other == token[0]:
+            continue
+        with suppress(Unread):
+            assert read(changed, target, kernel) != original, changed[token.start() - 60 : token.end() + 60]
+
+
+REFUSED = {
+    "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "not a frame of opencl"),
+    "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is not a constant"),
+    "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
+    "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
+    "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "begins with no token"),
+    "another letter": (
+        "float v1[2];",
+        "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */",
+        "beyond printable ASCII",
+    ),
+    "a name of a function": (
+        "float v1[2];",
+        "float v1[2]; int clamp = 0;",
+        "'clamp' is not a name of a value",
+    ),
+    "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]", "part2 is not declared"),
+    "a double": ("part1[j] = 0.0f", "part1[j] = 0.0", "begins with no token"),
+    "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is not a value"),
+    "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0", "begins with no token"),
+    "an integer that is too large": (
+        "float v1[2];",
+        "float v1[2]; int big = 4294967297;",
+        "4294967297 is not a constant of type int32",
+    ),
+    "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j", "part1 of type .* has a value of type"),
+    "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;", "j is not an array"),
+    "a call of another function": (
+        "part1[j] = 0.0f",
+        "part1[j] = tan(0.0f)",
+        "tan is not a function of the language",
+    ),
+    "an index beyond its array": ("float v1[2];", "float v1[2]; v1[2] = 0.0f;", "index 2 is beyond v1"),
+    "a further statement": (
+        "    int x = (int)get",
+        "    width = 1;\n    int x = (int)get",
+        "not a frame of opencl",
+    ),
+    "a further function": (
+        "__kernel void",
+        "float twice(float a) { return a; }\n__kernel void",
+        "not a frame of opencl",
+    ),
+    "images in another order": (
+        "image_a,\n",
+        "image_a,\n    __global const float *restrict image_a,\n",
+        "images in two orders",
+    ),
+    "another number of channels": (
+        "image_a[(row * width + column) * 1 + c]",
+        "image_a[(row * width + column) * 2 + c]",
+        "image_a has two numbers of channels",
+    ),
+    "another place of the result": ("(y * width + x)", "(y * height + x)", "without its row"),
+    "a deep expression": ("part1[j] = 0.0f", f"part1[j] = {'(' * 9999}0.0f{')' * 9999}", "recursion"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "reason"), REFUSED.values(), ids=REFUSED)
+def test_refused(tiny, old, new, reason):
+    kernel = plain(tiny)
+    kernel = replace(kernel, constants=(*kernel.constants, Constant("PIXELS", const(3))))
+    source = rendered(kernel, "opencl", pack(tiny))
+    channels = {"image_a": 1}
+    assert parse(source, "opencl", channels) == canonical(kernel)
+    with pytest.raises(Unread, match=reason):
+        parse(source.replace(old, new, 1), "opencl", channels)

@@ -1,0 +1,401 @@
+"""Kernels in NumPy: near the float64 reference, the bits of C without contraction, the errors of a run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.ir import Gather, Image
+from wamnet.compiler.core.trace import trace
+from wamnet.compiler.core.weights import pack
+from wamnet.compiler.kernel.domain import Domain
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.kernel import (
+    BOOL,
+    BYTE,
+    FLOAT,
+    INT,
+    Array,
+    Barrier,
+    Call,
+    Constant,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Store,
+    Type,
+    View,
+    apply,
+    call,
+    const,
+    load,
+    name,
+    splat,
+)
+from wamnet.compiler.kernel.run import Runner, run
+from wamnet.compiler.kernel.verify import KernelError
+from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.renderer import Renderer
+from wamnet.compiler.plan import plan_program
+from wamnet.compiler.schedules.bytes import bytes_stored, group_of_bytes, tile_of_bytes, words_stored
+from wamnet.compiler.schedules.fft import fft, spectra_stored
+from wamnet.compiler.schedules.group import LARGEST_NUMBERS, group
+from wamnet.compiler.schedules.inlined import inlined
+from wamnet.compiler.schedules.packed import packed, packed_weights
+from wamnet.compiler.schedules.plain import plain
+from wamnet.compiler.schedules.tile import all_stored, tile
+from wamnet.kernels.devices import c_executor
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.whole import forward_whole, rounded
+
+X, Y, TURN = map(name, ("x", "y", "i"))
+WRITTEN = Store(RESULT, (Y, X, const(0)), const(1.0))
+LOCAL, ITEM = name("local_x"), name("item")
+
+MAIN = """
+#include <stdio.h>
+#include "denoise.h"
+static float result[{count}];
+int main(void)
+{{
+    wamnet_image({images}, weights, result, {width}, {height});
+    for (int i = 0; i < {count}; ++i) {{
+        printf("%a\\n", (double)result[i]);
+    }}
+    return 0;
+}}
+"""
+
+
+def scheduled(program, shape=None):
+    """Return a kernel of a program and its weights: plain, or a tile of (lanes, pixels, vectors, wide)."""
+    if shape is None:
+        return plain(program), pack(program)
+    lanes, _, vectors, _ = shape
+    stored = all_stored(program, lanes, vectors).values()
+    return tile(program, *shape), np.concatenate([np.ravel(each) for each in stored])
+
+
+def pictures(channels, size, seed=1):
+    """Return an image of each name, with values in [-2, 2]."""
+    random = np.random.default_rng(seed)
+    return {key: random.uniform(-2, 2, (*size, n)).astype(np.float32) for key, n in channels.items()}
+
+
+def small(*body, images=1, **more):
+    """Return a kernel with one image and one channel of a result."""
+    interface = denoiser([Image("a", images, -2.0, 2.0)], 0, 1, BUFFER, ())
+    return Kernel(interface, body, **more)
+
+
+def ran(kernel, size=(2, 3), weights=(0, 0, 0, 0)):
+    """Return the first channel of the result of a small kernel, whose image counts pixels."""
+    image = np.arange(size[0] * size[1], dtype=np.float32).reshape(*size, 1)
+    return run(kernel, {"a": image}, np.float32(weights))[..., 0]
+
+
+@st.composite
+def cases(draw):
+    """Draw the parts of a small denoiser, an image's size and a schedule."""
+    channels = draw(st.sampled_from([{"a": 1}, {"a": 3}, {"a": 2, "b": 1}]))
+    window = draw(st.sampled_from([1, 2, 3, 5, 8, 13]))
+    hidden = draw(st.lists(st.integers(1, 6), min_size=1, max_size=2))
+    size = draw(st.tuples(st.integers(1, 5), st.integers(1, 7)))
+    lanes, vectors = draw(st.sampled_from([1, 2, 4, 16])), draw(st.integers(1, 3))
+    shape = (lanes, draw(st.integers(1, 5)), vectors, lanes > 1 and draw(st.booleans()))
+    return channels, window, hidden, draw(st.sampled_from(["clamp", "zero"])), size, shape
+
+
+@settings(max_examples=12)
+@given(case=cases())
+def test_kernels_are_near_the_reference(kit, case):
+    channels, window, hidden, border, size, shape = case
+    inputs = window**2 * sum(channels.values())
+    program = kit.denoiser(kit.network([inputs, *hidden, 3], (3.0, 5.0)), channels, window, border)
+    plan, images = plan_program(program, "opencl"), pictures(channels, size)
+    expected = plan.expected(images)
+    for each in (None, shape):
+        kernel, weights = scheduled(plan.emitted, each)
+        result = run(kernel, images, weights)
+        assert result.dtype == np.float32
+        assert (np.abs(result - expected.value) <= expected.bound).all()
+
+
+def flat(arrays):
+    """Return arrays one after another."""
+    return np.concatenate([np.ravel(each) for each in arrays.values()])
+
+
+SCHEDULES = {
+    "group": lambda p: (group(p, 2, (4, 2), True), flat(all_stored(p, 4, LARGEST_NUMBERS))),
+    "group, by components": lambda p: (group(p, 1, (2, 4), False), flat(all_stored(p, 4, LARGEST_NUMBERS))),
+    "inlined": lambda p: (inlined(p), np.zeros(0, np.float32)),
+    "packed": lambda p: (packed(p), flat(packed_weights(p))),
+    "fft": lambda p: (fft(p, 4, 2, 4, 2, True), flat(spectra_stored(p, 4, 4, 2))),
+}
+
+
+@pytest.mark.parametrize("border", ["clamp", "zero"])
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_other_schedules_are_near_the_reference(kit, schedule, border):
+    program = kit.denoiser(kit.network([36, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 3, border)
+    plan, images = plan_program(program, "opencl"), pictures({"a": 3, "b": 1}, (3, 5))
+    expected, (kernel, weights) = plan.expected(images), SCHEDULES[schedule](plan.emitted)
+    far = 4 if schedule == "fft" else 1  # another order of sums, whose own bound is larger
+    assert (np.abs(run(kernel, images, weights) - expected.value) <= far * expected.bound).all()
+
+
+BYTEWISE = {
+    "tile": lambda p: (tile_of_bytes(p, 4, 3, True), flat(bytes_stored(p, 4, 2))),
+    "group": lambda p: (group_of_bytes(p, 2, (4, 2), True), flat(words_stored(p))),
+}
+
+
+@pytest.mark.parametrize("schedule", BYTEWISE)
+def test_integer_networks_are_exact(schedule):
+    network = rounded(siren.init([36, 7, 5, 3], 3.0, 5.0, seed=2), 3)
+    channels = {"a": 3, "b": 1}
+    sources = tuple(Image(key, n, -127.0, 127.0, whole=True) for key, n in channels.items())
+    gather = Gather(Window(3, "zero"), sources)
+    program = trace(lambda x: forward_whole(network, x), {"window": ir.Type(shape=(36,))}, gather)
+    plan = plan_program(program, "opencl")
+    random = np.random.default_rng(3)
+    images = {key: random.integers(-127, 128, (3, 5, n)).astype(np.float32) for key, n in channels.items()}
+    kernel, weights = BYTEWISE[schedule](plan.emitted)
+    assert np.array_equal(run(kernel, images, weights), plan.expected(images).value)
+
+
+@pytest.mark.parametrize("shape", [None, (4, 3, 2, False), (16, 5, 1, False)])
+@pytest.mark.parametrize(("border", "size"), [("zero", (3, 7)), ("clamp", (1, 1))])
+def test_bits_are_those_of_c_without_contraction(executor_named, kit, tmp_path, border, size, shape):
+    executor_named("c")
+    channels = {"a": 3, "b": 1}
+    program = kit.denoiser(kit.network([100, 19, 5, 3], (3.0, 5.0)), channels, 5, border)
+    kernel, weights = scheduled(plan_program(program, "c").emitted, shape)
+    images = pictures(channels, size)
+    result = run(kernel, images, weights)
+    source = Renderer(C(), kernel, False, weights).source([]).replace("fp-contract=fast", "fp-contract=off")
+    arrays = {"weights": weights, **images}
+    texts = {key: ", ".join(float(each).hex() + "f" for each in np.ravel(a)) for key, a in arrays.items()}
+    data = [f"static const float {key}[] = {{{text}}};\n" for key, text in texts.items()]
+    main = MAIN.format(count=result.size, images="a, b", width=size[1], height=size[0])
+    (tmp_path / "denoise.h").write_text(source)
+    (tmp_path / "main.c").write_text("".join(data) + main)
+    command = os.environ.get(c_executor.COMPILER_VARIABLE, "cc").split()
+    options = ["-std=c99", "-O1", "-ffp-contract=off", "-o", "main", "main.c", "-lm"]
+    subprocess.run([*command, *options], cwd=tmp_path, check=True)
+    lines = subprocess.run(
+        ["./main"], cwd=tmp_path, check=True, capture_output=True, text=True
+    ).stdout.split()
+    bits = np.array([float.fromhex(line) for line in lines], np.float32).view(np.uint32)
+    assert np.array_equal(np.ravel(result).view(np.uint32), bits)
+
+
+# ---- statements that no schedule of a program has together ------------------------------------------------
+
+
+def test_loops_and_branches_of_each_item():
+    turns = For("i", X + 1, (Store("n", (), const(1), add=True),), until=apply("not_equal", TURN, Y + 1))
+    both = If(
+        apply("equal", X, 1), (Store("n", (), const(10), add=True),), (Store("n", (), const(20), add=True),)
+    )
+    result = Store(RESULT, (Y, X, const(0)), apply("convert", name("n"), value="float32"))
+    kernel = small(Array("n", INT, value=const(0)), turns, both, result)
+    assert ran(kernel).tolist() == [[21, 11, 21], [21, 12, 22]]
+
+
+def group_kernel(*between, write=ITEM, read=None):
+    """Return a kernel of groups of 4 x 2 items: each writes an element, and reads another item's."""
+    read = apply("subtract", const(7), ITEM) if read is None else read
+    inside = apply("less", X, name("width")) & apply("less", Y, name("height"))
+    load_image = load("image_a", apply("minimum", Y, name("height") - 1), X % name("width"), const(0))
+    return small(
+        Array("shared", FLOAT, (8,), "group"),
+        Store("shared", (write,), load_image),
+        *between,
+        Let("other", load("shared", read)),
+        If(inside, (Store(RESULT, (Y, X, const(0)), name("other", FLOAT)),)),
+        group=(4, 2),
+    )
+
+
+def test_groups_share_memory_behind_a_barrier():
+    assert ran(group_kernel(Barrier()), (2, 4)).tolist() == [[7, 6, 5, 4], [3, 2, 1, 0]]
+    assert ran(group_kernel(Barrier()), (2, 5))[:, :4].tolist() == [[8, 7, 6, 5], [3, 2, 1, 0]]
+
+
+def test_products_of_bytes():
+    """Words of bytes with a sign, times four bytes without one from any place on, or those of a word."""
+    rows = [Store("bytes", (const(k),), const(v, BYTE)) for k, v in enumerate((9, 1, 2, 255, 3))]
+    word = Expr("pack4", tuple(const(float(each)) for each in (1, -2, 3, 100)), INT)
+    words = splat(name("word"), 2)
+    four, twice = load("bytes", 1, kind=BYTE.of(4)), call("twice", [name("word")], INT)
+    double = Function("twice", (("n", INT),), (Let("m", name("n") + name("n")),), name("m"))
+    sums = Array("sums", INT.of(2), value=splat(const(1000), 2))
+    adds = [
+        Store("sums", (), Expr("dot4", (words, each), INT.of(2)), add=True) for each in (four, name("word"))
+    ]
+    total = name("sums", INT.of(2)).lane(1) + (twice - name("word"))
+    write = Store(RESULT, (Y, X, const(0)), apply("convert", total - name("word"), value="float32"))
+    kernel = small(
+        Array("bytes", BYTE, (5,)), *rows, Let("word", word), sums, *adds, write, functions=(double,)
+    )
+    assert (ran(kernel) == 1000 + (1 - 4 + 765 + 300) + (1 + 4 + 9 + 10000)).all()
+
+
+def test_functions_on_views_step_through_arrays():
+    body = (Store("to", (name("leap") * 2,), apply("add", load("from", 0), load("from", name("step")))),)
+    fill = For("i", const(8), (Store("v", (TURN,), apply("convert", TURN, value="float32")),))
+    views = (View("v", (const(1),), const(3)), View("v", (const(0),), const(2)))
+    write = Store(RESULT, (Y, X, const(0)), load("v", const(4)))
+    function = Function("add", (("from", FLOAT), ("to", FLOAT)), body)
+    kernel = small(Array("v", FLOAT, (8,)), fill, Call("add", views), write, functions=(function,))
+    assert (ran(kernel) == 1 + 4).all()
+    beyond = (View("v", (const(1),), const(7)), views[1])
+    with pytest.raises(KernelError, match="index 8 is beyond v, which has 8"):
+        ran(replace(kernel, body=(*kernel.body[:2], Call("add", beyond), write)))
+
+
+def test_components_of_vectors_and_positions_of_rows():
+    four = FLOAT.of(4)
+    body = (
+        Array("v", four, (2,)),
+        Store("v", (const(0),), splat(load("image_a", Y, X), 4)),
+        Store("v", (const(1),), load("weights", const(0), kind=four)),
+        Let("sum", apply("add", load("v", const(0), kind=four), load("v", const(1), kind=four))),
+        Store(RESULT, (Y, X, const(0)), apply("add", name("sum", four).lane(2), load("v", const(7)))),
+    )
+    result = ran(small(*body, weights=four), weights=(10, 20, 30, 40))
+    assert result.tolist() == [[70, 71, 72], [73, 74, 75]]
+
+
+def test_domains_see_every_operation():
+    """A domain that counts the operations on the way to each value."""
+
+    class Depth(Domain):
+        dtype = np.int32
+
+        def lift(self, values):
+            return np.zeros(np.shape(values), np.int32)
+
+        def apply(self, operation, args):
+            return np.maximum.reduce(np.broadcast_arrays(*args)) + 1
+
+    add = For("i", X, (Store("v", (), const(1.0), add=True),))
+    kernel = small(Array("v", FLOAT, value=const(0.0)), add, Store(RESULT, (Y, X, const(0)), load("v")))
+    depths = run(kernel, {"a": np.zeros((1, 4, 1), np.float32)}, np.zeros(4, np.float32), Depth())
+    assert depths[0, :, 0].tolist() == [0, 1, 2, 3]
+
+
+# ---- errors ------------------------------------------------------------------------------------------------
+
+V = Array("v", FLOAT, (2,))
+ERRORS = {
+    "an index beyond an array": (
+        (V, Store("v", (X,), const(0.0)), WRITTEN),
+        r"index 2 is beyond v, which has 2, in the item of pixel \(2, 0\)",
+    ),
+    "a negative index": ((V, Store("v", (X - 1,), const(0.0)), WRITTEN), "index -1 is beyond v"),
+    "a row beyond an image": ((Let("t", load("image_a", Y + 1, X, 0)), WRITTEN), "index 2 is beyond image_a"),
+    "a weight too many": ((Let("t", load("weights", X + 2)), WRITTEN), "index 4 is beyond weights"),
+    "an unwritten element": (
+        (V, Store("v", (const(0),), const(0.0)), Let("t", load("v", const(1))), WRITTEN),
+        "v is read before it is written",
+    ),
+    "an element that a branch has not written": (
+        (V, If(X < 2, (Store("v", (const(0),), const(0.0)),)), Let("t", load("v", const(0))), WRITTEN),
+        r"v is read before it is written, in the item of pixel \(2, 0\)",
+    ),
+    "memory of the turn before": (
+        (
+            For(
+                "i",
+                const(2),
+                (V, If(TURN < 1, (Store("v", (TURN,), const(0.0)),)), Let("t", load("v", TURN))),
+            ),
+        ),
+        "v is read before",
+    ),
+    "a sum onto nothing": ((V, Store("v", (const(0),), const(1.0), add=True), WRITTEN), "v is read before"),
+    "an integer too large": (
+        (Array("n", INT, (1,)), Store("n", (const(0),), (X + 2**30) * 4), WRITTEN),
+        "n is set to an integer that int32 does not hold",
+    ),
+    "a quotient of a negative index": ((Let("t", (X - 1) // 2), WRITTEN), "divide of a negative index"),
+    "a channel written twice": ((WRITTEN, WRITTEN), "a channel of the result is written twice"),
+    "a pixel of another item": (
+        (Store(RESULT, (Y, const(0), const(0)), const(0.0)),),
+        "a channel of the result is written twice",
+    ),
+    "a pixel beyond the image": ((Store(RESULT, (Y, X + 1, const(0)), const(0.0)),), "index 3 is beyond res"),
+    "a pixel left out": (
+        (If(X < 2, (WRITTEN,)),),
+        r"channel 0 of pixel \(2, 0\) of the result is never written",
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "message"), ERRORS.values(), ids=ERRORS)
+def test_error(body, message):
+    with pytest.raises(KernelError, match=message):
+        ran(small(*body))
+
+
+def test_items_that_are_not_active_make_no_error():
+    kernel = small(V, If(X < 2, (Store("v", (X,), const(0.0)), Let("t", load("v", X)))), WRITTEN)
+    assert (ran(kernel) == 1).all()
+
+
+LATER = (Let("t", load("shared", LOCAL)), Store("shared", (ITEM,), const(0.0)), Barrier())
+RACES = {
+    "no barrier": (group_kernel(), "reads shared where another wrote"),
+    "one element": (group_kernel(Barrier(), write=const(0)), "two items write one element of shared"),
+    "the next write": (group_kernel(Barrier(), *LATER), "writes shared where another read"),
+}
+
+
+@pytest.mark.parametrize(("kernel", "message"), RACES.values(), ids=RACES)
+def test_race(kernel, message):
+    with pytest.raises(KernelError, match=message):
+        ran(kernel, (2, 4))
+
+
+def test_a_barrier_that_some_items_miss():
+    """`verify` refuses such a kernel, so that the run itself is called."""
+    kernel = small(If(LOCAL < 3, (Barrier(),)), WRITTEN, group=(4, 2))
+    runner = Runner(kernel, {"a": np.zeros((2, 4, 1), np.float32)}, np.zeros(4, np.float32), Domain())
+    with pytest.raises(KernelError, match="a barrier is reached by 6 of 8 items of a group"):
+        runner.body(kernel.body)
+
+
+def test_tables_and_constants():
+    """An entry of a table by an item's column; one beyond is an error."""
+    entry = Expr("take", (X + name("FIRST"),), FLOAT, "table")
+    kernel = small(
+        Store(RESULT, (Y, X, const(0)), entry),
+        constants=(Constant("FIRST", const(1)),),
+        tables=(("table", np.float32([1, 2, 3, 4])),),
+    )
+    assert ran(kernel).tolist() == [[2, 3, 4], [2, 3, 4]]
+    with pytest.raises(KernelError, match="index 4 is beyond table, which has 4"):
+        ran(replace(kernel, constants=(Constant("FIRST", const(2)),)))
+
+
+def test_conditions_choose_between_vectors():
+    inside = Let("inside", X < 1)
+    value = apply("select", name("inside", BOOL), splat(const(1.0), 2), splat(const(2.0), 2))
+    kernel = small(
+        inside, Let("v", value), Store(RESULT, (Y, X, const(0)), name("v", Type("float32", 2)).lane(1))
+    )
+    assert ran(kernel).tolist() == [[1, 2, 2], [1, 2, 2]]

@@ -1,0 +1,207 @@
+"""Kernels that are not well formed: each is refused with its reason; those of schedules are accepted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.core.ir import Image
+from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.kernel import (
+    BOOL,
+    FLOAT,
+    INT,
+    Array,
+    Barrier,
+    Call,
+    Constant,
+    Expr,
+    For,
+    Function,
+    If,
+    Kernel,
+    Let,
+    Store,
+    Type,
+    View,
+    Write,
+    apply,
+    call,
+    const,
+    expr,
+    load,
+    name,
+    splat,
+)
+from wamnet.compiler.kernel.verify import KernelError, verify
+
+X, Y, TURN = map(name, ("x", "y", "i"))
+V, FOUR = Array("v", FLOAT, (2,)), FLOAT.of(4)
+ZERO = const(0.0)
+WRITE = Store(RESULT, (Y, X, const(0)), ZERO)
+GIVEN = Function("twice", (("n", INT),), (), name("n") + name("n"))
+COPY = Function("copy", (("from", FLOAT), ("to", FLOAT)), (Store("to", (const(0),), load("from", 1)),))
+TABLES = (("table", np.zeros(2, np.float32)),)
+
+
+def small(*body, **more):
+    """Return a kernel with an image of three channels and one channel of a result."""
+    interface = denoiser([Image("a", 3, -2.0, 2.0)], 0, 1, BUFFER, ())
+    return Kernel(interface, body, **more)
+
+
+def looped(*body, count=2, **more):
+    """Return a loop over `i`."""
+    return For("i", expr(count), body, **more)
+
+
+WRONG = {
+    "a name before it is declared": (
+        small(Let("t", name("later")), Let("later", ZERO)),
+        "later is used before",
+    ),
+    "a name behind its scope": (small(looped(Let("t", TURN)), Let("u", name("t"))), "t is used before it is"),
+    "a name twice": (small(Let("t", ZERO), Let("t", ZERO)), "t is declared twice"),
+    "a name that hides another": (small(Let("t", ZERO), looped(Let("t", ZERO))), "t is declared twice"),
+    "a name of an integer": (small(Let("width", const(1))), "width is declared twice"),
+    "a name of another type": (
+        small(Let("t", name("x", FLOAT))),
+        "name of type int32 is said to have type float32",
+    ),
+    "an array without its index": (small(V, Let("t", name("v", FLOAT))), "v is an array without its index"),
+    "an index of a value": (small(Let("t", ZERO), Let("u", load("t", 0))), "t is not an array"),
+    "a missing index": (small(Array("m", FLOAT, (2, 2)), Let("t", load("m", 0))), "m has 2 indices, not 1"),
+    "a float for an index": (
+        small(V, Let("t", load("v", ZERO))),
+        "index of v has type float32 instead of int32",
+    ),
+    "an index beyond the array": (
+        small(V, Store("v", (const(2),), ZERO)),
+        "index 2 is beyond v, which has 2",
+    ),
+    "an index of constants": (
+        small(V, Store("v", (name("N") - 1,), ZERO), constants=(Constant("N", const(4)),)),
+        "index 3 is beyond v",
+    ),
+    "a component beyond the array": (
+        small(Array("w", FOUR, (2,)), Let("t", load("w", 8))),
+        "index 8 is beyond w, which has 8",
+    ),
+    "a channel beyond the image": (small(Let("t", load("image_a", Y, X, 3))), "index 3 is beyond image_a"),
+    "a lane beyond the vector": (small(Let("t", splat(ZERO, 4).lane(4))), "component 4 does not exist"),
+    "an entry beyond the table": (
+        small(Let("t", Expr("take", (const(2),), FLOAT, "table")), tables=TABLES),
+        "index 2 is beyond table",
+    ),
+    "a table that is not there": (
+        small(Let("t", Expr("take", (X,), FLOAT, "other"))),
+        "other is not a table",
+    ),
+    "another type in an array": (
+        small(V, Store("v", (const(0),), const(1))),
+        "v has elements of type float32, not",
+    ),
+    "lanes that differ": (small(Let("t", apply("add", splat(ZERO, 4), ZERO))), "lanes differ"),
+    "kinds that differ": (small(Let("t", apply("add", ZERO, 1))), "add: operands must all be"),
+    "a sum of booleans": (
+        small(Let("t", Expr("add", (X < 1, X < 1), BOOL))),
+        "add: operands must all be",
+    ),
+    "a missing operand": (small(Let("t", Expr("add", (ZERO,), FLOAT))), "add has 1 operands, not 2"),
+    "an operation that is not there": (
+        small(Let("t", Expr("twist", (ZERO,), FLOAT))),
+        "twist is not an operation",
+    ),
+    "a constant of another kind": (small(Let("t", const(0.5, INT))), "0.5 is not a constant of type int32"),
+    "a type that does not exist": (small(Array("v", Type("float16"), (2,))), "which does not exist"),
+    "bits of no words": (
+        small(Let("t", Expr("bits", (ZERO,), FLOAT))),
+        "words that are read as floats has",
+    ),
+    "products of other values": (
+        small(Let("t", Expr("dot4", (X, ZERO), INT))),
+        "neither four bytes nor a",
+    ),
+    "a word of integers": (
+        small(Let("t", Expr("pack4", (X, X, X, X), INT))),
+        "a byte of a word has type",
+    ),
+    "a pixel without its channels": (small(Write(Y, X, ())), "a pixel is written with 0 channels"),
+    "a written image": (
+        small(Store("image_a", (Y, X, const(0)), ZERO)),
+        "image_a is written, which is read only",
+    ),
+    "a result that is read": (small(Let("t", load(RESULT, Y, X, 0))), "the result is read"),
+    "a sum in the result": (small(Store(RESULT, (Y, X, const(0)), ZERO, add=True)), "is added to result"),
+    "a condition that is a number": (small(If(X, (WRITE,))), "a condition has type int32 instead of bool"),
+    "a step of 0": (small(looped(WRITE, step=const(0))), "the step of the loop over i is 0"),
+    "a step that varies": (small(looped(WRITE, step=X)), "the step of the loop over i is not determined"),
+    "a bound that is a float": (
+        small(looped(WRITE, count=ZERO)),
+        "a bound of the loop over i has type float32",
+    ),
+    "a size of nothing": (small(Array("v", FLOAT, (0,))), "a size of v is 0"),
+    "a size that varies": (small(Array("v", FLOAT, (X,))), "a size of v is not determined by constants"),
+    "an array with a value": (small(Array("v", FLOAT, (2,), value=ZERO)), "v is an array with a first value"),
+    "memory of no group": (small(Array("v", FLOAT, (2,), "group")), "v is memory of a group"),
+    "memory of a group in a loop": (
+        small(looped(Array("v", FLOAT, (2,), "group")), group=(2, 2)),
+        "v is memory of a",
+    ),
+    "a barrier without groups": (small(Barrier()), "a barrier in a kernel without groups"),
+    "a barrier in a branch": (small(If(X < 1, (Barrier(),)), group=(2, 2)), "a barrier inside a branch"),
+    "a barrier in a loop of items": (
+        small(looped(Barrier(), count=X), group=(2, 2)),
+        "a barrier inside a branch",
+    ),
+    "a barrier in a function": (
+        small(functions=(Function("f", (), (Barrier(),), ZERO),), group=(2, 2)),
+        "function f has a barrier",
+    ),
+    "a function that is not there": (small(Let("t", call("f", [X], INT))), "f is not a function of values"),
+    "a missing argument": (
+        small(Let("t", call("twice", [], INT)), functions=(GIVEN,)),
+        "twice takes 1 values, not 0",
+    ),
+    "an argument of another type": (
+        small(Let("t", call("twice", [ZERO], INT)), functions=(GIVEN,)),
+        "argument n of twice has type float32",
+    ),
+    "a function that sees the item": (
+        small(functions=(Function("f", (), (), X),)),
+        "x is used before it is declared",
+    ),
+    "a function that calls itself": (
+        small(functions=(Function("f", (("n", INT),), (), call("f", [name("n")], INT)),)),
+        "f is not a function of values",
+    ),
+    "a call of a function of values": (
+        small(Call("twice", ()), functions=(GIVEN,)),
+        "twice is not a function on views",
+    ),
+    "a missing view": (
+        small(V, Call("copy", (View("v", (X,), X),)), functions=(COPY,)),
+        "copy takes 2 views, not 1",
+    ),
+    "a view that is written": (
+        small(V, Call("copy", (View("v", (X,), X), View("weights", (X,), X))), functions=(COPY,)),
+        "weights is written by copy",
+    ),
+    "a constant that varies": (
+        small(constants=(Constant("N", name("M")),)),
+        "M is used before it is declared",
+    ),
+    "a step of an item that is 0": (small(step=(const(0), const(1))), "the step of an item is 0"),
+}
+
+
+@pytest.mark.parametrize(("kernel", "message"), WRONG.values(), ids=WRONG)
+def test_refused(kernel, message):
+    with pytest.raises(KernelError, match=message):
+        verify(kernel)
+
+
+def test_names_of_scopes_side_by_side_may_be_equal_but_not_those_within():
+    verify(small(V, looped(Let("t", TURN)), looped(Let("t", TURN)), WRITE))
+    with pytest.raises(KernelError, match="t is declared twice"):
+        verify(small(V, Let("t", X), looped(Let("t", TURN)), WRITE))

@@ -187,7 +187,10 @@ def _losing_no_interrupt() -> Iterator[None]:
             clock = threading.Timer(AGAIN_S, signal.pthread_kill, (main, signal.SIGINT))
             clock.daemon = True
             clock.start()
-        else:
+            return
+        deletes = getattr(unraisable.object, "__name__", "") == "__del__"
+        # An object that an interrupt has left half made lacks attributes when it is deleted: nothing to tell.
+        if not (deletes and isinstance(unraisable.exc_value, AttributeError)):
             before(unraisable)
 
     main = threading.main_thread().ident or 0

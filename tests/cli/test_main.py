@@ -166,6 +166,20 @@ def test_ctrl_c(wamnet, monkeypatch) -> None:
     assert wamnet("render", "minicubes").status == 130
 
 
+def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:
+    """An object whose `__init__` is cut short has no attributes when it is deleted: nobody can use that news."""
+
+    class HalfMade:
+        def __init__(self) -> None:
+            raise KeyboardInterrupt
+
+        def __del__(self) -> None:
+            self.connection.close()
+
+    monkeypatch.setattr(module, "application", lambda _: lambda *_args, **_options: HalfMade())
+    assert wamnet("render") == (130, "", "wamnet: interrupted\n")
+
+
 def test_as_a_process(tmp_path) -> None:
     """The exit status reaches the shell; standard output stays empty when something is wrong."""
     done = run_process("render", "nowhere", cwd=tmp_path)

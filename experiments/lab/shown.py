@@ -436,7 +436,7 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
 """Figures in sentences that are computed from several values."""
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
-    "course", "moving-quality", "savings", "sequence", "sines-speed", "specialisation", "text-faults", "whole",
+    "course", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
 SHOWN_BY_MODULE = ("blender", "domain", "house3")
@@ -453,6 +453,8 @@ TABLES: Mapping[str, TableOf] = {
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
     **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in SHOWN_BY_MODULE},
+    "sequence": as_printed("sequence", 2),
+    "sequence-frame": as_printed("sequence", 1),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,

@@ -167,7 +167,7 @@ def test_ctrl_c(wamnet, monkeypatch) -> None:
 
 
 def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:
-    """An object whose `__init__` is cut short has no attributes when it is deleted: nobody can use that news."""
+    """An object whose `__init__` is cut short lacks attributes when it is deleted: of no use to anyone."""
 
     class HalfMade:
         def __init__(self) -> None:

@@ -318,7 +318,7 @@ class Dialect:
 
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""
-        return f"{kind} {name}[{count}];"
+        return self.memory(kind, name, [count])
 
     def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
         """Return a component of such an array, or a vector."""

@@ -55,11 +55,13 @@ METAL_SHIM = """\
 #define device
 #define constant const
 #define threadgroup static
+#define thread
 typedef unsigned int uint;
 struct uint2 { uint x, y; };
 namespace metal {
 struct alignas(16) float4 {
     float x, y, z, w;
+    float4() = default;
     explicit float4(float all) : x(all), y(all), z(all), w(all) {}
     float4(float a, float b, float c, float d) : x(a), y(b), z(c), w(d) {}
 };
@@ -252,7 +254,7 @@ class MetalRunner(HostRunner):
         if group is not None:
             places.append("{(uint)group_column, (uint)group_row}")
         call = f"{kernel.entry_point}({', '.join([*arguments, *places])});"
-        return f'{_waiting(group)}#include "kernel.txt"\n{_started(call, group)}'
+        return f'{_waiting(group)}#include "kernel.txt"\n#undef thread\n{_started(call, group)}'
 
 
 def _waiting(group: tuple[int, int] | None) -> str:

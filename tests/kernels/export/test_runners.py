@@ -74,18 +74,18 @@ def test_denoiser_keeps_its_bound(runner, kit, case):
 
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
-@pytest.mark.parametrize("schedule", ["group", "group4"])
-def test_grouped_kernels_keep_their_bound(runner, kit, schedule, border):
-    """KER-18 in every language that has groups: pictures of several groups, none of them whole.
+@pytest.mark.parametrize("schedule", ["tile4", "group", "group4"])
+def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
+    """KER-18 in every language that has them: pictures of several groups, none of them whole.
 
     A channel more than a tile holds at once, so that the tile is filled twice.
     """
     if schedule not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
-        pytest.skip("its language has no groups")
+        pytest.skip("its language has no such schedule")
     program = kit.denoiser(kit.network([45, 7, 5, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, border)
     artifact = compile_program(program, runner.name, "ieee", schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
-    width, height = artifact.manifest["schedule"]["group"]
+    width, height = artifact.manifest["schedule"].get("group", (1, 1))
     random = np.random.default_rng(2)
     size = (height + 3, artifact.manifest["schedule"]["pixels"] * width + 5)
     for shape in (size, (1, 1)):

@@ -32,6 +32,8 @@ from ..kernel.kernel import (
     Store,
     Write,
     const,
+    rewritten,
+    substituted,
     walk,
 )
 
@@ -68,6 +70,12 @@ def _body(body: Body, variables: Collection[str]) -> Body:
             stores = (Store(RESULT, (*place, const(c)), value) for c, value in enumerate(statement.values))
             statements += [_statement(store, names) for store in stores]
             continue
+        if isinstance(statement, For) and _writes(statement):
+            for turn in range(int(statement.count.value)):
+                known = {statement.name: const(turn)}
+                inner = rewritten(statement.body, lambda value, known=known: substituted(value, known))
+                statements += _body(inner, names)
+            continue
         rest = walk(body[number + 1 :])
         stored = any(
             isinstance(each, Store) and each.array == getattr(statement, "name", "") for each in rest
@@ -82,6 +90,13 @@ def _body(body: Body, variables: Collection[str]) -> Body:
         elif isinstance(statement, Let | Array):
             names.discard(statement.name)
     return tuple(statements)
+
+
+def _writes(loop: For) -> bool:
+    """Return whether a loop does nothing but write channels of the result, which some languages write out."""
+    stores = all(isinstance(each, Store) and each.array == RESULT for each in loop.body)
+    whole = (loop.start, loop.step, loop.until) == (const(0), const(1), None)
+    return stores and whole and loop.count.op == "const"
 
 
 def _statement(statement: Statement, names: Collection[str]) -> Statement:
@@ -139,6 +154,10 @@ def _shortened(value: Expr) -> Expr:
     op, args = value.op, value.args
     if op == "negative" and args[0].op == "const":
         return replace(args[0], value=-args[0].value)
+    if op == "stack" and all(each == args[0] for each in args[1:]):
+        return Expr("splat", args[:1], value.type)
+    if op == "add" and args[0].op == args[1].op == "splat" and args[0].args[0] == const(0.0):
+        return args[1]
     if op == "divide" and args[0] == const(1.0):
         return Expr("reciprocal", args[1:], value.type)
     if op == "select" and args[0].op in ("less", "greater") and args[0].args == args[1:]:

@@ -11,27 +11,92 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from ..languages.c import FUSED, RESTRICT, STRAIGHT, UNFUSED, VECTORS
+from ..languages.c import FUSED, REFUSED, RESTRICT, STRAIGHT, UNFUSED, VECTORS, gnu_vectors
+from ..languages.cuda import CUDA_VECTOR
+from ..languages.instructions import (
+    C_TILE,
+    CUDA_GROUP,
+    OPENCL_GROUP,
+    OPENCL_TILE,
+    VULKAN_EXTENSION,
+    VULKAN_GROUP,
+    WGSL_GROUP,
+)
 from ..languages.opencl import BUILTINS
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
 """What becomes a blank."""
 
 OPEN: Mapping[str, str] = {
-    "(": "(?:", "|": "|", ")": ")?",
+    "(": "(?:", "|": "|", ")": ")?", "<": "(?:", ">": ")",
     "constants": r"(?P<constants>(?:#define [A-Z_]+ [^\n]*\n)*)",
     "wgsl_constants": r"(?P<constants>(?:const [A-Z_]+: i32 = [^\n]*;\n)*)",
+    "functions": r"(?P<functions>(?:[^\n]*\n)*?)",
     "undefined": r"(?:#undef [A-Z_]+\n)*",
     "images": r"(?P=images)",
     "given": r"(?P<given>(?:image_\w+, )+)",
-    "first": r"(?P<first>image_\w+)",
-    "scale": r"(?: \* (?P<step>[A-Z_]+))?",
-    "advance": r"(?:\+\+x|x \+= (?P<step>[A-Z_]+))",
-    "lanes": r"float(?P<lanes>\d+)",
-    "same_lanes": r"float(?P=lanes)",
+    "first": r"(?P<first>image_\w+)", "same_first": r"(?P=first)",
+    "group": r"(?P<grouped>)", "words": r"(?P<words>)",
+    "bounded": r"(?P<bounded>)",
+    "column": r"(?P<column>x|tile_x)", "row": r"(?P<row>y|tile_y)",
+    "x": r"(?P=column)", "y": r"(?P=row)",
+    "scale": r"(?: \* (?P<across>[A-Z]+(?: \* [A-Z]+)*))?",
+    "scale_y": r"(?: \* (?P<down>[A-Z]+))?",
+    "advance": r"(?:\+\+x|x \+= (?P<across>[A-Z]+(?: \* [A-Z]+)*))",
+    "advance_y": r"(?:\+\+y|y \+= (?P<down>[A-Z]+))",
+    "vector": r"(?P<vector>(?:float|int)(?:2|4|8|16)|wamnet_vector|i?vec4|vec4<[fi]32>)",
+    "same_vector": r"(?P=vector)",
+    "shared": r"(?P<shared>float|int|f32|i32)",
+    "lanes": r"(?P<lanes>\d+)",
     "body": r"(?P<body>.*\n)?",
 }  # fmt: skip
 """The open places by name; `@each LINE@` are lines, one for each image."""
+
+BLOCKS = (
+    "constants",
+    "wgsl_constants",
+    "functions",
+    "undefined",
+    "images",
+    "body",
+    "bounded",
+    "words",
+    *"(|)<>",
+)
+"""Those that hold whole lines, or none: the end of the line behind them need not be there."""
+
+GUARD = """if (@x@ >= width || @y@ >= height) {
+return;
+}"""
+"""Items beyond the image write nothing."""
+
+Two = tuple[str, str]
+
+
+def begun(thread: Two, local: Two, group: Two, size: str = "", own: Two = ("", ""), index: str = "") -> str:
+    """Return how the statements begin: those of an item, or of one of a group.
+
+    `own`: declarations of the group's memory, and of the weights as vectors, inside the function.
+    """
+    let = (index or "int {} = {};").format
+    shared, weights = own
+    item = (
+        let("local_x", local[0]),
+        let("local_y", local[1]),
+        let("item", "local_y * GROUP_WIDTH + local_x"),
+    )
+    places = (f"{group[0]} * (GROUP_WIDTH * PIXELS) + local_x", f"{group[1]} * GROUP_HEIGHT + local_y")
+    first = (let("@column@", f"{thread[0]}@scale@"), let("@row@", f"{thread[1]}@scale_y@"), GUARD)
+    alone = [size, *first, f"@(@{weights}\n@)@" if weights else ""]
+    grouped = [shared, weights, size, *item, let("x", places[0]), let("y", places[1])]
+    both = ("\n".join(filter(None, lines)) for lines in (alone, grouped))
+    return "@<@{}\n@|@@group@{}\n@>@".format(*both)
+
+
+def read_size(index: str, of: str) -> str:
+    """Return how an item gets the image's size from a block."""
+    return "\n".join(index.format(each, f"{of}{each}") for each in ("width", "height"))
+
 
 ARGUMENTS = """
 @each const float *restrict IMAGE,@
@@ -50,7 +115,50 @@ return value < low ? low : value > high ? high : value;
 }"""
 """An index within limits."""
 
-FRAMES: Mapping[str, str] = {
+FRAGMENT = """
+@constants@
+@functions@
+@each uniform sampler2D IMAGE;@
+@(@uniform sampler2D weight_texture;
+@)@
+layout(location = 0) out vec4 result;
+@(@float weights(int index)
+{
+ivec2 texel = ivec2(index % 1024, index / 1024);
+return texelFetch(weight_texture, texel, 0).r;
+}
+@|@@vector@ weights(int texel)
+{
+ivec2 place = ivec2(texel % 1024, texel / 1024);
+return texelFetch(weight_texture, place, 0);
+}
+@)@
+void main()
+{
+int width = textureSize(@first@, 0).x;
+int height = textureSize(@same_first@, 0).y;
+int @column@ = int(gl_FragCoord.x);
+int @row@ = int(gl_FragCoord.y);
+result = vec4(0.0, 0.0, 0.0, 1.0);
+@body@
+}
+"""
+"""A fragment shader behind its first lines."""
+
+ITEMS = (
+    ("int(gl_GlobalInvocationID.x)", "int(gl_GlobalInvocationID.y)"),
+    ("int(gl_LocalInvocationID.x)", "int(gl_LocalInvocationID.y)"),
+    ("int(gl_WorkGroupID.x)", "int(gl_WorkGroupID.y)"),
+)
+"""The places of items in GLSL."""
+
+SIZE = "int width = textureSize(@first@, 0).x;\nint height = textureSize(@same_first@, 0).y;"
+"""The image's size in fragment shaders."""
+
+EXTENSION = "\n".join(VULKAN_EXTENSION)
+"""Products of bytes in Vulkan GLSL."""
+
+FRAMES: dict[str, str] = {
     "c": f"""
 #ifndef WAMNET_DENOISE_H
 #define WAMNET_DENOISE_H
@@ -58,24 +166,36 @@ FRAMES: Mapping[str, str] = {
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+@(@@words@#include <string.h>
+@)@
 {RESTRICT}
-@(@#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
+@(@@bounded@
+#if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
 @)@
-@(@{UNFUSED}
+@(@{REFUSED}
+@)@
+@<@{UNFUSED}
 @|@{FUSED}
+@>@
+@(@{STRAIGHT}
+{gnu_vectors("@lanes@")}
 @)@
 @constants@
+@functions@
 @(@{STRAIGHT}
 {VECTORS}
+@|@@words@
+{STRAIGHT}
+{C_TILE}
 @)@
 static inline void wamnet_pixel({ARGUMENTS},
-int x,
-int y);
+int @column@,
+int @row@);
 static inline void wamnet_image({SAME})
 {{
-for (int y = 0; y < height; ++y) {{
+for (int y = 0; y < height; @advance_y@) {{
 for (int x = 0; x < width; @advance@) {{
 wamnet_pixel(@given@weights, result, width, height, x, y);
 }}
@@ -83,8 +203,8 @@ wamnet_pixel(@given@weights, result, width, height, x, y);
 }}
 static inline {CLAMP}
 static inline void wamnet_pixel({SAME},
-int x,
-int y)
+int @x@,
+int @y@)
 {{
 (void)weights;
 @body@
@@ -98,24 +218,34 @@ int y)
 """,
     "opencl": f"""
 @(@{BUILTINS}
+{OPENCL_GROUP}
+@|@{BUILTINS}
 @)@
 @constants@
-@(@{BUILTINS}
+@(@{OPENCL_TILE.replace("int16", "int@lanes@", 1)}
 @)@
-__kernel void wamnet_denoise(
+@functions@
+@<@__kernel void wamnet_denoise(
+@|@@group@__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))
+void wamnet_denoise(
+@>@
 @each __global const float *restrict IMAGE,@
 __global const float *restrict weights,
 __global float *restrict result,
 int width,
 int height)
 {{
-int x = (int)get_global_id(0)@scale@;
-int y = (int)get_global_id(1);
-if (x >= width || y >= height) {{
-return;
-}}
-@(@__global const @lanes@ *w = (__global const @same_lanes@ *)weights;
-@)@
+{
+        begun(
+            ("(int)get_global_id(0)", "(int)get_global_id(1)"),
+            ("(int)get_local_id(0)", "(int)get_local_id(1)"),
+            ("(int)get_group_id(0)", "(int)get_group_id(1)"),
+            own=(
+                "__local @shared@ tile[TILE_NUMBERS];",
+                "__global const @vector@ *w = (__global const @same_vector@ *)weights;",
+            ),
+        )
+    }
 @body@
 }}
 """,
@@ -124,122 +254,169 @@ return;
 #define WAMNET_CLAMP
 static __device__ inline {CLAMP}
 #endif
+@(@{CUDA_VECTOR}
+{CUDA_GROUP}
+@|@{CUDA_VECTOR}
+@)@
 @constants@
-extern "C" __global__ void wamnet_denoise(
+@functions@
+@<@extern "C" __global__ void wamnet_denoise(
+@|@@group@extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) wamnet_denoise(
+@>@
 @each const float *__restrict__ IMAGE,@
 const float *__restrict__ weights,
 float *__restrict__ result,
 int width,
 int height)
 {{
-int x = (int)(blockIdx.x * blockDim.x + threadIdx.x)@scale@;
-int y = (int)(blockIdx.y * blockDim.y + threadIdx.y);
-if (x >= width || y >= height) {{
-return;
-}}
+{
+        begun(
+            ("(int)(blockIdx.x * blockDim.x + threadIdx.x)", "(int)(blockIdx.y * blockDim.y + threadIdx.y)"),
+            ("(int)threadIdx.x", "(int)threadIdx.y"),
+            ("(int)blockIdx.x", "(int)blockIdx.y"),
+            own=(
+                "__shared__ @shared@ tile[TILE_NUMBERS];",
+                "const @vector@ *w = (const @same_vector@ *)weights;",
+            ),
+        )
+    }
 @body@
 }}
 """,
-    "metal": """
+    "metal": f"""
 #include <metal_stdlib>
 using namespace metal;
 @constants@
-struct Size {
+@functions@
+struct Size {{
 int width;
 int height;
-};
+}};
 kernel void wamnet_denoise(
 constant Size &size [[buffer(0)]],
 device const float *weights [[buffer(1)]],
 device float *result [[buffer(2)]],
 @each device const float *IMAGE [[buffer(NUMBER)]],@
-uint2 thread_place [[thread_position_in_grid]])
+@<@uint2 thread_place [[thread_position_in_grid]])
+@|@@group@uint2 item_place [[thread_position_in_threadgroup]],
+uint2 group_place [[threadgroup_position_in_grid]])
+@>@
+{{
 {
-int width = size.width;
-int height = size.height;
-int x = int(thread_place.x)@scale@;
-int y = int(thread_place.y);
-if (x >= width || y >= height) {
-return;
-}
+        begun(
+            ("int(thread_place.x)", "int(thread_place.y)"),
+            ("int(item_place.x)", "int(item_place.y)"),
+            ("int(group_place.x)", "int(group_place.y)"),
+            read_size("int {} = {};", "size."),
+            (
+                "threadgroup @shared@ tile[TILE_NUMBERS];",
+                "device const @vector@ *w = (device const @same_vector@ *)weights;",
+            ),
+        )
+    }
 @body@
-}
+}}
 """,
-    "opengl": """
-#version 330 core
+    "opengl": f"""
+@<@#version 330 core
 #extension GL_ARB_gpu_shader5 : enable
 #if defined(GL_ARB_gpu_shader5) || __VERSION__ >= 400
 #define PRECISE precise
 #else
 @(@#define PRECISE
-@|@#error the error bound needs `precise`: GL_ARB_gpu_shader5, or #version 400
+@|@@bounded@#error the error bound needs `precise`: GL_ARB_gpu_shader5, or #version 400
 @)@
 #endif
-@constants@
-@each uniform sampler2D IMAGE;@
-uniform sampler2D weight_texture;
-layout(location = 0) out vec4 result;
-float weights(int index)
-{
-ivec2 texel = ivec2(index % 1024, index / 1024);
-return texelFetch(weight_texture, texel, 0).r;
-}
-void main()
-{
-int width = textureSize(@first@, 0).x;
-int height = textureSize((?P=first), 0).y;
-int x = int(gl_FragCoord.x);
-int y = int(gl_FragCoord.y);
-result = vec4(0.0, 0.0, 0.0, 1.0);
-@body@
-}
-""",
-    "glsl-vulkan": """
-#version 450
+{FRAGMENT}
+@|@@bounded@
+#version 430 core
 #define PRECISE precise
 @constants@
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(std140, binding = 0) uniform Size {
+@functions@
+@group@layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
+@each uniform sampler2D IMAGE;@
+layout(std430, binding = 0) restrict readonly buffer weight_buffer {{ @vector@ w[]; }};
+layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
+shared @shared@ tile[TILE_NUMBERS];
+void main()
+{{
+{begun(*ITEMS, SIZE)}
+@body@
+}}
+@>@
+""",
+    "glsl-es": f"""
+#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+#define PRECISE
+{FRAGMENT}
+""",
+    "glsl-vulkan": f"""
+#version 450
+#define PRECISE precise
+@(@{EXTENSION}
+@)@
+@constants@
+@functions@
+@<@layout(local_size_x = 8, local_size_y = 8) in;
+@|@@group@layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
+@>@
+layout(std140, binding = 0) uniform Size {{
 int width;
 int height;
-};
-layout(std430, binding = 1) restrict readonly buffer Weights { float weights[]; };
-layout(std430, binding = 2) restrict buffer Result { float result[]; };
-@each layout(std430, binding = NUMBER) restrict readonly buffer BLOCK { float IMAGE[]; };@
+}};
+layout(std430, binding = 1) restrict readonly buffer Weights {{ @<@float weights@|@@vector@ w@>@[]; }};
+layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
+@each layout(std430, binding = NUMBER) restrict readonly buffer BLOCK {{ float IMAGE[]; }};@
+@(@shared @shared@ tile[TILE_NUMBERS];
+@)@
+@(@{VULKAN_GROUP}
+@)@
 void main()
-{
-int x = int(gl_GlobalInvocationID.x)@scale@;
-int y = int(gl_GlobalInvocationID.y);
-if (x >= width || y >= height) {
-return;
-}
+{{
+{begun(*ITEMS)}
 @body@
-}
+}}
 """,
-    "wgsl": """
+    "wgsl": f"""
+@(@requires packed_4x8_integer_dot_product;
+@)@
 @wgsl_constants@
-struct Size {
+@functions@
+struct Size {{
 width: i32,
 height: i32,
-}
+}}
 $group(0) $binding(0) var<uniform> size: Size;
-$group(0) $binding(1) var<storage, read> weights: array<f32>;
+$group(0) $binding(1) var<storage, read> @<@weights: array<f32>@|@w: array<@vector@>@>@;
 $group(0) $binding(2) var<storage, read_write> result: array<f32>;
 @each $group(0) $binding(NUMBER) var<storage, read> IMAGE: array<f32>;@
-$compute $workgroup_size(8, 8)
-fn main($builtin(global_invocation_id) invocation: vec3<u32>) {
-let width: i32 = size.width;
-let height: i32 = size.height;
-let x: i32 = i32(invocation.x)@scale@;
-let y: i32 = i32(invocation.y);
-if (x >= width || y >= height) {
-return;
-}
+@(@var<workgroup> tile: array<@shared@, TILE_NUMBERS>;
+@)@
+@(@{WGSL_GROUP}
+@)@
+@<@$compute $workgroup_size(8, 8)
+fn main($builtin(global_invocation_id) invocation: vec3<u32>) {{
+@|@@group@$compute $workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)
+fn main($builtin(local_invocation_id) item_place: vec3<u32>, $builtin(workgroup_id) group_place: vec3<u32>) {{
+@>@
+{
+        begun(
+            ("i32(invocation.x)", "i32(invocation.y)"),
+            ("i32(item_place.x)", "i32(item_place.y)"),
+            ("i32(group_place.x)", "i32(group_place.y)"),
+            read_size("let {}: i32 = {};", "size."),
+            index="let {}: i32 = {};",
+        )
+    }
 @body@
-}
+}}
 """,
 }
 """The frames by target; a dollar sign stands for WGSL's @."""
+FRAMES["glsl-compute"] = FRAMES["glsl-vulkan"].replace("#version 450", "#version 430 core")
 
 
 def lines_of(source: str) -> str:
@@ -250,16 +427,29 @@ def lines_of(source: str) -> str:
 
 @cache
 def frame(target: str) -> re.Pattern[str]:
-    """Return the pattern of a target's frame."""
+    """Return the pattern of a target's frame; groups of one name are numbered [`parts_of`]."""
     text = lines_of(FRAMES[target])
     pieces = re.split(r"@([^@\n]+)@(\n?)", text)
-    pattern = ""
+    pattern, last = "", {}
     for literal, place, end in zip(pieces[::3], [*pieces[1::3], ""], [*pieces[2::3], ""], strict=True):
-        pattern += re.escape(literal.replace("$", "@")).replace(re.escape("(?P=first)"), "(?P=first)")
-        pattern += _each(place[5:]) if place.startswith("each ") else OPEN.get(place, "")
-        inline = place in ("scale", "advance", "given", "first", "lanes", "same_lanes")
-        pattern += re.escape(end) if inline else ""
+        found = _each(place[5:]) if place.startswith("each ") else OPEN.get(place, "")
+        for key in re.findall(r"\(\?P<(\w+)>", found):
+            number = pattern.count(f"(?P<{key}")
+            last[key] = f"{key}{number or ''}"
+            found = found.replace(f"<{key}>", f"<{last[key]}>")
+        found = re.sub(r"\(\?P=(\w+)\)", lambda same: f"(?P={last[same[1]]})", found)
+        in_line = place not in BLOCKS and not place.startswith("each ")
+        pattern += re.escape(literal.replace("$", "@")) + found + (re.escape(end) if in_line else "")
     return re.compile(pattern, re.S)
+
+
+def parts_of(match: re.Match[str]) -> dict[str, str] | None:
+    """Return what stands in the open places, by name; nothing of half a kernel of groups, or of bytes."""
+    found = [(name.rstrip("0123456789"), text) for name, text in match.groupdict().items()]
+    for together in (("grouped", "shared"), ("words",)):
+        if len({text is None for name, text in found if name in together}) > 1:
+            return None
+    return {name: text for name, text in found if text is not None}
 
 
 def _each(line: str) -> str:

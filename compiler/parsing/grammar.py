@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-from ..kernel.kernel import BOOL, FLOAT, INT, Type
+from ..kernel.kernel import BOOL, BYTE, FLOAT, INT, Type
 
 TOKEN = re.compile(
-    r"(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
+    r"(?P<pixel>vec4 color = vec4\(0\.0, 0\.0, 0\.0, 1\.0\);)"
+    r"|(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
     r"|(?P<float>\d+(?:\.\d+(?:e[+-]\d+)?|e[+-]\d+)f(?!\w))|(?P<mask>0x7fffffff)(?!\w)"
-    r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>[A-Za-z_]\w*(?:::\w+)?)"
-    r"|(?P<sign>\+\+|--|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
+    r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>vec4<[fi]32>|unsigned int|[A-Za-z_]\w*(?:::\w+)?)"
+    r"|(?P<sign>\+\+|--|->|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
 )
 """The tokens of all languages; a kernel has no others."""
 
@@ -44,16 +45,25 @@ LEAST_MOST = {"min": "minimum", "max": "maximum"}
 C_TYPES = {"float": FLOAT, "int": INT, "bool": BOOL}
 """Types of C and its children."""
 
-VECTORS = {f"float{n}": FLOAT.of(n) for n in (2, 4, 8, 16)}
-"""Vectors of OpenCL."""
+VECTORS = {
+    f"{word}{n}": kind.of(n)
+    for word, kind in (("float", FLOAT), ("int", INT), ("uint", Type("uint32")))
+    for n in (2, 4, 8, 16)
+}
+"""Vectors of OpenCL; those of integers hold booleans too, with all bits set."""
 
-MASKS = {f"int{n}": BOOL.of(n) for n in (2, 4, 8, 16)}
-"""Booleans in vectors of OpenCL, which are integers with all bits set."""
+
+DOTS = {"wamnet_packed": "pack4", "wamnet_numbers": "bits", "wamnet_floats": "convert"}
+"""Functions of work groups on words of bytes."""
 
 
 @dataclass(frozen=True)
 class Language:
-    """The words of a language: types, functions, a barrier; `qualifier`: one that changes no value."""
+    """The words of a language: types, functions, a barrier; `qualifier`: one that changes no value.
+
+    `makers`: what makes a vector of values; `function`: the words before a function's type; `number`: those
+    before a vector's address as that of its components.
+    """
 
     types: Mapping[str, Type]
     calls: Mapping[str, str]
@@ -62,12 +72,40 @@ class Language:
     casts: bool = True
     texels: bool = False
     lets: bool = False
+    makers: Mapping[str, Type] = field(default_factory=dict)
+    function: tuple[str, ...] = ()
+    number: tuple[str, ...] = ()
 
+
+COMPARED = {
+    "lessThan": "less", "lessThanEqual": "less_equal", "greaterThan": "greater",
+    "greaterThanEqual": "greater_equal",
+}  # fmt: skip
+"""Comparisons of vectors in GLSL."""
+
+SHADING = {**C_TYPES, "uint": Type("uint32"), "ivec4": INT.of(4), "bvec4": BOOL.of(4)} | {
+    f"vec{n}": FLOAT.of(n) for n in (2, 3, 4)
+}
+"""Types of GLSL."""
+
+BUFFERS = Language(
+    SHADING,
+    {**SHADER, **DOTS, **COMPARED},
+    "barrier()",
+    qualifier="PRECISE",
+    casts=False,
+    makers={"ivec4": INT.of(4), **{f"vec{n}": FLOAT.of(n) for n in (2, 3, 4)}},
+)
+"""GLSL of compute shaders."""
 
 LANGUAGES: Mapping[str, Language] = {
-    "c": Language({**C_TYPES, "int32_t": INT, "uint32_t": Type("uint32")}, C_CALLS),
+    "c": Language(
+        {**C_TYPES, "int32_t": INT, "uint32_t": Type("uint32"), "uint8_t": BYTE},
+        C_CALLS,
+        function=("static",),
+    ),
     "opencl": Language(
-        {**C_TYPES, **VECTORS, **MASKS, "uint": Type("uint32")},
+        {**C_TYPES, **VECTORS, "uint": Type("uint32"), "uchar": BYTE},
         {
             **COMMON,
             "fabs": "absolute",
@@ -76,35 +114,66 @@ LANGUAGES: Mapping[str, Language] = {
             "clamp": "clamp",
             "FLOOR": "floor",
         }
-        | {**LEAST_MOST, "exp2": "exp2", "log2": "log2"},
+        | {**LEAST_MOST, "exp2": "exp2", "log2": "log2", **DOTS},
         "barrier(CLK_LOCAL_MEM_FENCE)",
     ),
     "cuda": Language(
-        C_TYPES, {**C_CALLS, **LEAST_MOST, "fminf": "minimum", "fmaxf": "maximum"}, "__syncthreads()"
+        {**C_TYPES, "unsigned int": Type("uint32"), "wamnet_vector": FLOAT.of(4), "int4": INT.of(4)},
+        {**C_CALLS, **LEAST_MOST, "fminf": "minimum", "fmaxf": "maximum", **DOTS},
+        "__syncthreads()",
+        makers={"wamnet_made": FLOAT.of(4), "make_int4": INT.of(4)},
+        function=("static", "__device__", "inline"),
+        number=("float", "*"),
     ),
     "metal": Language(
-        {**C_TYPES, "uint": Type("uint32")},
+        {**C_TYPES, "uint": Type("uint32"), "float4": FLOAT.of(4)},
         {**COMMON, **LEAST_MOST, "fabs": "absolute", "pow": "power", "clamp": "clamp"},
         "threadgroup_barrier(mem_flags::mem_threadgroup)",
+        makers={"float4": FLOAT.of(4)},
+        function=("static", "inline"),
+        number=("thread", "float", "*"),
     ),
-    "opengl": Language(
-        {**C_TYPES, "uint": Type("uint32")}, SHADER, qualifier="PRECISE", casts=False, texels=True
-    ),
-    "glsl-vulkan": Language(
-        {**C_TYPES, "uint": Type("uint32")}, SHADER, "barrier()", qualifier="PRECISE", casts=False
-    ),
+    "opengl": replace(BUFFERS, texels=True),
+    "glsl-es": replace(BUFFERS, texels=True),
+    "glsl-vulkan": BUFFERS,
+    "glsl-compute": BUFFERS,
     "wgsl": Language(
-        {"f32": FLOAT, "i32": INT, "u32": Type("uint32"), "bool": BOOL},
-        SHADER,
+        {"f32": FLOAT, "i32": INT, "u32": Type("uint32"), "bool": BOOL}
+        | {"vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
+        {**SHADER, **DOTS},
         "workgroupBarrier()",
         casts=False,
         lets=True,
+        makers={"vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
     ),
 }
 """The languages by target."""
 
 CONSTANT = re.compile(
     "WINDOW_(SIZE|CENTRE|ROWS|COLUMNS)|CENTRE_(ROW|COLUMN)|PIXELS|LANES|PATCH_WIDTH|GROUP_(WIDTH|HEIGHT)|"
-    "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE"
+    "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE|POINTS|OUT|TILES|PAIRS|BLOCK|INPUTS|NEURONS|STRIDE"
 )
 """The names of constants; no macro has another name, so that none changes what surrounds the statements."""
+
+NAME = re.compile(
+    r"[a-z]|dx|dy|(?:[bsvx]|part)_?\d+(?:_\d+)*|(?:bytes|[tw])\d+|(?:whole_)?(?:real|imaginary)|tile_(?:row|column)|"
+    "apart|at|back|block|columns?|first|gathered|inside|last|left|line|opposite|pair|part|product|rows?|"
+    "spectra|sums?|tap|tile|top|value|within"
+)
+"""The names of values and arrays, but those of layers: no language has one of these for something else."""
+
+FUNCTION = re.compile(r"elementwise_\d+(_of_one)?|forward|backward")
+"""The names of functions."""
+
+CALLS = {
+    "clear": 0,
+    "load": 1,
+    "store": 1,
+    "start": 1,
+    "weights": 1,
+    "floats": 1,
+    "add": 1,
+    "add_product": 1,
+    "dot": 1,
+}
+"""C's functions on vectors, and how many vectors they take beside the one that they set."""

@@ -11,54 +11,65 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
 from ..core.ir import Image
 from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.kernel import (
+    BYTE,
     FLOAT,
     INT,
     Array,
     Barrier,
     Block,
     Body,
+    Call,
     Constant,
     Expr,
     For,
+    Function,
     If,
     Kernel,
     Let,
     Statement,
     Store,
     Type,
+    View,
+    Write,
     const,
     load,
     name,
 )
 from ..kernel.verify import KernelError, verify
-from .canonical import canonical, terms
-from .frames import frame, lines_of
-from .grammar import BINARY, CONSTANT, LANGUAGES, PRODUCTS, TOKEN, Language
+from .canonical import canonical
+from .expressions import Expressions
+from .frames import FRAMES, frame, lines_of, parts_of
+from .grammar import CALLS, CONSTANT, FUNCTION, LANGUAGES, PRODUCTS
+from .reader import Scope
+from .reader import Unread as Unread
+
+Space = Literal["item", "group"]
 
 
-class Unread(Exception):
-    """A source that this grammar does not have."""
-
-
-def parse(source: str, language: str, channels: Mapping[str, int] | None = None) -> Kernel:
+def parse(
+    source: str, language: str, channels: Mapping[str, int] | None = None, bounded: bool = False
+) -> Kernel:
     """Return the canonical kernel of a source.
 
     `channels` of the images and of the result by name, where the source does not state them: of textures.
+    `bounded`: it must say what an error bound rests on, where its language lets it.
     """
     if re.search(r"[^\n -~]|\?\?", source):
         raise Unread("a character beyond printable ASCII, or a trigraph")
     match = frame(language).fullmatch(lines_of(source))
-    if match is None:
+    parts = match and parts_of(match)
+    if parts is None:
         raise Unread(f"what surrounds the statements is not a frame of {language}")
-    parser = Parser(LANGUAGES[language], match.groupdict(), dict(channels or {}))
+    if bounded and "@bounded@" in FRAMES[language] and "bounded" not in parts:
+        raise Unread("a source that does not refuse compilers which void its bound")
+    parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
     try:
         kernel = canonical(parser.kernel())
         verify(kernel)
@@ -67,46 +78,114 @@ def parse(source: str, language: str, channels: Mapping[str, int] | None = None)
     return kernel
 
 
-@dataclass
-class Scope:
-    """The names of values and of arrays: their types, numbers of indices, whether components are read too."""
-
-    values: dict[str, Type] = field(default_factory=dict)
-    arrays: dict[str, tuple[Type, int, bool]] = field(default_factory=dict)
-
-
-class Parser:
+class Parser(Expressions):
     """Reads one source: `kernel()`."""
-
-    def __init__(self, language: Language, parts: Mapping[str, str | None], channels: dict[str, int]) -> None:
-        self.language, self.parts, self.channels = language, parts, channels
-        self.types, self.vector = dict(language.types), FLOAT
-        self.scope = Scope(dict.fromkeys(("x", "y", "width", "height"), INT))
-        self.tokens: list[tuple[str, str]] = []
-        self.at = 0
 
     # ---- the whole ---------------------------------------------------------------------------------------
 
     def kernel(self) -> Kernel:
         """Return the kernel, not yet in canonical form."""
         parts = self.parts
-        images = self._images(parts["images"] or "")
-        constants = tuple(map(self._constant, (parts["constants"] or "").splitlines()))
-        lanes = {each.name: each.value for each in constants}.get("LANES")
-        if parts.get("lanes"):
-            self.vector = FLOAT.of(int(parts["lanes"] or 0))
-        elif lanes is not None and "wamnet_vector" in (parts["body"] or ""):
-            self.vector = self.types["wamnet_vector"] = FLOAT.of(int(lanes.value))
-        self._read(parts["body"] or "")
-        body = self._body(end="")
-        scale = parts.get("step")
-        step = (name(scale) if scale else const(1), const(1))
+        images = self._images(parts["images"])
+        constants = tuple(map(self._constant, parts.get("constants", "").splitlines()))
+        known = {each.name: each.value for each in constants}
+        self._vectors(known.get("LANES"))
+        self._read(parts.get("functions", ""))
+        while self._now():
+            self._function()
+        shared: tuple[Statement, ...] = ()
+        if "shared" in parts:
+            shared = (
+                self._array("tile", self.types[parts["shared"]], [name("TILE_NUMBERS")], space="group"),
+            )
+        self._read(parts.get("body", ""))
+        body = (*shared, *self._body(end=""))
         missing = [key for key in (*images, RESULT) if key not in self.channels]
         if missing:
             raise Unread(f"the channels of {missing[0]} are not stated")
         declared = [Image(key.removeprefix(IMAGE), self.channels[key], -np.inf, np.inf) for key in images]
-        interface = denoiser(declared, 0, self.channels[RESULT], BUFFER, ())
-        return Kernel(interface, body, constants, step=step, weights=self.vector)
+        return Kernel(
+            denoiser(declared, 0, self.channels[RESULT], BUFFER, ()),
+            body,
+            constants,
+            tuple(self.functions.values()),
+            (self._step("PIXELS" if shared else parts.get("across")), self._step(parts.get("down"))),
+            (known["GROUP_WIDTH"].value, known["GROUP_HEIGHT"].value) if shared else None,
+            self.place,
+            self.vector,
+        )
+
+    def _vectors(self, lanes: Expr | None) -> None:
+        """Note the type of the weights: single values, or vectors."""
+        parts = self.parts
+        if "vector" in parts:
+            self.vector = self._kind(parts["vector"])
+            if parts.get("lanes", str(self.vector.lanes)) != str(self.vector.lanes):
+                raise Unread(f"words of {parts['lanes']} sums in vectors of {self.vector.lanes}")
+        elif "lanes" in parts:  # of C with operators on vectors
+            self.vector = self.types["wamnet_vector"] = FLOAT.of(int(parts["lanes"]))
+        elif lanes is not None and "wamnet_" in parts.get("body", "") and not self.language.number:
+            kind = INT if "wamnet_sums" in parts["body"] else FLOAT
+            self.vector = kind.of(int(lanes.value))
+            self.types |= {"wamnet_vector": FLOAT.of(int(lanes.value))}
+            self.types |= dict.fromkeys(("wamnet_sums", "wamnet_bytes"), INT.of(int(lanes.value)))
+        self.by_calls = "lanes" not in parts and "wamnet_sums" in self.types
+        self.in_floats = self.by_calls or ("lanes" in parts and "vector" not in parts)
+
+    def _step(self, text: str | None) -> Expr:
+        """Return how many pixels an item takes along an axis."""
+        self._read(text or "1")
+        return self._expression()
+
+    def _function(self) -> None:
+        """Read a function above the kernel: of values with a result, or of views of two arrays."""
+        lets = self.language.lets
+        for word in ("fn",) if lets else self.language.function:
+            self._take(word)
+        outer = self.scope
+        self.scope = Scope({key: kind for key, kind in outer.values.items() if key.isupper()})
+        if self._has("void"):
+            key, takes, kind = *self._views(), None
+        else:
+            kind = FLOAT if lets else self._type()
+            key, takes = self._word(), []
+            while self._has("," if takes else "("):
+                takes.append(self._argument())
+            self._take(")")
+            kind = self._type() if lets and self._take("->") else kind
+            self.scope.values |= dict(takes)
+        self._take("{")
+        if not FUNCTION.fullmatch(key):
+            raise Unread(f"{key!r} is not a function of a kernel")
+        body, result = [], None
+        while self._now() not in ("return", "}"):
+            body.append(self._statement())
+        if kind:
+            self._take("return")
+            result = self._of(self._expression(), kind, key)
+            self._take(";")
+        self._take("}")
+        self.scope = outer
+        self.functions[key] = Function(key, tuple(takes), tuple(body), result)
+
+    def _argument(self) -> tuple[str, Type]:
+        """Read an argument's name and type."""
+        if not self.language.lets:
+            kind = self._type()
+            return self._word(), kind
+        key = self._word()
+        self._take(":")
+        return key, self._type()
+
+    def _views(self) -> tuple[str, list[tuple[str, Type]]]:
+        """Read the head of a function of views, and return its name and arrays."""
+        key, vector = self._take().removeprefix("wamnet_"), self._now(2)
+        self._take("(", "const", vector, "*", "from", ",", "int", "step")
+        self._take(",", vector, "*", "to", ",", "int", "leap", ")")
+        takes = [("from", self.types[vector]), ("to", self.types[vector])]
+        self.scope.arrays = {array: (kind, 1, False) for array, kind in takes}
+        self.scope.values |= {"step": INT, "leap": INT}
+        return key, takes
 
     def _images(self, text: str) -> list[str]:
         """Return the names of the images: numbers count up from 3, and the order is everywhere the same."""
@@ -122,7 +201,9 @@ class Parser:
 
     def _constant(self, line: str) -> Constant:
         """Return a named integer: of a macro whose text is one number or in parentheses."""
-        match = re.fullmatch(r"#define (\w+) (\d+|\(.*\))|const (\w+): i32 = (\d+|\(.*\));", line)
+        match = re.fullmatch(
+            r"#define (\w+) (\d+|[A-Z_]+|\(.*\))|const (\w+): i32 = (\d+|[A-Z_]+|\(.*\));", line
+        )
         key = match and (match[1] or match[3])
         if match is None or not CONSTANT.fullmatch(str(key)):
             raise Unread(f"{line!r} is not a constant")
@@ -131,51 +212,6 @@ class Parser:
         self._end()
         self.scope.values[str(key)] = INT
         return Constant(str(key), value)
-
-    def _read(self, text: str) -> None:
-        """Begin to read the tokens of a text."""
-        self.tokens, self.at, at = [], 0, 0
-        while at < len(text):
-            match = TOKEN.match(text, at)
-            if match is None:
-                raise Unread(f"{text[at : at + 20]!r} begins with no token")
-            if match.lastgroup:
-                self.tokens.append((match.lastgroup, match[0].strip()))
-            at = match.end()
-
-    # ---- tokens ------------------------------------------------------------------------------------------
-
-    def _now(self, ahead: int = 0) -> str:
-        """Return a token, or nothing at the end."""
-        return self.tokens[self.at + ahead][1] if self.at + ahead < len(self.tokens) else ""
-
-    def _take(self, *texts: str) -> str:
-        """Take these tokens, or any one; return the last."""
-        for text in texts or (self._now(),):
-            if self._now() != text or not text:
-                raise Unread(f"{' '.join(t for _, t in self.tokens[self.at : self.at + 6])!r}: no {text!r}")
-            self.at += 1
-        return self.tokens[self.at - 1][1]
-
-    def _has(self, *texts: str) -> bool:
-        """Take these tokens if they are there."""
-        there = all(self._now(k) == text for k, text in enumerate(texts))
-        self.at += len(texts) * there
-        return there
-
-    def _end(self) -> None:
-        """Refuse further tokens."""
-        if self._now():
-            raise Unread(f"{self._now()!r} where nothing follows")
-
-    def _word(self) -> str:
-        """Take a name that is not a type, function or array of the interface."""
-        kind = self.tokens[self.at][0] if self.at < len(self.tokens) else ""
-        word = self._take()
-        taken = word in self.types or word in self.language.calls or word in (WEIGHTS, RESULT, "w", "select")
-        if kind != "word" or taken or word.startswith((IMAGE, "wamnet_", "gl_", "as_", "convert_")):
-            raise Unread(f"{word!r} is not a name of a value")
-        return word
 
     # ---- statements --------------------------------------------------------------------------------------
 
@@ -197,6 +233,8 @@ class Parser:
             self.at += 1
             if self._now() != "for":
                 raise Unread("an unrolled statement that is not a loop")
+        if self.at < len(self.tokens) and self.tokens[self.at][0] == "pixel":
+            return self._written()
         if self._has("{"):
             return Block(self._body())
         if self._has("for", "("):
@@ -210,9 +248,23 @@ class Parser:
             words = re.findall(r"[\w:]+|\W", self.language.barrier)
             self._take(*words, ";")
             return Barrier()
-        statement = self._declaration() or self._vector_call() or self._assignment()
+        statement = self._declaration() or self._view_call() or self._vector_call() or self._assignment()
         self._take(";")
         return statement
+
+    def _written(self) -> Write:
+        """Read how a pixel of the result is written at once."""
+        self._take()
+        values: list[Expr] = []
+        while self._has("color", "[", str(len(values)), "]", "="):
+            values.append(self._expression())
+            self._take(";")
+        self._take("imageStore", "(", RESULT, ",", "ivec2", "(")
+        column = self._expression()
+        self._take(",")
+        row = self._expression()
+        self._take(")", ",", "color", ")", ";")
+        return Write(row, column, tuple(values))
 
     def _for(self) -> For:
         """Read a counted loop."""
@@ -262,26 +314,20 @@ class Parser:
             return self._array(key, kind, sizes)
         self._take("=")
         value = self._of(self._expression(), kind, key)
-        self.scope.values[key] = kind
+        self.scope.values[key] = value.type
         return Let(key, value)
 
-    def _sizes(self) -> list[Expr]:
-        """Read the sizes of an array."""
-        sizes = []
-        while self._has("["):
-            sizes.append(self._expression())
-            self._take("]")
-        return sizes
-
-    def _array(self, key: str, kind: Type, sizes: list[Expr], mixed: bool = False) -> Array:
+    def _array(
+        self, key: str, kind: Type, sizes: list[Expr], mixed: bool = False, space: Space = "item"
+    ) -> Array:
         """Return an array; in C one of floats of LANES times a count holds vectors."""
-        if "wamnet_vector" in self.types and len(sizes) == 1 and kind == FLOAT:
+        if self.in_floats and len(sizes) == 1 and kind == FLOAT:
             size = sizes[0]
             if size.op == "multiply" and size.args[1] == name("LANES"):
-                kind, sizes, mixed = self.vector, [size.args[0]], True
+                kind, sizes, mixed = self.types["wamnet_vector"], [size.args[0]], True
         self.scope.arrays[key] = (kind, len(sizes), mixed)
         self.scope.values.pop(key, None)
-        return Array(key, kind, tuple(sizes))
+        return Array(key, kind, tuple(sizes), space)
 
     def _filled(self, key: str, kind: Type) -> Statement:
         """Read the call that sets a vector of C, or return a variable without a first value."""
@@ -341,246 +387,103 @@ class Parser:
 
     def _assignment(self) -> Store:
         """Read an assignment."""
-        target = self._postfix(self._take())
+        target = self._unary() if self._now() in ("*", "(") else self._postfix(self._take())
         sign = self._take()
         if sign not in ("=", "+=", "-="):
-            raise Unread(f"{sign!r} is not a assignment")
+            raise Unread(f"{sign!r} is not an assignment")
         if target.op == "name":
             target = Expr("load", (), target.type, target.value)
         if target.op != "load" or target.value == WEIGHTS or target.value.startswith(IMAGE):
             raise Unread("an assignment to no element")
-        value = self._of(self._expression(), target.type, target.value)
+        if sign == "=" and (self._has("DOT", "(") or self._has("wamnet_dots", "(")):
+            return Store(target.value, target.args, self._dot(target), True)
+        value = self._expression()
+        if target.type == BYTE and value.op == "const":
+            value = const(value.value, BYTE)
+        value = self._of(value, target.type, target.value)
         value = self._made("negative", value) if sign == "-=" else value
         return Store(target.value, target.args, value, sign != "=")
 
-    def _of(self, value: Expr, kind: Type, key: str) -> Expr:
-        """Return a value of a declared type; an operator's single value fills all lanes."""
-        if value.type != kind:
-            raise Unread(f"{key} of type {kind} has a value of type {value.type}")
-        return value
+    def _dot(self, total: Expr) -> Expr:
+        """Read the operands of products of bytes that are added to a sum, behind the parenthesis."""
+        if self._expression() not in (total, name(total.value, total.type)):
+            raise Unread(f"products of bytes are added to another sum than {total.value}")
+        self._take(",")
+        weights = self._expression()
+        self._take(",")
+        in_words = not self._has("(", "(", "const", "fours", "*", ")", "(")
+        four = self._expression() if in_words else self._four()
+        if not in_words:
+            self._take(")", ")", "->", "bytes")
+        self._take(")")
+        return Expr("dot4", (weights, four), weights.type)
 
-    # ---- vectors of C ------------------------------------------------------------------------------------
+    def _four(self) -> Expr:
+        """Read the address of four bytes."""
+        array = self._word()
+        if self.scope.arrays.get(array) != (BYTE, 1, False):
+            raise Unread(f"{array} holds no bytes")
+        self._take("+")
+        return load(array, self._binary(PRODUCTS - 1), kind=BYTE.of(4))
+
+    # ---- vectors and views --------------------------------------------------------------------------------
+
+    def _view_call(self) -> Call | None:
+        """Read a call of a function of views, if there is one."""
+        function = self.functions.get(self._now().removeprefix("wamnet_"))
+        if function is None or function.result is not None or self._now(1) != "(":
+            return None
+        self._take()
+        views = []
+        for sign in ("(", ","):
+            self._take(sign)
+            array, index = self._view()
+            self._take(",")
+            views.append(View(array, index, self._expression()))
+        self._take(")")
+        return Call(function.name, tuple(views))
+
+    def _view(self) -> tuple[str, tuple[Expr, ...]]:
+        """Read the address of a view: rows of an array in brackets, and its first element as a sum."""
+        if self._has("(", "wamnet_vector", "*", ")", "("):
+            vector = self._vector()
+            self._take(")")
+            return vector.value, vector.args
+        array = self._word()
+        if array not in self.scope.arrays:
+            raise Unread(f"{array} is not an array")
+        _, count, mixed = self.scope.arrays[array]
+        if mixed:
+            self._take(".", "all")
+        rows = self._sizes()
+        last = self._binary(PRODUCTS - 1) if self._has("+") else const(0)
+        if len(rows) != count - 1:
+            raise Unread(f"{array} has {count} indices")
+        return array, (*rows, last)
 
     def _vector_call(self) -> Statement | None:
         """Read a call of one of C's functions on vectors, if there is one."""
-        if "wamnet_vector" not in self.types or not self._now().startswith("wamnet_"):
+        if not self.by_calls or not self._now().startswith("wamnet_"):
             return None
         call = self._take().removeprefix("wamnet_")
         self._take("(")
         target = self._vector()
         if target.op != "load":
             raise Unread("a call that sets a value which never changes")
-        values = [self._vector()] if self._has(",") else []
-        values += [self._expression()] if self._has(",") else []
-        self._take(")")
-        if call == "clear" and not values:
-            value = Expr("splat", (const(0.0),), self.vector)
-        elif call == "add_product" and len(values) == 2:
-            value = self._made("multiply", *values)
-        elif call in ("load", "store", "add") and len(values) == 1:
-            value = values[0]
+        vectors, add = [], call in ("add", "add_product", "dot")
+        while call in CALLS and len(vectors) < CALLS[call] and self._has(","):
+            vectors.append(self._vector())
+        if call not in CALLS or len(vectors) != CALLS[call]:
+            raise Unread(f"wamnet_{call} of {len(vectors)} values")
+        if call == "clear":
+            value = Expr("splat", (const(0.0),), target.type)
+        elif call == "add_product":
+            self._take(",")
+            value = self._made("multiply", *vectors, self._expression())
+        elif call == "dot":
+            self._take(",")
+            value = Expr("dot4", (*vectors, self._four()), target.type)
         else:
-            raise Unread(f"wamnet_{call} of {len(values)} values")
-        value = self._of(value, self.vector, target.value)
-        return Store(target.value, target.args, value, call.startswith("add"))
-
-    def _vector(self) -> Expr:
-        """Read the address of a vector: `&name[...]`, or `name + index * LANES`."""
-        if self._has("&"):
-            return self._postfix(self._take())
-        array = self._take()
-        self._take("+")
-        place = self._binary(PRODUCTS)
-        if place.op != "multiply" or place.args[1] != name("LANES"):
-            raise Unread(f"a place in {array} that is not a vector's")
-        if array != WEIGHTS and self.scope.arrays.get(array) != (self.vector, 1, True):
-            raise Unread(f"{array} holds no vectors")
-        return load(array, place.args[0], kind=self.vector)
-
-    # ---- expressions -------------------------------------------------------------------------------------
-
-    def _made(self, what: str, *args: Expr, value: Any = None) -> Expr:
-        """Return an operation; a single value among vectors fills all lanes."""
-        lanes = max((each.type.lanes for each in args), default=1)
-        if not (what == "select" and args[0].type.lanes == 1):
-            args = tuple(Expr("splat", (a,), a.type.of(lanes)) if a.type.lanes < lanes else a for a in args)
-        dtype = args[-1].type.dtype
-        if what.startswith(("less", "greater", "equal", "not_", "logical")):
-            dtype = "bool"
-        return Expr(what, args, Type(value if what == "convert" else dtype, lanes), value)
-
-    def _expression(self) -> Expr:
-        """Read an expression."""
-        condition = self._binary(0)
-        if self.language.lets or not self._has("?"):
-            return condition
-        chosen = self._expression()
-        self._take(":")
-        return self._made("select", condition, chosen, self._expression())
-
-    def _binary(self, level: int) -> Expr:
-        """Read operators of a level, from the left."""
-        if level == len(BINARY):
-            return self._unary()
-        value = self._binary(level + 1)
-        while self._now() in BINARY[level]:
-            value = self._made(BINARY[level][self._take()], value, self._binary(level + 1))
-        return value
-
-    def _unary(self) -> Expr:
-        """Read an operator of one operand, a conversion, or a value."""
-        if self._has("-"):
-            return self._made("negative", self._unary())
-        if self._has("!"):
-            return self._made("logical_not", self._unary())
-        if self.language.casts and self._now() == "(" and self._now(1) in self.types and self._now(2) == ")":
-            self._take("(")
-            kind = self.types[self._take()]
-            self._take(")")
-            if kind.lanes > 1:
-                self._take("(")
-                return self._filled_lanes(kind, self._arguments())
-            return self._made("convert", self._unary(), value=kind.dtype)
-        return self._primary()
-
-    def _filled_lanes(self, kind: Type, values: list[Expr]) -> Expr:
-        """Return a vector of values, or of one in all lanes."""
-        if len(values) not in (1, kind.lanes):
-            raise Unread(f"{len(values)} values of {kind.lanes} lanes")
-        return Expr("splat" if len(values) == 1 else "stack", tuple(values), kind)
-
-    def _primary(self) -> Expr:
-        """Read a number, a name, an element, a call, or an expression in parentheses."""
-        kind, text = self.tokens[self.at] if self.at < len(self.tokens) else ("", "")
-        if kind in ("float", "integer"):
-            self._take()
-            if kind == "float":
-                return const(float(np.float32(text[:-1])))
-            return const(int(text.removesuffix("u")), Type("uint32") if text.endswith("u") else INT)
-        if self._has("("):
-            value = self._expression()
-            self._take(")")
-            return value
-        if text in ("true", "false"):
-            return const(self._take() == "true")
-        if kind != "word":
-            raise Unread(f"{text!r} is not a value")
-        self._take()
-        return self._call(text) if self._has("(") else self._postfix(text)
-
-    def _arguments(self) -> list[Expr]:
-        """Read the arguments of a call, behind its parenthesis."""
-        values = [self._expression()]
-        while self._has(","):
-            values.append(self._expression())
+            value = self._made("convert", *vectors, value="float32") if call == "floats" else vectors[0]
         self._take(")")
-        return values
-
-    def _call(self, word: str) -> Expr:
-        """Read a call of a function of the language."""
-        language = self.language
-        if language.texels and word == "texelFetch":
-            return self._texel()
-        if language.texels and word == WEIGHTS:
-            return load(WEIGHTS, *self._arguments())
-        if match := re.fullmatch(r"as_float(\d+)", word):
-            self._take(f"as_int{match[1]}", "(")
-            value = self._expression()
-            self._take(")", "&", "0x7fffffff", ")")
-            return self._made("absolute", value)
-        if word == "CONVERT" or word.startswith("convert_"):
-            value = self._expression()
-            kind = self.types.get(word.removeprefix("convert_")) if word != "CONVERT" else None
-            if word == "CONVERT":
-                self._take(",")
-                kind = self.types.get(self._take().rstrip("0123456789"))
-            self._take(")")
-            if kind is None:
-                raise Unread(f"{word} to no type")
-            return self._made("convert", value, value=kind.dtype)
-        values = self._arguments()
-        if word in self.types and not language.casts and len(values) == 1:
-            return self._made("convert", *values, value=self.types[word].dtype)
-        if word == "select" and language.lets and len(values) == 3:
-            return self._made("select", values[2], values[1], values[0])
-        if word not in language.calls:
-            raise Unread(f"{word} is not a function of the language's list")
-        return self._made(language.calls[word], *values)
-
-    def _texel(self) -> Expr:
-        """Read a channel of a texture's pixel."""
-        image = self._take()
-        self._take(",", "ivec2", "(")
-        column = self._expression()
-        self._take(",")
-        row = self._expression()
-        self._take(")", ",", "0", ")", "[")
-        channel = self._expression()
-        self._take("]")
-        return load(image, row, column, channel)
-
-    def _postfix(self, word: str) -> Expr:
-        """Read the index or the component behind a name."""
-        if word == RESULT and self.language.texels:
-            self._take("[")
-            channel = self._expression()
-            self._take("]")
-            return load(RESULT, name("y"), name("x"), channel)
-        if word.startswith(IMAGE) or word == RESULT:
-            self._take("[")
-            place = self._expression()
-            self._take("]")
-            return self._pixel(word, place)
-        if word in (WEIGHTS, "w") and self._has("["):
-            place = self._expression()
-            self._take("]")
-            return load(WEIGHTS, place, kind=self.vector if word == "w" else FLOAT)
-        if word in self.scope.arrays:
-            return self._element(word)
-        if word not in self.scope.values:
-            raise Unread(f"{word} is not declared")
-        value = name(word, self.scope.values[word])
-        return self._lane(value)
-
-    def _lane(self, value: Expr) -> Expr:
-        """Read the component of a vector, if there is one."""
-        if not self._has("."):
-            return value
-        lane = self._take()
-        if lane not in tuple("xyzw"):
-            raise Unread(f"component {lane!r}")
-        return value.lane("xyzw".index(lane))
-
-    def _element(self, word: str) -> Expr:
-        """Read the index of an element of an array, or of a component of its vectors."""
-        kind, count, mixed = self.scope.arrays[word]
-        in_union = mixed and "wamnet_vector" not in self.types
-        part = self._take(".") and self._take() if in_union else ""
-        indices = self._sizes()
-        if len(indices) != count or (in_union and part not in ("all", "number")):
-            raise Unread(f"{word} has {count} indices")
-        kind = kind.of(1) if mixed and part != "all" else kind
-        return self._lane(load(word, *indices, kind=kind))
-
-    def _pixel(self, image: str, place: Expr) -> Expr:
-        """Return an element: `(row * width + column) * channels + c`."""
-        first, *rest = terms(place)
-        if first[0].op != "multiply" or not rest or rest[0][1] < 0:
-            raise Unread(f"a place in {image} of another form")
-        pixel, channels = first[0].args
-        index = rest[0][0]
-        for value, sign in rest[1:]:
-            index = Expr("add" if sign > 0 else "subtract", (index, value), INT)
-        if channels.op != "const" or self.channels.setdefault(image, channels.value) != channels.value:
-            raise Unread(f"{image} has two numbers of channels")
-        (row, _), *columns = terms(pixel)
-        if row.op != "multiply" or row.args[1] != name("width"):
-            raise Unread(f"a place in {image} without its row")
-        if not columns:
-            raise Unread(f"a place in {image} without its column")
-        column = columns[0][0]
-        if columns[0][1] < 0:
-            raise Unread(f"a place in {image} left of its row")
-        for value, sign in columns[1:]:
-            column = Expr("add" if sign > 0 else "subtract", (column, value), INT)
-        return load(image, row.args[0], column, index)
+        return Store(target.value, target.args, self._of(value, target.type, target.value), add)

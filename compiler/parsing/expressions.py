@@ -1,0 +1,282 @@
+"""Expressions of a source [parse.py]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..kernel.interface import IMAGE, RESULT, WEIGHTS
+from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name
+from .canonical import terms
+from .grammar import BINARY, PRODUCTS
+from .reader import Reader, Unread
+
+
+class Expressions(Reader):
+    """Reads an expression: `_expression()`."""
+
+    def _made(self, what: str, *args: Expr, value: Any = None) -> Expr:
+        """Return an operation; a single value among vectors fills all lanes."""
+        lanes = max((each.type.lanes for each in args), default=1)
+        if not (what == "select" and args[0].type.lanes == 1):
+            args = tuple(Expr("splat", (a,), a.type.of(lanes)) if a.type.lanes < lanes else a for a in args)
+        dtype = args[-1].type.dtype
+        if what.startswith(("less", "greater", "equal", "not_", "logical")):
+            dtype = "bool"
+        return Expr(what, args, Type(value if what == "convert" else dtype, lanes), value)
+
+    def _expression(self) -> Expr:
+        """Read an expression."""
+        condition = self._binary(0)
+        if self.language.lets or not self._has("?"):
+            return condition
+        chosen = self._expression()
+        self._take(":")
+        return self._made("select", condition, chosen, self._expression())
+
+    def _binary(self, level: int) -> Expr:
+        """Read operators of a level, from the left."""
+        if level == len(BINARY):
+            return self._unary()
+        value = self._binary(level + 1)
+        while self._now() in BINARY[level]:
+            value = self._made(BINARY[level][self._take()], value, self._binary(level + 1))
+        return value
+
+    def _unary(self) -> Expr:
+        """Read an operator of one operand, a conversion, or a value."""
+        if self._has("-"):
+            return self._made("negative", self._unary())
+        if self._has("!"):
+            return self._made("logical_not", self._unary())
+        if self.in_floats and self._has("*", "("):
+            self._has("const")
+            self._take("wamnet_vector", "*", ")", "(")
+            vector = self._vector()
+            self._take(")")
+            return vector
+        if self.language.casts and self._now() == "(" and self._now(1) in self.types and self._now(2) == ")":
+            self._take("(")
+            kind = self._type()
+            self._take(")")
+            if kind.lanes > 1 and self.in_floats:
+                self._take("{", "0", "}")
+                return Expr("splat", (const(0.0),), kind)
+            if kind.lanes > 1:
+                self._take("(")
+                return self._filled_lanes(kind, self._arguments())
+            return self._made("convert", self._unary(), value=kind.dtype)
+        return self._primary()
+
+    def _filled_lanes(self, kind: Type, values: list[Expr]) -> Expr:
+        """Return a vector of values, or of one in all lanes."""
+        if [value.type.lanes for value in values] == [kind.lanes]:
+            return self._made("convert", *values, value=kind.dtype)
+        if len(values) not in (1, kind.lanes):
+            raise Unread(f"{len(values)} values of {kind.lanes} lanes")
+        return Expr("splat" if len(values) == 1 else "stack", tuple(values), kind)
+
+    def _primary(self) -> Expr:
+        """Read a number, a name, an element, a call, or an expression in parentheses."""
+        kind, text = self.tokens[self.at] if self.at < len(self.tokens) else ("", "")
+        if kind in ("float", "integer"):
+            self._take()
+            if kind == "float":
+                return const(float(np.float32(text[:-1])))
+            return const(int(text.removesuffix("u")), Type("uint32") if text.endswith("u") else INT)
+        if self.language.number and self._has("(", "(", *self.language.number):
+            self._take(")")
+            array = self._word()
+            self._take(")")
+            return self._component(array, self._sizes())
+        if self._has("("):
+            value = self._expression()
+            self._take(")")
+            return value
+        if text in ("true", "false"):
+            return const(self._take() == "true")
+        if kind != "word":
+            raise Unread(f"{text!r} is not a value")
+        self._take()
+        return self._call(text) if self._has("(") else self._postfix(text)
+
+    def _arguments(self) -> list[Expr]:
+        """Read the arguments of a call, behind its parenthesis."""
+        values = [self._expression()]
+        while self._has(","):
+            values.append(self._expression())
+        self._take(")")
+        return values
+
+    def _call(self, word: str) -> Expr:
+        """Read a call of a function of the language."""
+        language = self.language
+        if language.texels and word == "texelFetch":
+            return self._texel()
+        if word == "CONVERT" or word.startswith(("convert_", "as_float")):
+            return self._converted(word)
+        values = self._arguments()
+        if language.texels and word == WEIGHTS:
+            return load(WEIGHTS, *values, kind=self.vector)
+        if word in language.makers:
+            return self._filled_lanes(language.makers[word], values)
+        if word in self.functions:
+            result = self.functions[word].result
+            return Expr("call", tuple(values), result.type if result else FLOAT, word)
+        if word in self.types and not language.casts and len(values) == 1:
+            return self._made("convert", *values, value=self.types[word].dtype)
+        if word == ("select" if language.lets else "mix") and not language.casts and len(values) == 3:
+            return self._made("select", values[2], values[1], values[0])
+        if word not in language.calls:
+            raise Unread(f"{word} is not a function of the language's list")
+        operation = language.calls[word]
+        if operation in ("pack4", "bits"):
+            return Expr(operation, tuple(values), INT if operation == "pack4" else FLOAT.of(4))
+        return self._made(operation, *values, value="float32" if operation == "convert" else None)
+
+    def _converted(self, word: str) -> Expr:
+        """Read OpenCL's conversions of vectors, and integers' bits as floats: of words, or magnitudes."""
+        lanes = word.removeprefix("as_float")
+        if lanes != word and self._has(f"as_int{lanes}", "("):
+            value = self._expression()
+            self._take(")", "&", "0x7fffffff", ")")
+            return self._made("absolute", value)
+        value = self._expression()
+        if lanes != word:
+            self._take(")")
+            return Expr("bits", (value,), self._kind(f"float{lanes}"))
+        kind = self._kind(
+            word.removeprefix("convert_") if word != "CONVERT" else self._take(",") and self._take()
+        )
+        self._take(")")
+        return self._made("convert", value, value=kind.dtype)
+
+    def _texel(self) -> Expr:
+        """Read a channel of a texture's pixel."""
+        image = self._take()
+        self._take(",", "ivec2", "(")
+        column = self._expression()
+        self._take(",")
+        row = self._expression()
+        self._take(")", ",", "0", ")")
+        if self._has("."):
+            part = self._take()
+            if part not in ("rg", "rgb", "rgba"):
+                raise Unread(f"part {part!r} of a texel")
+            return load(image, row, column, kind=FLOAT.of(len(part)))
+        self._take("[")
+        channel = self._expression()
+        self._take("]")
+        return load(image, row, column, channel)
+
+    def _postfix(self, word: str) -> Expr:
+        """Read the index or the component behind a name."""
+        if word == RESULT and self.language.texels:
+            self._take("[")
+            channel = self._expression()
+            self._take("]")
+            return load(RESULT, name("y"), name("x"), channel)
+        if word.startswith(IMAGE) or word == RESULT:
+            self._take("[")
+            place = self._expression()
+            self._take("]")
+            return self._pixel(word, place)
+        if word in (WEIGHTS, "w") and self._has("["):
+            place = self._expression()
+            self._take("]")
+            return load(WEIGHTS, place, kind=self.vector if word == "w" else FLOAT)
+        if word in self.scope.arrays:
+            return self._element(word)
+        if word not in self.scope.values:
+            raise Unread(f"{word} is not declared")
+        value = name(word, self.scope.values[word])
+        return self._lane(value)
+
+    def _lane(self, value: Expr) -> Expr:
+        """Read the component of a vector, if there is one."""
+        if not self._has("."):
+            return value
+        lane = self._take()
+        if lane not in tuple("xyzw"):
+            raise Unread(f"component {lane!r}")
+        return value.lane("xyzw".index(lane))
+
+    def _element(self, word: str) -> Expr:
+        """Read the index of an element of an array, or of a component of its vectors."""
+        kind, count, mixed = self.scope.arrays[word]
+        in_union = mixed and "wamnet_vector" not in self.types
+        part = self._take(".") and self._take() if in_union else ""
+        indices = self._sizes()
+        if len(indices) == count + 1 and kind.lanes > 1 and not self.in_floats:
+            place, lane = indices
+            index = place.args[0] if place.args else place
+            halves = self._made("divide", index, const(4)), self._made("remainder", index, const(4))
+            if (place, lane) != halves:
+                raise Unread(f"a component of {word} of another form")
+            return self._component(word, [index])
+        if len(indices) != count or (in_union and part not in ("all", "number")):
+            raise Unread(f"{word} has {count} indices")
+        kind = kind.of(1) if mixed and part != "all" else kind
+        return self._lane(load(word, *indices, kind=kind))
+
+    def _component(self, word: str, index: Sequence[Expr]) -> Expr:
+        """Return a component of an array of vectors by its own index."""
+        kind, count, _ = self.scope.arrays.get(word, (FLOAT, 0, False))
+        if kind.lanes == 1 or count != 1 or len(index) != 1:
+            raise Unread(f"{word} holds no vectors")
+        return load(word, *index, kind=kind.of(1))
+
+    def _pixel(self, image: str, place: Expr) -> Expr:
+        """Return an element: `(row * width + column) * channels + c`."""
+        first, *rest = terms(place)
+        if first[0].op != "multiply" or not rest or rest[0][1] < 0:
+            raise Unread(f"a place in {image} of another form")
+        pixel, channels = first[0].args
+        index = rest[0][0]
+        for value, sign in rest[1:]:
+            index = Expr("add" if sign > 0 else "subtract", (index, value), INT)
+        if channels.op != "const" or self.channels.setdefault(image, channels.value) != channels.value:
+            raise Unread(f"{image} has two numbers of channels")
+        (row, _), *columns = terms(pixel)
+        if row.op != "multiply" or row.args[1] != name("width"):
+            raise Unread(f"a place in {image} without its row")
+        if not columns:
+            raise Unread(f"a place in {image} without its column")
+        column = columns[0][0]
+        if columns[0][1] < 0:
+            raise Unread(f"a place in {image} left of its row")
+        for value, sign in columns[1:]:
+            column = Expr("add" if sign > 0 else "subtract", (column, value), INT)
+        return load(image, row.args[0], column, index)
+
+    def _sizes(self) -> list[Expr]:
+        """Read the sizes of an array."""
+        sizes = []
+        while self._has("["):
+            sizes.append(self._expression())
+            self._take("]")
+        return sizes
+
+    def _of(self, value: Expr, kind: Type, key: str) -> Expr:
+        """Return a value of a declared type; OpenCL's vectors of truths are declared as integers."""
+        if value.type != kind and (
+            value.type != Type("bool", kind.lanes) or kind.dtype != "int32" or kind.lanes == 1
+        ):
+            raise Unread(f"{key} of type {kind} has a value of type {value.type}")
+        return value
+
+    def _vector(self) -> Expr:
+        """Read the address of a vector: `&name[...]`, or `name + index * LANES`."""
+        if self._has("&"):
+            return self._postfix(self._take())
+        array = self._take()
+        self._take("+")
+        place = self._binary(PRODUCTS)
+        if place.op != "multiply" or place.args[1] != name("LANES"):
+            raise Unread(f"a place in {array} that is not a vector's")
+        kind = self.vector if array == WEIGHTS else self.types["wamnet_vector"]
+        if array != WEIGHTS and self.scope.arrays.get(array) != (kind, 1, True):
+            raise Unread(f"{array} holds no vectors")
+        return load(array, place.args[0], kind=kind)

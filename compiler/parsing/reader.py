@@ -1,0 +1,95 @@
+"""What a source is read by: its tokens one by one, and the names that are known so far [parse.py]."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..kernel.interface import IMAGE
+from ..kernel.kernel import FLOAT, INT, Function, Type
+from .grammar import FUNCTION, NAME, TOKEN, Language
+
+
+class Unread(Exception):
+    """A source that this grammar does not have."""
+
+
+@dataclass
+class Scope:
+    """The names of values and of arrays: their types, numbers of indices, whether components are read too."""
+
+    values: dict[str, Type] = field(default_factory=dict)
+    arrays: dict[str, tuple[Type, int, bool]] = field(default_factory=dict)
+
+
+class Reader:
+    """The tokens of a part of a source, and the scope at one of them.
+
+    `vector`: the type of the weights. C has vectors in arrays of floats (`in_floats`), and functions in
+    place of operators (`by_calls`).
+    """
+
+    def __init__(self, language: Language, parts: Mapping[str, str], channels: dict[str, int]) -> None:
+        self.language, self.parts, self.channels = language, parts, channels
+        self.types, self.vector = dict(language.types), FLOAT
+        places = (parts.get("column", "x"), parts.get("row", "y"))
+        grouped = ("local_x", "local_y", "item") if "shared" in parts else ()
+        self.scope = Scope(dict.fromkeys((*places, *grouped, "width", "height"), INT))
+        self.place = places
+        self.by_calls = self.in_floats = False
+        self.functions: dict[str, Function] = {}
+        self.tokens: list[tuple[str, str]] = []
+        self.at = 0
+
+    def _read(self, text: str) -> None:
+        """Begin to read the tokens of a text."""
+        self.tokens, self.at, at = [], 0, 0
+        while at < len(text):
+            match = TOKEN.match(text, at)
+            if match is None:
+                raise Unread(f"{text[at : at + 20]!r} begins with no token")
+            if match.lastgroup:
+                self.tokens.append((match.lastgroup, match[0].strip()))
+            at = match.end()
+
+    def _now(self, ahead: int = 0) -> str:
+        """Return a token, or nothing at the end."""
+        return self.tokens[self.at + ahead][1] if self.at + ahead < len(self.tokens) else ""
+
+    def _take(self, *texts: str) -> str:
+        """Take these tokens, or any one; return the last."""
+        for text in texts or (self._now(),):
+            if self._now() != text or not text:
+                raise Unread(f"{' '.join(t for _, t in self.tokens[self.at : self.at + 6])!r}: no {text!r}")
+            self.at += 1
+        return self.tokens[self.at - 1][1]
+
+    def _has(self, *texts: str) -> bool:
+        """Take these tokens if they are there."""
+        there = all(self._now(k) == text for k, text in enumerate(texts))
+        self.at += len(texts) * there
+        return there
+
+    def _end(self) -> None:
+        """Refuse further tokens."""
+        if self._now():
+            raise Unread(f"{self._now()!r} where nothing follows")
+
+    def _word(self) -> str:
+        """Take the name of a value: one of the closed list, or of a layer."""
+        word = self._take()
+        layer = re.search(rf"\b{IMAGE}{re.escape(word.removeprefix('patch_'))}\b", self.parts["images"])
+        if not (NAME.fullmatch(word) or FUNCTION.fullmatch(word) or layer) or word == "w":
+            raise Unread(f"{word!r} is not a name of a value")
+        return word
+
+    def _type(self) -> Type:
+        """Take a type."""
+        return self._kind(self._take())
+
+    def _kind(self, word: str) -> Type:
+        """Return a type by its name."""
+        if word not in self.types:
+            raise Unread(f"{word!r} is not a type")
+        return self.types[word]

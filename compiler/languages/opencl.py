@@ -152,13 +152,13 @@ class OpenCL(Arguments):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         if parts.kernel is not None and parts.kernel.weights.lanes > 1:
-            words = (
-                OPENCL_GROUP
-                if parts.kernel.group
-                else OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")
-            )
-            instructions = [words] if parts.kernel.weights.dtype == "int32" else []
-            return [BUILTINS, *instructions, *super().top(kernel, parts)]
+            named = super().top(kernel, parts)
+            if parts.kernel.weights.dtype != "int32":
+                return [BUILTINS, *named]
+            if parts.kernel.group:
+                return [BUILTINS, OPENCL_GROUP, *named]
+            # Which instruction there is depends on LANES.
+            return [BUILTINS, *named, OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")]
         lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
         return [*lanes, *super().top(kernel, parts)]
 

@@ -15,6 +15,11 @@
 #ifndef CONVERT
 #define CONVERT(a, kind) convert_##kind(a)
 #endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+#define PIXELS 2 /* neighbours in a row that a work item computes */
+#define LANES 4 /* components of a vector */
+#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 typedef int4 sums;
 typedef struct __attribute__((packed)) { uchar4 bytes; } fours; /* at any address */
 #ifdef __has_builtin
@@ -28,11 +33,6 @@ typedef struct __attribute__((packed)) { uchar4 bytes; } fours; /* at any addres
     ((sum) + PRODUCT(weight, (four).s0, 24) + PRODUCT(weight, (four).s1, 16) \
         + PRODUCT(weight, (four).s2, 8) + PRODUCT(weight, (four).s3, 0))
 #endif
-#define WINDOW_SIZE 2
-#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
-#define PIXELS 2 /* neighbours in a row that a work item computes */
-#define LANES 4 /* components of a vector */
-#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 __kernel void wamnet_denoise(
     __global const float *restrict image_a,
     __global const float *restrict image_b,

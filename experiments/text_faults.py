@@ -217,6 +217,12 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("a suffix in upper case", ("wgsl",), "3.0f *", "3.0F *"),
     ("a namespace before its library", ("metal",), "#include <metal_stdlib>\nusing namespace metal;",
         "using namespace metal;\n#include <metal_stdlib>"),
+    *(("constants that are 0 in the field", C_LIKE, "+= part1[j];", f"+= part1[j] + {a} + {b};")
+      for a, b in (("0.9375f", "4.656612873077393e-10f"), ("2013265920.0f", "1.0f"))),
+    *(("a name that an extension has", (of,), TAP, f"int {name} = 0; {TAP}") for of, name in (
+        ("opencl", "cl_khr_fp64"), ("opencl", "vec_step"), ("opencl", "cles_khr_int64"), ("opengl", "packed"),
+        ("opengl", "row_major"), ("opengl", "GL_core_profile"), ("glsl-vulkan", "samplerShadow"),
+        ("glsl-vulkan", "isubpassInput"))),
     ("a second pragma of fused products", ("c",), CENTRE, f"""#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=fast")

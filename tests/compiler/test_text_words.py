@@ -48,14 +48,14 @@ def test_texts_of_bytes_compute_what_is_certified(target, schedule, compilers, b
         (" + 128);", " + 127);", "never made"),
         (" + 128);", " + 129);", "never made"),
         ("sum[p][0] = w[18];", "sum[p][0] = w[19];", "beyond 16777216|never made"),
-        ("(four).s1, 16)", "(four).s1, 8)", "outside of functions"),
-        ("(four).s1, 16)", "(four).s0, 16)", "outside of functions"),
-        ("(int)(byte)", "(int)(byte) - 1", "outside of functions"),
-        ("(sums)(as_int(four)), weight", "(sums)(as_int(four)), weight >> (sums)(8)", "outside of functions"),
-        ("sum[p][0] = DOT(sum[p][0],", "sum[p][0] = DOT(sum[p][0] * 65536,", "int32 does not hold"),
+        ("(four).s1, 16)", "(four).s1, 8)", "begins with no token"),
+        ("(four).s1, 16)", "(four).s0, 16)", "begins with no token"),
+        ("(int)(byte)", "(int)(byte) - 1", "begins with no token"),
+        ("(sums)(as_int(four)), weight", "(sums)(as_int(four)), weight >> (sums)(8)", "begins with no token"),
+        ("sum[p][0] = DOT(sum[p][0],", "sum[p][0] = DOT(sum[p][0] * 65536,", "to another sum"),
         ("w0 = w[dy * 3 + i];", "w0 = w[dy * 3 + i + 1];", "never made"),
         ("+ p) * 3 + 4 * i", "+ p) * 3 + 3 * i", "never made"),
-        ("PATCH_WIDTH * 3 + i] = 0;", "PATCH_WIDTH * 3 + i];", "without an effect"),
+        ("PATCH_WIDTH * 3 + i] = 0;", "PATCH_WIDTH * 3 + i];", "is not an assignment"),
         ("bytes49[i] = (uchar)", "bytes49[i] = (char)", "char is not declared"),
     ],
 )
@@ -76,9 +76,7 @@ def test_faults_of_bytes_are_named(dot16, old, new, why):
 def test_faults_of_words_are_noticed(grouped, old, new):
     """A word has each byte at its own place, and nothing of another's sign."""
     pair = [t.replace("uint", "unsigned int") if "__dp4a" in grouped[0] else t for t in (old, new)]
-    with pytest.raises(
-        (Refused, Unread), match=r"not known as int8|words and other numbers|the sums of %1 are never made"
-    ):
+    with pytest.raises((Refused, Unread), match="begins with no token"):
         run_text(*changed(grouped, *pair))
 
 

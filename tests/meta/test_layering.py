@@ -84,7 +84,7 @@ ROOMS = {
         "languages": ("core", "kernel"),
         "parsing": ("core", "kernel", "languages"),
         "proof": ("core",),
-        "reading": ("core", "proof"),
+        "reading": ("core", "parsing", "proof"),
         "schedules": ("core", "kernel", "languages", "proof"),
         "": ("core", "kernel", "languages", "proof", "schedules"),
         "scenes": ("core", "kernel", "languages", "proof", "schedules", ""),

@@ -95,7 +95,7 @@ def test_an_interrupted_experiment_goes_on(tmp_path, cache, monkeypatch):
 
 def test_another_scale_s_results_are_refused(tmp_path, cache):
     Results.open(tmp_path / "results.json", "flicker", {"size": 128})
-    with pytest.raises(InputError, match="it belongs to flicker with settings"):
+    with pytest.raises(InputError, match="belongs to flicker with settings"):
         run("flicker", tmp_path, cache)
 
 

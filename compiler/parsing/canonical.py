@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -73,8 +74,7 @@ def _body(body: Body, variables: Collection[str]) -> Body:
         if isinstance(statement, For) and _writes(statement):
             for turn in range(int(statement.count.value)):
                 known = {statement.name: const(turn)}
-                inner = rewritten(statement.body, lambda value, known=known: substituted(value, known))
-                statements += _body(inner, names)
+                statements += _body(rewritten(statement.body, partial(substituted, known=known)), names)
             continue
         rest = walk(body[number + 1 :])
         stored = any(

@@ -470,7 +470,8 @@ class Parser(Expressions):
         target = self._vector()
         if target.op != "load":
             raise Unread("a call that sets a value which never changes")
-        vectors, add = [], call in ("add", "add_product", "dot")
+        add = call in ("add", "add_product", "dot")
+        vectors: list[Expr] = []
         while call in CALLS and len(vectors) < CALLS[call] and self._has(","):
             vectors.append(self._vector())
         if call not in CALLS or len(vectors) != CALLS[call]:

@@ -1,10 +1,11 @@
-"""Make the models that ship with the package: one for each scene of `experiments/quality.py`.
+"""Make the models that ship with the package: two for each scene of `experiments/quality.py`.
 
     python experiments/models.py
     python experiments/models.py --scenes minicubes -o out/models --write models
 
 1. Each is the network of that experiment's row for a set of frames, seed 0; it is trained where the cache
    lacks it [`MADE_OF`]. That of the mini cubes knows all that the web page moves.
+   The second one of each scene needs colour, normal and albedo alone, which every renderer writes.
 2. Its scores on the test frames inside of its ranges, with features of 16 rays and of one, and those of Open
    Image Denoise there go into its facts, beside the recipe and the ranges [`shipped`].
 3. The folder gets a file for each scene, and `SHA256SUMS` [`written`].
@@ -38,6 +39,9 @@ MADE_OF = {
     "minicubes": (SHIPPED_SET, "shipped"),
     "cornell": ("cornell", "best-16"),
     "glossy": ("glossy", "best-16"),
+    "minicubes-basic": ("minicubes", "basic-16"),
+    "cornell-basic": ("cornell", "basic-16"),
+    "glossy-basic": ("glossy", "basic-16"),
 }
 """The models by name: the set that each has learned from, and the row that it is."""
 

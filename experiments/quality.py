@@ -86,6 +86,9 @@ PLANS: Mapping[str, Plan] = {
 LAMPS = ("color", "normal", "albedo", "position", "unshadowed")
 """What a network sees that shall follow the lamps."""
 
+BASIC = ("color", "normal", "albedo")
+"""What every renderer writes for a denoiser."""
+
 PAST = ("color", "seen_normal", "seen_albedo", "seen_position")
 """The features of `short`, past mirrors and glass."""
 
@@ -105,6 +108,7 @@ RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
     "page": replace(BEST, features=LAMPS, steps=60_000),
+    "basic": replace(BEST, features=BASIC, steps=60_000),
     "past": replace(BEST, features=PAST),
     "bright": replace(BEST, features=BRIGHT),
     "narrow": NARROW,
@@ -187,6 +191,7 @@ ROWS: Mapping[str, Row] = {
     "best-1": Row("wamnet, preset `best`, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, preset `best`, features of {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, inputs and steps of the web page, {RAYS} rays", RAYS, "page"),
+    "basic-16": Row(f"wamnet, colour, normal and albedo alone, {RAYS} rays", RAYS, "basic"),
     "page48-16": Row(f"wamnet, the same with 48 neurons per layer, {RAYS} rays", RAYS, "page48"),
     "smooth-page-16": Row(
         "inputs of the web page, filtered colour, 8x8 window, 64 neurons", RAYS, "smooth-page"

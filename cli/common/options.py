@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SCENES = "minicubes, glossy, vitrine, daylight, cornell, furnace, lone_light, empty"
 """Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
 
-MODELS = "minicubes, cornell, glossy"
+MODELS = "minicubes, cornell, glossy, minicubes-basic, cornell-basic, glossy-basic"
 """Names of the models that ship with the package, for help texts; equal to the files in models."""
 
 LARGEST_EXPOSURE_STOPS = 64.0

@@ -28,6 +28,9 @@ LARGEST_BYTES = 300_000
 ROWS = (116, 140)
 """Rows of a 256x256 frame that are rendered here: the size of the training, at a tenth of the time."""
 
+BASIC = "-basic"
+"""Ends the names of models that need colour, normal and albedo alone."""
+
 LEAST_DB = {"minicubes": 28.0, "cornell": 33.0, "glossy": 22.0}
 """PSNR against references of 64 samples, whose own noise is at 31 dB (minicubes), 37 (cornell) and 30
 (glossy): with errors of 35, 46 and 30 dB beside it 29.5, 36.5 and 27, and windows that end at the band,
@@ -57,7 +60,8 @@ def test_a_model_says_what_it_is(name):
     recipe = recipe_from_json(model.info["recipe"])
     assert model.siren.widths == recipe.layer_widths
     assert 31_000 <= sum(a.size for a in (*model.siren.weights, *model.siren.biases)) <= 75_000
-    assert model.info["trained_on_scene"] == name
+    assert model.info["trained_on_scene"] == name.removesuffix(BASIC)
+    assert (model.features == ("color", "normal", "albedo")) == name.endswith(BASIC)
     assert model.info["trained_on_feature_spp"] == "16"
     assert recipe.steps == int(model.info["steps_done"])
     scores = json.loads(model.info["scores"])
@@ -66,7 +70,7 @@ def test_a_model_says_what_it_is(name):
     assert str(UNSEEN_S) not in model.info.get("trained_on_time", "").split(", ")
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "glossy"])
+@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("glossy")])
 def test_a_model_says_its_ranges(name):
     """Camera and time, for the page the lamps too; each frame's own draw is not among the facts."""
     info = load_model(models.path(name)).info
@@ -81,12 +85,13 @@ def test_a_model_says_its_ranges(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_model_denoises_an_unseen_frame(name):
     """A band of rows, at a time and with noise that training had none of."""
-    scene = canonical(name, time=UNSEEN_S)
+    scene = canonical(name.removesuffix(BASIC), time=UNSEEN_S)
     noisy = render(scene, Job(256, 256, seed=990, feature_spp=16), rows=ROWS).frame
     target = to_display(render(scene, Job(256, 256, 64, seed=991), rows=ROWS).frame["color"])
     model = load_model(models.path(name))
     found = metrics.psnr(denoise(model, noisy), target)
-    assert found >= LEAST_DB[name]
-    # The features matter: without normals, and the light that follows from them, the network is far off.
+    assert found >= LEAST_DB[name.removesuffix(BASIC)]
+    # The features matter: without normals, and the light that follows from them, the network is far off;
+    # less so where the first hit's normals say little, as in mirrors.
     blind = {**noisy.layers, **{name: np.zeros_like(noisy[name]) for name in ("normal", "unshadowed")}}
-    assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - 2.0
+    assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - (1.0 if name == "glossy-basic" else 2.0)

@@ -41,7 +41,8 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import RANGES, ranges_from_json, varied
 from wamnet.refimpl.network.denoise import Model, denoise
 
-MODELS = models.names()
+MODELS = [name for name in models.names() if not name.endswith("-basic") or name == "glossy-basic"]
+"""All bundled models, but those of the form of another one, with other weights."""
 
 WIDTH, HEIGHT = 40, 27
 """Size of a frame in pixels: more than one tile of spectra (21 x 21), and no multiple of any tile."""

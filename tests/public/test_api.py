@@ -47,7 +47,7 @@ def test_a_bundled_model_loads_by_name(tmp_path):
     assert repr(model).count("\n") == 1
     assert "trained on scene cornell" in repr(model)
     assert wamnet.load(model) is model
-    with pytest.raises(wamnet.WamnetError, match="choose one of cornell, glossy, minicubes"):
+    with pytest.raises(wamnet.WamnetError, match="choose one of cornell, cornell-basic, glossy"):
         wamnet.load("spheres")
     with pytest.raises(wamnet.WamnetError, match="not found"):
         wamnet.load(tmp_path / "none.safetensors")

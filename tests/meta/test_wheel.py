@@ -243,8 +243,8 @@ def test_full_installation_runs_outside_the_repository(from_sdist, outside, tmp_
     )
     assert [status for status, _ in results] == [0, 0, 0, 2], results
     assert results[-1][1] == (
-        "wamnet: error: command is course: distribution wamnet-course is not installed; "
-        "install it: pip install wamnet-course\n"
+        "wamnet: error: command 'course': distribution wamnet-course is not installed "
+        "(install it: pip install wamnet-course)\n"
     )
     for name in ("view.html", "bench/bench.md", "demo/report.html"):
         assert (tmp_path / name).stat().st_size

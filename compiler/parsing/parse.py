@@ -110,10 +110,17 @@ class Parser(Expressions):
             constants,
             tuple(self.functions.values()),
             (self._step("PIXELS" if shared else parts.get("across")), self._step(parts.get("down"))),
-            (known["GROUP_WIDTH"].value, known["GROUP_HEIGHT"].value) if shared else None,
+            self._group(known) if shared else None,
             self.place,
             self.vector,
         )
+
+    def _group(self, known: Mapping[str, Expr]) -> tuple[int, int]:
+        """Return the items of a work group."""
+        width, height = (known.get(key, name(key)) for key in ("GROUP_WIDTH", "GROUP_HEIGHT"))
+        if (width.op, height.op) != ("const", "const"):
+            raise Unread("work groups of no stated size")
+        return int(width.value), int(height.value)
 
     def _vectors(self, lanes: Expr | None) -> None:
         """Note the type of the weights: single values, or vectors."""
@@ -155,8 +162,8 @@ class Parser(Expressions):
             kind = self._type() if lets and self._take("->") else kind
             self.scope.values |= dict(takes)
         self._take("{")
-        if not FUNCTION.fullmatch(key):
-            raise Unread(f"{key!r} is not a function of a kernel")
+        if not FUNCTION.fullmatch(key) or key in self.functions:
+            raise Unread(f"{key!r} is not a function of a kernel, or its second one")
         body, result = [], None
         while self._now() not in ("return", "}"):
             body.append(self._statement())
@@ -182,7 +189,7 @@ class Parser(Expressions):
         key, vector = self._take().removeprefix("wamnet_"), self._now(2)
         self._take("(", "const", vector, "*", "from", ",", "int", "step")
         self._take(",", vector, "*", "to", ",", "int", "leap", ")")
-        takes = [("from", self.types[vector]), ("to", self.types[vector])]
+        takes = [("from", self._kind(vector)), ("to", self._kind(vector))]
         self.scope.arrays = {array: (kind, 1, False) for array, kind in takes}
         self.scope.values |= {"step": INT, "leap": INT}
         return key, takes
@@ -205,8 +212,8 @@ class Parser(Expressions):
             r"#define (\w+) (\d+|[A-Z_]+|\(.*\))|const (\w+): i32 = (\d+|[A-Z_]+|\(.*\));", line
         )
         key = match and (match[1] or match[3])
-        if match is None or not CONSTANT.fullmatch(str(key)):
-            raise Unread(f"{line!r} is not a constant")
+        if match is None or not CONSTANT.fullmatch(str(key)) or key in self.scope.values:
+            raise Unread(f"{line!r} is not a constant, or its second value")
         self._read(match[2] or match[4])
         value = self._expression()
         self._end()

@@ -273,6 +273,7 @@ def test_tokens_of_other_schedules_count(target, schedule):
 REFUSED = {
     "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "begins with no token"),
     "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is not a constant"),
+    "a constant twice": ("#define PIXELS 3", "#define PIXELS 3\n#define PIXELS 3", "its second value"),
     "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
     "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
     "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "begins with no token"),

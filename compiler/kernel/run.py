@@ -246,8 +246,6 @@ class Runner:
             return self.domain.apply(value, args)
         if value.op in ("divide", "remainder"):
             return self._divided(value.op, *args)
-        if value.op in ("divide", "remainder"):
-            return self._divided(value.op, *args)
         if value.op in INTEGERS and all(isinstance(each, int) for each in args):
             return INTEGERS[value.op](*args)
         if value.op == "convert":

@@ -296,7 +296,7 @@ def test_a_damaged_checkpoint_is_told(tmp_path, files):
     data = fitting.examples(DNCNN, files, tmp_path)
     path = fitting.path_of(tmp_path, DNCNN, data, data).with_suffix(".checkpoint")
     path.write_bytes(b"nothing")
-    with pytest.raises(InputError, match=r"checkpoint '.*': cannot be read .* remove it"):
+    with pytest.raises(InputError, match=r"checkpoint '.*': cannot be read: .* \(remove it"):
         fitting.fit(make(DNCNN), DNCNN, data, data, tmp_path)
 
 

@@ -193,13 +193,13 @@ def fuzz(
 
     `before`: what earlier runs of this seed have found; this one continues where they ended.
     """
-    until = time.monotonic() + seconds
     total = dict(before or {})
     context = get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, prepare)
     names = [
         name for name in pool.submit(names_of).result() if not only or any(word in name for word in only)
     ]
+    until = time.monotonic() + seconds  # the workers have been prepared by now
     following = {name: total[name].following if name in total else 0 for name in names}
     waiting, running, tried_all = list(names), {}, sum(sum(found.counts.values()) for found in total.values())
     while waiting or running:
@@ -249,7 +249,7 @@ def report(total: dict[str, Found], seed: int, folder: Path) -> int:
             keep(name, seed, number, folder)
             print(f"FOUND {name}: {what}; again: make fuzz SEED={seed} ONLY='{name}' AT={number}")
     print(f"fuzz: seed {seed}: {sum(everything.values())} inputs, {len(findings)} findings")
-    return 1 if findings else 0
+    return 1 if findings or not everything else 0  # a run that tries nothing says nothing
 
 
 def keep(name: str, seed: int, number: int, folder: Path) -> None:

@@ -123,10 +123,10 @@ def train(
 ) -> Model:
     """Train a denoiser on noisy frames and their references, and return the model.
 
-    `noisy` and `clean` are one frame each, or as many frames each; a frame is a `Frame` or maps layers
-    to arrays (H, W, C). Noisy frames have the layers of `features` (those of the `preset` by default), clean
-    ones `"color"`. `steps` replaces the preset's number of steps. `on_progress` is called with the number of
-    steps and the loss. Presets are short, best, mirrors, sky and paper.
+    `noisy` and `clean` are single frames, or two sequences of equal length; a frame is a `Frame` or a mapping
+    from layers to arrays (H, W, C). Noisy frames have the layers of `features` (by default the preset's),
+    clean ones `"color"`. `steps` replaces the preset's number of steps. `on_progress` is called with the
+    number of steps and the loss. Presets are short, best, mirrors, sky and paper.
 
     Raises InputError for frames that do not fit each other or lack a layer, TrainingError if the loss
     becomes infinite, ExecutorUnavailable for a missing device.

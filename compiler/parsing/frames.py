@@ -63,7 +63,7 @@ BLOCKS = (
     "words",
     *"(|)<>",
 )
-"""Those that hold whole lines, or none: the end of the line behind them need not be there."""
+"""Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
 GUARD = """if (@x@ >= width || @y@ >= height) {
 return;
@@ -432,24 +432,24 @@ def frame(target: str) -> re.Pattern[str]:
     pieces = re.split(r"@([^@\n]+)@(\n?)", text)
     pattern, last = "", {}
     for literal, place, end in zip(pieces[::3], [*pieces[1::3], ""], [*pieces[2::3], ""], strict=True):
-        found = _each(place[5:]) if place.startswith("each ") else OPEN.get(place, "")
-        for key in re.findall(r"\(\?P<(\w+)>", found):
+        piece = _each(place[5:]) if place.startswith("each ") else OPEN.get(place, "")
+        for key in re.findall(r"\(\?P<(\w+)>", piece):
             number = pattern.count(f"(?P<{key}")
             last[key] = f"{key}{number or ''}"
-            found = found.replace(f"<{key}>", f"<{last[key]}>")
-        found = re.sub(r"\(\?P=(\w+)\)", lambda same: f"(?P={last[same[1]]})", found)
+            piece = piece.replace(f"<{key}>", f"<{last[key]}>")
+        piece = re.sub(r"\(\?P=(\w+)\)", lambda same: f"(?P={last[same[1]]})", piece)
         in_line = place not in BLOCKS and not place.startswith("each ")
-        pattern += re.escape(literal.replace("$", "@")) + found + (re.escape(end) if in_line else "")
+        pattern += re.escape(literal.replace("$", "@")) + piece + (re.escape(end) if in_line else "")
     return re.compile(pattern, re.S)
 
 
 def parts_of(match: re.Match[str]) -> dict[str, str] | None:
     """Return what stands in the open places, by name; nothing of half a kernel of groups, or of bytes."""
-    found = [(name.rstrip("0123456789"), text) for name, text in match.groupdict().items()]
+    texts = [(name.rstrip("0123456789"), text) for name, text in match.groupdict().items()]
     for together in (("grouped", "shared"), ("words",)):
-        if len({text is None for name, text in found if name in together}) > 1:
+        if len({text is None for name, text in texts if name in together}) > 1:
             return None
-    return {name: text for name, text in found if text is not None}
+    return {name: text for name, text in texts if text is not None}
 
 
 def _each(line: str) -> str:

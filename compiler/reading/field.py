@@ -188,8 +188,8 @@ def leaf(shape: Words, kind: str = "float32", **other: Any) -> Number:
 def literal(value: float, kind: str) -> Number:
     """Return a constant (2, 1) of a text.
 
-    A float other than 0 is an unknown of its own in a sum: constants whose sum is 0 in the field are not in
-    float32. Integers are themselves, without a magnitude: their sums are exact [words.py].
+    A nonzero float in a sum counts as an independent unknown: constants that cancel in the field need not
+    cancel in float32. Integers keep their value and have no magnitude: their sums are exact [words.py].
     """
     is_float = kind == "float32"
     value = (

@@ -38,19 +38,18 @@ void main()
 of all pixels without a seam."""
 
 
-def _egl() -> Any:
-    """Open a context without a display through EGL."""
-    options: dict[str, Any] = {"backend": "egl"}
-    return moderngl.create_context(require=330, standalone=True, **options)
+def _created(**options: Any) -> Any:
+    """Return a context of OpenGL 4.3, or 3.3 without compute shaders: some drivers give what is required."""
+    try:
+        return moderngl.create_context(require=SHADER_VERSION, standalone=True, **options)
+    except Exception:  # noqa: BLE001 (moderngl and drivers raise what they like)
+        return moderngl.create_context(require=330, standalone=True, **options)
 
 
-def _osmesa() -> Any:
-    """Open a context in main memory through OSMesa."""
-    options: dict[str, Any] = {"context": osmesa.OSMesaContext()}
-    return moderngl.create_context(require=330, standalone=True, **options)
-
-
-CONTEXTS: Mapping[str, Callable[[], Any]] = {"egl": _egl, "osmesa": _osmesa}
+CONTEXTS: Mapping[str, Callable[[], Any]] = {
+    "egl": lambda: _created(backend="egl"),
+    "osmesa": lambda: _created(context=osmesa.OSMesaContext()),
+}
 """Kinds of context, in the order in which `auto` tries them."""
 
 HOW_TO_GET = {
@@ -121,8 +120,9 @@ class OpenGLExecutor(Executor):
         self.software = any(name in self.device for name in SOFTWARE)
         if llvmpipe.NAME in self.device:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
-            name, least = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
-            self.schedule_reason = f"built-in choice for software, {name} from {least} pixels on"
+            self.schedule_reason = (
+                f"built-in choice for software, {self.schedule} from {self.schedule_pixels} pixels on"
+            )
         elif self._context.version_code >= SHADER_VERSION:
             self.schedule = GPU_SCHEDULE
             self.schedule_reason = "built-in choice for graphics processors, not measured on one"

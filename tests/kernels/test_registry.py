@@ -122,6 +122,26 @@ def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):
         kernels.open_executor("opengl")
 
 
+@pytest.mark.parametrize(("newest", "asked"), [(430, [430]), (330, [430, 330])])
+def test_driver_that_gives_the_required_version_is_asked_for_compute_shaders(
+    executor_named, monkeypatch, newest, asked
+):
+    executor_named("opengl-egl")
+    from wamnet.kernels.devices import opengl_executor
+
+    required = []
+
+    def create(require, **options):
+        required.append(require)
+        if require > newest:
+            raise ValueError(f"version {require} is not supported")
+        return SimpleNamespace(version_code=require)
+
+    monkeypatch.setattr(opengl_executor.moderngl, "create_context", create)
+    assert opengl_executor.CONTEXTS["egl"]().version_code == newest
+    assert required == asked
+
+
 def test_osmesa_library_that_is_missing(monkeypatch):
     from wamnet.kernels.devices import osmesa
 

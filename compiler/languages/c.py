@@ -258,6 +258,7 @@ class C(Arguments):
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
     writes = "float *restrict {name}"
+    long = "size_t"
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
@@ -517,14 +518,6 @@ class C(Arguments):
             "    const float samples = (float)sample_count;",
             "    for (size_t at = 0; at < plane; ++at) {",
         ]
-
-    def offset(self, name: str, value: str) -> str:
-        """Return the declaration of a place in memory."""
-        return f"size_t {name} = {value};"
-
-    def factor(self, text: str) -> str:
-        """Return a number as a factor of a place in memory."""
-        return f"(size_t){text}"
 
 
 Two = tuple[str, str]

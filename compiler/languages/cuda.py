@@ -75,6 +75,7 @@ class CUDA(Arguments):
     heading = 'extern "C" __global__ void {entry}'
     reads = "const float *__restrict__ {name}"
     writes = "float *__restrict__ {name}"
+    long = "size_t"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     types = scalars = {**Dialect.types, "uint32": "unsigned int"}
     clamp = "wamnet_clamp"
@@ -148,11 +149,3 @@ class CUDA(Arguments):
         """Return the declaration of the weights as vectors."""
         vector = self.vector_kind(kind.dtype, kind.lanes)
         return [f"    const {vector} *w = (const {vector} *)weights;"] if kind.lanes > 1 else []
-
-    def offset(self, name: str, value: str) -> str:
-        """Return the declaration of a place in memory."""
-        return f"size_t {name} = {value};"
-
-    def factor(self, text: str) -> str:
-        """Return a number as a factor of a place in memory."""
-        return f"(size_t){text}"

@@ -61,8 +61,7 @@ class Dialect:
     operation. `scene_number` reads a number of the scene that is an input, by its `number`, or the `vector`
     of four and the `component`; a kernel takes `most_numbers`, and callers read `said_numbers`. `painted`: a
     channel of an image in a path kernel; a language without it writes sums.
-    `integers_top`: lines that integers in vectors need at a kernel's top. `types` are those of
-    values; `scalars` those of single numbers, where values are vectors.
+    `types` are those of values; `scalars` those of single numbers, where values are vectors.
     """
 
     target: str
@@ -101,7 +100,6 @@ class Dialect:
     said_numbers: str = f"{SCENE_NUMBERS}: {{count}} floats, after the sums in the list of arguments"
     most_numbers: int = 2**16
     scene_number: str = f"{SCENE_NUMBERS}[{{number}}]"
-    integers_top: tuple[str, ...] = ()
     planes_per_buffer: int = 1
     max_planes: int = 2**16
     max_images: int = 2**16

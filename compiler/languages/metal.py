@@ -13,7 +13,7 @@ from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Inter
 from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
-from .dialect import Parts
+from .dialect import Dialect, Parts
 from .glsl_buffers import NUMBERS_SAID
 from .openings import Buffers
 
@@ -74,13 +74,8 @@ class Metal(Buffers):
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
         **C.operations,
+        **Dialect.operations,
         "absolute": "fabs({0})",
-        "floor": "floor({0})",
-        "sqrt": "sqrt({0})",
-        "power": "pow({0}, {1})",
-        "exp": "exp({0})",
-        "sin": "sin({0})",
-        "cos": "cos({0})",
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
     }

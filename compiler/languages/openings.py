@@ -30,7 +30,7 @@ class Buffers(Dialect):
     """Kernels whose arrays are buffers; `item` are the texts of an item's column and row.
 
     `reach`: what a column is multiplied by where an item computes several pixels. `word`: a qualifier of
-    numbers that are read.
+    numbers that are read; `long`: the type of a place in memory, if it is not that of other integers.
     """
 
     item: tuple[str, str]
@@ -39,6 +39,7 @@ class Buffers(Dialect):
     early: Mapping[str, Sequence[str]] = {}
     late: Mapping[str, Sequence[str]] = {}
     word: str = ""
+    long: str = ""
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
@@ -120,11 +121,11 @@ class Buffers(Dialect):
 
     def offset(self, name: str, value: str) -> str:
         """Return the declaration of a place in memory."""
-        return self.index(name, value)
+        return f"{self.long} {name} = {value};" if self.long else self.index(name, value)
 
     def factor(self, text: str) -> str:
         """Return a number as a factor of a place in memory."""
-        return text
+        return f"({self.long}){text}" if self.long else text
 
     def path_start(self, kernel: Interface) -> list[str]:
         """Return the first statements of a path kernel: its place in the planes, pixel and seed."""

@@ -116,11 +116,7 @@ class Nest:
             self.row, self.column = name("CENTRE_ROW"), name("CENTRE_COLUMN")
         found = {self.rows.value: (gather.rows, ""), self.columns.value: (gather.columns, "")}
         found |= {self.row.value: (gather.rows // 2, pixel)}
-        found = {
-            **found,
-            self.column.value: (gather.columns // 2, ""),
-            self.row.value: (gather.rows // 2, pixel),
-        }
+        found.setdefault(self.column.value, (gather.columns // 2, ""))
         return [Constant(name, const(value), text) for name, (value, text) in found.items()]
 
     def kernel(self, body: Sequence[Statement], constants: Sequence[Constant], **more: object) -> Kernel:

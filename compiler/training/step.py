@@ -124,27 +124,22 @@ def factor_errors(factors: Factors, dweight: Array, error: Array) -> Factors:
 
     `error` (D_out, D_in) is that of dweight. A sum of n products is rounded at most n + 1 times.
     """
-    magnitude = Factors(
-        *(np.abs(array.astype(np.float64)) for array in (factors.vertical, factors.horizontal))
-    )
-    passed_on = factored.backward(magnitude, error)
-    size = factored.backward(magnitude, np.abs(dweight) + error + FLUSH)
+    magnitude = _magnitude(factors)
+    errors = factored.backward(magnitude, error)
+    sizes = factored.backward(magnitude, np.abs(dweight) + error + FLUSH)
     n_out, run = magnitude.vertical.shape[0] * magnitude.vertical.shape[1], magnitude.horizontal.shape[1]
-    widened = (
-        (e + gamma(n + 1) * s + 2 * n * FLUSH) * (1 + OUTWARD)
-        for e, s, n in (
-            (passed_on.vertical, size.vertical, run),
-            (passed_on.horizontal, size.horizontal, n_out),
-        )
-    )
-    return Factors(*widened)
+    terms = (errors.vertical, sizes.vertical, run), (errors.horizontal, sizes.horizontal, n_out)
+    return Factors(*((e + gamma(n + 1) * s + 2 * n * FLUSH) * (1 + OUTWARD) for e, s, n in terms))
+
+
+def _magnitude(factors: Factors) -> Factors:
+    """Return the sizes of all numbers of both factors."""
+    return Factors(np.abs(factors.vertical.astype(np.float64)), np.abs(factors.horizontal.astype(np.float64)))
 
 
 def expansion_error(factors: Factors) -> Array:
     """Return how far the kernels' product (D_out, D_in) of two factors may be from [`factored.expand`]."""
-    magnitude = Factors(
-        *(np.abs(array.astype(np.float64)) for array in (factors.vertical, factors.horizontal))
-    )
+    magnitude = _magnitude(factors)
     rank = factors.rank
     widened: Array = (gamma(rank + 1) * factored.expand(magnitude) + 2 * rank * FLUSH) * (1 + OUTWARD)
     return widened

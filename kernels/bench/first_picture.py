@@ -8,16 +8,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from ...models.data.scene_source import scene_source
-from ...models.model_file import load_model, save_model
+from ...models.model_file import load_model
 from ...refimpl.network.denoise import Model
 from ..cache import FOLDER_VARIABLE
 from ..devices.registry import open_executor
@@ -30,26 +27,8 @@ CACHES = (*first_run.CACHES, FOLDER_VARIABLE)
 
 def first_picture(executor: str, model: Model, scene: str, size: int) -> float | None:
     """Return the seconds to the first picture (size, size) of a scene; None where that fails."""
-    with tempfile.TemporaryDirectory() as folder:
-        places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
-        for place in places.values():
-            Path(place).mkdir()
-        path = Path(folder, "model.safetensors")
-        save_model(path, model)
-        command = [sys.executable, "-m", __name__, executor, str(path), scene, str(size)]
-        try:
-            done = subprocess.run(
-                command,
-                env=os.environ | places,
-                capture_output=True,
-                text=True,
-                timeout=first_run.SECONDS_AT_MOST,
-                stdin=subprocess.DEVNULL,
-                check=True,
-            )
-            return float(json.loads(done.stdout.splitlines()[-1])["seconds"])
-        except (subprocess.SubprocessError, ValueError, KeyError, IndexError):
-            return None
+    with first_run.prepared(model, CACHES) as (path, places):
+        return first_run.in_process(__name__, (executor, path, scene, str(size)), places)
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -16,7 +16,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ...models.model_file import load_model, save_model
@@ -46,22 +47,28 @@ def first_runs(name: str, model: Model, size: int) -> tuple[float | None, float 
 
     `size`: the width of the benchmark's pictures, by which names are given.
     """
+    with prepared(model, CACHES) as (path, places):
+        found = [in_process(__name__, (name, path, str(size)), places) for _ in range(2)]
+    return found[0], found[1]
+
+
+@contextmanager
+def prepared(model: Model, caches: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the path of a model's file, and an empty folder for each cache by its variable."""
     with tempfile.TemporaryDirectory() as folder:
-        places = {variable: str(Path(folder, variable.lower())) for variable in CACHES}
+        places = {variable: str(Path(folder, variable.lower())) for variable in caches}
         for place in places.values():
             Path(place).mkdir()
         path = Path(folder, "model.safetensors")
         save_model(path, model)
-        found = [_in_process(name, path, size, places) for _ in range(2)]
-    return found[0], found[1]
+        yield str(path), places
 
 
-def _in_process(name: str, path: Path, size: int, places: dict[str, str]) -> float | None:
-    """Return what a process finds; None where it fails."""
-    command = [sys.executable, "-m", __name__, name, str(path), str(size)]
+def in_process(module: str, arguments: Sequence[str], places: dict[str, str]) -> float | None:
+    """Return the seconds that a module, run as a process with these caches, prints; None where it fails."""
     try:
         done = subprocess.run(
-            command,
+            [sys.executable, "-m", module, *arguments],
             env=os.environ | places,
             capture_output=True,
             text=True,

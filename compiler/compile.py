@@ -68,9 +68,8 @@ def compile_plan(plan: Plan) -> Artifact:
     Another schedule replaces one that cannot hold the program; the manifest says so.
     """
     found = _of_one_pass(plan, plan.bound) if plan.cut is None else _of_two_passes(plan, plan.cut)
-    if plan.varied is None or not plan.varied.variant.steps:
-        return found
-    return replace(found, manifest={**found.manifest, "variant": plan.varied.manifest(plan)})
+    variant = plan.variation
+    return replace(found, manifest={**found.manifest, "variant": variant}) if variant else found
 
 
 def _of_two_passes(plan: Plan, cut: Cut) -> Artifact:

@@ -17,15 +17,16 @@ Everything is computed when it is first needed, and then kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
+from ..refimpl.network.denoise import Model
 from .core import profiles
 from .core.interpret import interpret
 from .core.ir import Program
@@ -39,10 +40,6 @@ from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Target, target_named
-
-if TYPE_CHECKING:
-    from ..refimpl.network.denoise import Model
-    from .variants import Varied
 
 BLOCK_NUMBERS = 2**20
 """Numbers in the windows of one block of rows: a bound holds some copies of them, 8 MiB each."""
@@ -81,8 +78,8 @@ class Plan:
     """How a program becomes a kernel, or two.
 
     `analysed`: the program after the passes that bounds see, each sine one node; `asked`: the name of the
-    schedule that was requested; `cut`: both passes of a first layer of low rank; `varied`: the variant of a
-    network that the program is, if it is one; `proves`: whether a proof is looked for, which takes seconds.
+    schedule that was requested; `cut`: both passes of a first layer of low rank; `proves`: whether a proof is
+    looked for, which takes seconds.
     """
 
     analysed: Program
@@ -90,7 +87,6 @@ class Plan:
     profile: Profile
     asked: str = PLAIN
     cut: Cut | None = None
-    varied: Varied | None = None
     proves: bool = True
 
     def __getstate__(self) -> dict[str, Any]:
@@ -103,9 +99,13 @@ class Plan:
 
     @property
     def model(self) -> Model:
-        """Return the network that the program is: of plans that were made of one [variants.plan_model]."""
-        assert self.varied is not None, "the plan was made of a program, not of a network"
-        return self.varied.model
+        """Return the network that the program is: of plans that were made of one [variants.VariedPlan]."""
+        raise TypeError("the plan was made of a program, not of a network")
+
+    @property
+    def variation(self) -> Mapping[str, Any] | None:
+        """Return what a manifest says about the variant of a network that the program is, if it is one."""
+        return None
 
     @cached_property
     def sine(self) -> SineContract:
@@ -138,7 +138,7 @@ class Plan:
         if self.cut is None:
             return (self,)
         return tuple(
-            replace(self, analysed=part, cut=None, varied=None)
+            Plan(part, self.target, self.profile, self.asked, proves=self.proves)
             for part in (self.cut.horizontal, self.cut.vertical)
         )
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -160,15 +160,31 @@ class Varied:
         """Return the name of the profile that has the variant's sine."""
         return base if self.degree == sine.DEGREE else f"{base}-sine{self.degree}"
 
-    def manifest(self, plan: Plan) -> Mapping[str, Any]:
-        """Return what a kernel's manifest says about the variant: what was done, and what it moves."""
-        bound = bound_of(plan)
+
+@dataclass(frozen=True)
+class VariedPlan(Plan):
+    """The plan of a network, or of a variant of it."""
+
+    varied: Varied = field(kw_only=True)
+
+    @property
+    def model(self) -> Model:
+        """Return the network that the program is."""
+        return self.varied.model
+
+    @property
+    def variation(self) -> Mapping[str, Any] | None:
+        """Return what a manifest says about the variant: what was done, and what it moves."""
+        variant, full = self.varied.variant, self.varied.full
+        if not variant.steps:
+            return None
+        bound = bound_of(self)
         return {
-            "name": self.variant.name,
-            "approximations": [f"{kind}{value}" for kind, value in self.variant.steps],
-            "program": digest_of(self.full),
-            "products": self.products,
-            "products_of_full": vary(Variant(), self.full).products,
+            "name": variant.name,
+            "approximations": [f"{kind}{value}" for kind, value in variant.steps],
+            "program": digest_of(full),
+            "products": self.varied.products,
+            "products_of_full": vary(Variant(), full).products,
             "bound": {
                 "output": None if bound is None else [round_up(float(error)) for error in bound],
                 "against": "float64 reference of the full network, for all images, in display-encoded colour",
@@ -468,12 +484,11 @@ def _first_error(varied: Varied, plan: Plan, error: Array) -> Array:
     return errors
 
 
-def bound_of(plan: Plan) -> Array | None:
+def bound_of(plan: VariedPlan) -> Array | None:
     """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
 
     In display-encoded colour, over all images, against float64.
     """
-    assert plan.varied is not None, "plan_model makes plans of variants"
     if not plan.varied.is_full:
         program, found = analysed(lower(plan.varied.full)), enclose(plan.varied, plan)
     else:  # The kernel's own bound, which is sharper than one layer after another.
@@ -489,11 +504,11 @@ def bound_of(plan: Plan) -> Array | None:
 
 def plan_model(
     model: Model, target: str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
-) -> Plan:
+) -> VariedPlan:
     """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
     varied = vary(parse(variant), model)
     found = plan_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
-    return replace(found, varied=varied)
+    return VariedPlan(**found.__getstate__(), varied=varied)
 
 
 def digest_of(model: Model) -> str:

@@ -176,7 +176,7 @@ def _untimed(
 ) -> Point:
     """Return the point of a variant's kernel, which lacks its time."""
     plan, model = artifact.plan, artifact.plan.model
-    assert plan.varied is not None, "plan_model makes plans of variants"
+    assert isinstance(plan, variants.VariedPlan), "plan_model makes plans of variants"
     pictures = [executor.run(artifact, images_of(model, noisy)) for noisy, _ in pairs]
     targets = [dataset.target_image(clean, model.normalization) for _, clean in pairs]
     found, bound = quality(pictures, full, targets), variants.bound_of(plan)

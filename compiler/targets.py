@@ -25,6 +25,7 @@ from .languages.hosts import GodotDenoise, ShadertoyDenoise
 from .languages.metal import Metal
 from .languages.opencl import OpenCL
 from .languages.wgsl import WGSL
+from .schedules.names import parse
 from .schedules.schedules import (
     Dot,
     Fourier,
@@ -75,27 +76,25 @@ class Target:
         return target_named, (self.name,)
 
 
-TILE_IDEAS = {
-    16: (14, "14 pixels share each weight: 28 vectors of 16 sums stay in registers"),
-    8: (6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
-    4: (6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
+TILES = {
+    "vector:16": (1, "a layer's neurons side by side in vectors of 16, one pixel after another"),
+    "tile:16": (14, "14 pixels share each weight: 28 vectors of 16 sums stay in registers"),
+    "tile:8": (6, "the same for 16 registers of 8 numbers: 6 pixels, 12 vectors of sums"),
+    "tile:4": (6, "the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums"),
 }
-"""Pixels of a tile, and its idea, by lanes: AVX-512, AVX2, and SSE or NEON have those registers."""
+"""Pixels of a tile, and its idea: AVX-512, AVX2, and SSE or NEON have those registers."""
 
-FFT_IDEA = "products of spectra in place of sums over the window, in tiles of 32 x 32 pixels"
+FFT_IDEA = "the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {}"
 """What an FFT schedule says of itself."""
 
 
 def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedules for processors: register tiles in each width of vector that the language has."""
-    found = [
-        Tile(f"tile{lanes}", TILE_IDEAS[lanes][1], dialect, lanes, TILE_IDEAS[lanes][0])
-        for lanes in dialect.tiles
-    ]
-    if 16 not in dialect.tiles or not dialect.wide:
-        return tuple(found)
-    idea = "a layer's neurons side by side in vectors of 16, one pixel after another"
-    return (Tile("vector16", idea, dialect, 16, 1), *found)
+    return tuple(
+        Tile(name, idea, dialect, lanes, pixels)
+        for name, (pixels, idea) in TILES.items()
+        if (lanes := parse(name)[1]) in dialect.tiles and (pixels > 1 or dialect.wide)
+    )
 
 
 def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
@@ -104,36 +103,29 @@ def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
     Two tiles of 32 points side by side are as fast as four and take half the memory; one takes a third more
     time: the weights pass by twice as often. The other layers have the register tiles of the tiled schedules.
     """
-    if not dialect.transforms:
-        return ()
-    return (
-        Fourier("fft32", FFT_IDEA, dialect, 16, 14, 32, 2),
-        *(
-            Fourier(f"fft32x{lanes}", f"{FFT_IDEA}, by vectors of {lanes}", dialect, lanes, 6, 32, 2)
-            for lanes in (8, 4)
-        ),
+    return tuple(
+        Fourier(f"fft:{lanes}", FFT_IDEA.format(lanes), dialect, lanes, TILES[f"tile:{lanes}"][0], 32, 2)
+        for lanes in ((16, 8, 4) if dialect.transforms else ())
     )
 
 
 def dots(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedule of bytes for processors."""
     idea = "products of bytes, four at a time, of a network of integers"
-    found = Dot("dot16", idea, dialect, 16, 14)
-    found.instead = "tile16"
-    return (found,) if dialect.dot_of_bytes else ()
+    return (Dot("dot:16", idea, dialect, 16, 14),) if dialect.dot_of_bytes else ()
 
 
-def groups(dialect: Dialect, name: str = "group") -> tuple[Schedule, ...]:
+def groups(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedules for graphics processors; none of them has been measured on one."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
     four = "the same with 4 pixels an item, which share each weight"
     found: list[Schedule] = [
-        Grouped(name, one, dialect, 1),
-        Grouped(f"{name}4", four, dialect, 4, instead=name),
+        Grouped("group:1", one, dialect, 1),
+        Grouped("group:4", four, dialect, 4, instead="group:1"),
     ]
     if dialect.words:
-        idea = f"group4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
-        found.append(GroupDot("groupdot", idea, dialect, 4, instead="group4"))
+        idea = f"group:4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
+        found.append(GroupDot("groupdot:4", idea, dialect, 4, instead="group:4"))
     return tuple(found)
 
 
@@ -207,7 +199,7 @@ TARGETS: Mapping[str, Target] = {
             forms=Forms(trees=True),
         ),
         replace(
-            _dialect_target(GLSL(), Inline(GLSL()), *groups(GLSLCompute(), "compute")),
+            _dialect_target(GLSL(), Inline(GLSL()), *groups(GLSLCompute())),
             planes={1: planes.GLSLPlanes()},
             forms=MESA,
         ),

@@ -206,8 +206,8 @@ def compile(  # noqa: A001 - what it does
     """Compile a model to a kernel: source, weights, interface, and a bound on its rounding error.
 
     `target` is a language: opencl, glsl, c, wgsl, cuda, metal, glsl-es, vulkan and others. `profile` "ieee"
-    has a proven bound, "native" uses the device's own sine. `schedule` "plain" is human-readable; "tile16"
-    and "fft32" are faster where the target has them. `variant` is a cheaper network, as "window8+rank16".
+    has a proven bound, "native" uses the device's own sine. `schedule` "plain" is human-readable; "tile:16"
+    and "fft:16" are faster where the target has them. `variant` is a cheaper network, as "window8+rank16".
 
     Raises InputError or CompileError for a combination that does not exist.
 

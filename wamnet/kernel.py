@@ -68,7 +68,7 @@ class Kernel:
 
     @property
     def schedule(self) -> str:
-        """Name of the schedule, such as `"tile16"`."""
+        """Name of the schedule, such as `"tile:16"`."""
         return str(self.artifact.manifest["schedule"]["name"])
 
     @property

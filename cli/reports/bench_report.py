@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...compiler.schedules.names import split
 from ...refimpl.errors import InputError
 from ..files.outputs import replacing
 from . import plots
@@ -269,7 +270,8 @@ def short_name(row: Data) -> str:
     """Return a row's name without its executor, which the marker says, and without a variant's schedule."""
     if row["kind"] != "kernel":
         return str(row["name"])
-    return str(row["name"]).rpartition(":")[2]
+    target, schedule, form = split(row["name"])
+    return form or schedule or target
 
 
 def panels(data: Data) -> list[plots.Panel]:
@@ -322,7 +324,7 @@ def _full_row(data: Data, row: Data) -> tuple[str, ...]:
     """Return the cells of a row; a star is on the front of time and loss, a dagger has a certificate."""
     front = data["front"].get("quality", ())
     kernel = row["kind"] == "kernel"
-    form = (row["name"].split(":")[2:] or ["whole"])[0] if kernel else row["name"]
+    form = (split(row["name"])[2] or "whole") if kernel else row["name"]
     certified = " †" if part(row, "rounding", "certified") else ""
     degree = row.get("degree")
     return (

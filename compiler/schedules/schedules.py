@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError, choice
+from ...refimpl.errors import CompileError
 from ...refimpl.network import dataset
 from ..core import ir, weights
 from ..core.ir import Gather, Program
@@ -57,6 +57,7 @@ from .group import (
     rows_at_once,
 )
 from .inlined import LARGEST_WEIGHTS, inlined
+from .names import remedy
 from .packed import WEIGHTS_A_TEXEL, packed, packed_weights
 from .plain import plain
 from .tile import (
@@ -98,6 +99,9 @@ class Schedule:
     instead: str = PLAIN
     bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
+
+    def __init__(self, dialect: Dialect) -> None:
+        self.dialect = dialect
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -193,9 +197,6 @@ class Plain(Schedule):
 
     name = PLAIN
     idea = "one pixel after another, loops over taps and neurons"
-
-    def __init__(self, dialect: Dialect) -> None:
-        self.dialect = dialect
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
@@ -308,9 +309,6 @@ class Inline(Schedule):
     idea = "all loops unrolled, every weight a constant of the source"
     order = "every weight is a constant of the source"
 
-    def __init__(self, dialect: Dialect) -> None:
-        self.dialect = dialect
-
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         count = sum(array.size for array in weights.weights(program).values())
@@ -344,9 +342,6 @@ class Packed(Stored):
     idea = "four weights a texel, four neurons a `vec4`"
     order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
 
-    def __init__(self, dialect: Dialect) -> None:
-        self.dialect = dialect
-
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         return refused_by_vectors(program, self.dialect.max_output_channels)
@@ -373,6 +368,7 @@ class Dot(Tile):
         f"{START}: where a matrix' sums begin, integers of 32 bits"
     )
     bytewise = True
+    instead = "tile:16"
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -439,7 +435,7 @@ class Fourier(Stored):
     ) -> None:
         self.name, self.idea, self.dialect = name, idea, dialect
         self.lanes, self.pixels, self.points, self.tiles = lanes, pixels, points, tiles
-        self.instead = f"tile{lanes}"
+        self.instead = f"tile:{lanes}"
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
@@ -543,6 +539,9 @@ class Printed(Schedule):
     name = PLAIN
     idea = "one operation after another, all pixels at once"
 
+    def __init__(self) -> None:
+        """No language."""
+
     def arguments(self, program: Program) -> str:
         """Return how it is called."""
         return PRINTED
@@ -579,7 +578,7 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
-        raise CompileError(f"schedule {name!r}: unknown to this target ({choice(name, known)})")
+        raise CompileError(f"schedule {name!r}: unknown to this target ({remedy(name, known)})")
     chosen, first = known[name], ""
     while chosen is not schedules[0] and (reason := chosen.refusal(program)):
         first = first or reason

@@ -17,7 +17,7 @@ from ...compiler.compile import compile_program
 from ...compiler.plan import analysed
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN, Dot
-from ...compiler.targets import DENOISERS, TARGETS, schedule_named, target_named
+from ...compiler.targets import DENOISERS, TARGETS, schedule_named
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.images import Images
@@ -51,8 +51,7 @@ QUICK = ("onnxruntime", "oidn:fast")
 def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
     """Return the contender that is a kernel of this schedule."""
     name = f"{executor}:{schedule}" + ("" if variant is FULL else f":{variant.name}")
-    ideas = {each.name: each.idea for each in target_named(executor).schedules}
-    text = ideas[schedule] if variant is FULL else variant.text
+    text = schedule_named(executor, schedule).idea if variant is FULL else variant.text
     open_it = partial(_open_kernel, executor, schedule, variant)
     return Contender(name, text, open_it, variant, executor, schedule, caches=CACHES.get(executor, NO_CACHE))
 

@@ -26,6 +26,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from ...compiler.schedules.names import split
 from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ...refimpl.frame import Frame
 from ...refimpl.network.denoise import Model
@@ -235,9 +236,9 @@ class Contest:
         if name == MACHINE:
             return limits.rates
         if name not in self.found_rates:
-            executor, schedule, profile = (*name.split(":"), IEEE)[:3]
+            executor, schedule, profile = split(name)
             pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
-            times, side = rates.probed(self.tools.executor(executor), schedule, pause_s, profile)
+            times, side = rates.probed(self.tools.executor(executor), schedule, pause_s, profile or IEEE)
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
 

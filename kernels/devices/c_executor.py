@@ -4,7 +4,7 @@
 2. Compile them to a shared object, for this processor where the compiler knows how [`OPTIONS`]; what was
    compiled before by this compiler for this processor is taken from the cache [cache.py].
 3. Call it on blocks of rows, one a thread: ctypes lets other threads run meanwhile.
-4. The schedule that suits the processor follows from the registers that the compiler uses [`SCHEDULES`].
+4. The schedule that suits the processor follows from the registers that it has [`VECTOR_SCHEDULES`].
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from ...compiler.kernel.interface import (
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .. import cache
 from ..folders import discard, new_temporary
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .images import widest
 from .kernel import Denoiser, Kernel, Memory, is_denoiser, words
 
@@ -123,11 +123,6 @@ int main(int count, char **arguments)
 """A program in which each freedom that a compiler may take shows: order of sums, contraction, reciprocals,
 denormal numbers, signs of zeros, comparison with NaN. Last it prints whether kernels are compiled for an
 instruction for products of bytes, and the floats in a vector register: 1 where there are no vectors."""
-
-SCHEDULES = {16: "fft32", 8: "fft32x8", 4: "fft32x4"}
-"""Schedule of a denoiser by the floats in a vector register: each took the least time of all when GCC
-compiled them for such registers; the tiles of the same vectors take what it refuses. Without vectors it is
-the plain one."""
 
 
 def trial_bits() -> list[str]:
@@ -247,7 +242,7 @@ class CExecutor(Executor):
             discard(self._folder, self._lock)
             raise
         self.byte_schedule = BYTE_SCHEDULE if byte_products else ""
-        self.schedule = SCHEDULES.get(lanes, PLAIN)
+        self.schedule = VECTOR_SCHEDULES.get(lanes, PLAIN)
         self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
         self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
 

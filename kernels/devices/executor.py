@@ -56,7 +56,11 @@ if TYPE_CHECKING:
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
 
-BYTE_SCHEDULE = "dot16"
+VECTOR_SCHEDULES = {lanes: f"fft:{lanes}" for lanes in (16, 8, 4)}
+"""Schedule of a denoiser on a processor, by the floats in its vector registers: each took the least time of
+all when PoCL and GCC compiled them for such registers; the tiles of the same vectors take what it refuses."""
+
+BYTE_SCHEDULE = "dot:16"
 """Schedule of networks of integers on processors with an instruction for products of bytes. Without it loops
 and shifts take far longer than tiles of floats."""
 

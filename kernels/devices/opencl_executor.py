@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...compiler.kernel.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, Executor
+from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .images import Images, widest
 from .kernel import Denoiser, Kernel, Memory, Part, Size, in_order, is_denoiser, shapes
 
@@ -41,10 +41,6 @@ TILE_LOCAL_SIZE = (1, 1)
 """The same for kernels whose items compute several pixels: they are groups by themselves, and need no second
 loop around them."""
 
-CPU_SCHEDULES = {16: "fft32", 8: "fft32x8"}
-"""Schedule of a denoiser by the floats in a vector register of a processor; others have registers of 4. Each
-took the least time of all when PoCL compiled for such a processor; tiles take what it refuses."""
-
 HAS_BYTES = """\
 #if defined(__AVX512VNNI__) && defined(__has_builtin)
 #if __has_builtin(__builtin_ia32_vpdpbusd512)
@@ -61,7 +57,7 @@ __kernel void wamnet_has_bytes(__global int *found)
 """
 """A kernel that says whether the compiler has VNNI's instruction for products of bytes."""
 
-GPU_SCHEDULE = "group4"
+GPU_SCHEDULE = "group:4"
 """Schedule of a denoiser on a graphics processor."""
 
 STACK_BYTES = 2**20
@@ -113,7 +109,7 @@ class OpenCLExecutor(Executor):
             self.lanes = CPU_LANES
             self.trains = True
             lanes = chosen.native_vector_width_float
-            self.schedule = CPU_SCHEDULES.get(lanes, "fft32x4")
+            self.schedule = VECTOR_SCHEDULES.get(lanes, VECTOR_SCHEDULES[4])
             self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
         elif chosen.type & cl.device_type.GPU:
             self.schedule = GPU_SCHEDULE
@@ -125,7 +121,7 @@ class OpenCLExecutor(Executor):
     @cached_property
     def byte_schedule(self) -> str:  # type: ignore[override]
         """Return the schedule of bytes where the compiler has VNNI's instruction."""
-        if self.schedule != CPU_SCHEDULES[16]:
+        if self.schedule != VECTOR_SCHEDULES[16]:
             return ""
         answer = np.zeros(1, np.int32)
         held = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, answer.nbytes)

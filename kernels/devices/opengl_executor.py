@@ -65,7 +65,7 @@ SOFTWARE = (llvmpipe.NAME, "softpipe", "swrast", "SwiftShader")
 SOFTWARE_SCHEDULE = "inlined"
 """Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
 
-GPU_SCHEDULE = "compute4"
+GPU_SCHEDULE = "group:4"
 """Schedule of a denoiser on a graphics processor with compute shaders."""
 
 SOFTWARE_PIXELS = 700_000

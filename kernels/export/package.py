@@ -32,6 +32,7 @@ from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.schedules.names import remedy
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Scene
@@ -346,7 +347,7 @@ def _schedule(row: Row, how: str, place: Place, wanted: str) -> str:
     """Return the schedule that is wanted, or the usual one."""
     if wanted and wanted not in place.schedules:
         rule = f"is not available for target {row.name} with --weights {how}"
-        raise InputError("--schedule", wanted, rule, f"{choice(wanted, place.schedules)}, or leave it out")
+        raise InputError("--schedule", wanted, rule, f"{remedy(wanted, place.schedules)}, or leave it out")
     return wanted or place.schedules[0]
 
 

@@ -106,10 +106,10 @@ def _texture(side: int) -> Limit:
     return Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
 
 
-GROUPED = ("group4", "group", PLAIN)
+GROUPED = ("group:4", "group:1", PLAIN)
 """Schedules of languages for graphics processors, the usual one first."""
 
-GROUPED_BYTES = (*GROUPED, "groupdot")
+GROUPED_BYTES = (*GROUPED, "groupdot:4")
 """The same where a language has a word for products of bytes."""
 
 
@@ -150,17 +150,17 @@ DISPATCH = "dispatch(ceil(width / {across}), ceil({height} / {down}), 1)"
 DISPATCHED = ("numbered", "registers")
 """Kinds of slots of such kernels."""
 
-SPECTRA = ("fft32x8", "fft32", "fft32x4")
+SPECTRA = ("fft:8", "fft:16", "fft:4")
 """Schedules of spectra. Most processors have AVX2's registers, or get two instructions for each vector."""
 
-BYTES = ("dot16", "groupdot")
+BYTES = ("dot:16", "groupdot:4")
 """Schedules of bytes, for networks of integers: the former is the fastest on processors with VNNI, and slow
 on others; the latter is for graphics processors."""
 
-ON_PROCESSORS = (*SPECTRA, "tile16", "tile8", "tile4", "vector16", BYTES[0])
+ON_PROCESSORS = (*SPECTRA, "tile:16", "tile:8", "tile:4", "vector:16", BYTES[0])
 """Schedules of OpenCL for processors."""
 
-IN_C = ("tile8", "tile16", "tile4", *SPECTRA, BYTES[0], PLAIN)
+IN_C = ("tile:8", "tile:16", "tile:4", *SPECTRA, BYTES[0], PLAIN)
 """Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
 GL_CODE = """\
@@ -298,7 +298,7 @@ ROWS: tuple[Row, ...] = (
         '#include "{file}"\n'
         + _arguments_code("wamnet_image({arguments});")
         + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
-        "   tile8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile4.\n"
+        "   tile:8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile:4.\n"
         "   GCC and clang take the schedules of spectra too, which are faster where windows are large. */",
     ),
     Row(

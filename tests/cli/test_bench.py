@@ -423,16 +423,16 @@ TRADED = {"ms": {"median": 20.0, "min": 19.0, "max": 25.0, "spread": 0.3, "round
 
 def traded() -> dict:
     """Return a result with a trained form, a kernel of another sine, one without a bound, and two peers."""
-    facts = {"executor": "opencl", "schedule": "tile16", "profile": "ieee", "degree": 11, "rank": None}
+    facts = {"executor": "opencl", "schedule": "tile:16", "profile": "ieee", "degree": 11, "rank": None}
     facts |= {"window": 12, "parameters": 58595, **TRADED}
     bounds = {"max": 2e-7, "bound": 1e-5, "bound_all": 1e-4, "certified": True}
     loss = {"psnr_db": 35.0, "psnr_loss_db": -0.001}
     no_bounds = dict.fromkeys(bounds)
     rows = [
-        row("opencl:tile16", quality=loss, rounding=bounds, **facts),
-        row("opencl:tile16:rank8", quality={"psnr_db": 34.0, "psnr_loss_db": 1.0}, rounding=bounds, **facts)
+        row("opencl:tile:16", quality=loss, rounding=bounds, **facts),
+        row("opencl:tile:16:rank8", quality={"psnr_db": 34.0, "psnr_loss_db": 1.0}, rounding=bounds, **facts)
         | {"rank": 8, "parameters": 7811},
-        row("opencl:tile16:native", quality=loss, rounding=no_bounds, **facts)
+        row("opencl:tile:16:native", quality=loss, rounding=no_bounds, **facts)
         | {"profile": "native", "degree": None},
         row("torch", kind="peer", quality=loss, rounding=no_bounds, **TRADED, window=12),
         row("oidn:high", kind="peer", quality={"psnr_db": 32.0, "psnr_loss_db": 3.0}, **TRADED),
@@ -440,7 +440,7 @@ def traded() -> dict:
     network = {"widths": [4, 3], "features": ["color"], "window": 12}
     draws = [{"time_s": 1.6, "time_in_training": False, "unlike_training": []}]
     frames = {"scene": "minicubes", "frame_px": 16, "feature_spp": 16, "reference_spp": 2, "draws": draws}
-    front = {"error": [], "quality": ["opencl:tile16"], "rounding": ["opencl:tile16"]}
+    front = {"error": [], "quality": ["opencl:tile:16"], "rounding": ["opencl:tile:16"]}
     return planted(contenders=rows, network=network, frames=frames, front=front, unseen_frames=1)
 
 
@@ -449,12 +449,12 @@ def test_the_table_has_quality_error_and_bounds_of_every_row() -> None:
     start = "| 12 | 58,595 | 20 | 30% |"
     assert (
         lines[2]
-        == f"| whole * | opencl tile16 | ieee, 11 | – {start} 35.00 | 0.00 | 2.0e-07 | 1.0e-05 | 1.0e-04 † |"
+        == f"| whole * | opencl tile:16 | ieee, 11 | – {start} 35.00 | 0.00 | 2.0e-07 | 1.0e-05 | 1.0e-04 † |"
     )
     assert lines[3].startswith(
-        "| rank8 | opencl tile16 | ieee, 11 | 8 | 12 | 7,811 | 20 | 30% | 34.00 | +1.00 |"
+        "| rank8 | opencl tile:16 | ieee, 11 | 8 | 12 | 7,811 | 20 | 30% | 34.00 | +1.00 |"
     )
-    assert lines[4] == f"| native | opencl tile16 | native, its own | – {start} 35.00 | 0.00 | – | – | – |"
+    assert lines[4] == f"| native | opencl tile:16 | native, its own | – {start} 35.00 | 0.00 | – | – | – |"
     assert lines[6] == "| oidn:high | – | – | – | – | – | 20 | 30% | 32.00 | +3.00 | – | – | – |"
 
 
@@ -463,7 +463,7 @@ def test_the_picture_has_a_panel_of_loss_and_one_of_bounds() -> None:
     loss, bound = bench_report.panels(traded())
     assert (loss.is_loss, bound.is_loss) == (True, False)
     marks = {mark.name: mark for mark in bound.marks}
-    assert list(marks) == ["tile16", "rank8", "native", "torch", "oidn:high"]
+    assert list(marks) == ["tile:16", "rank8", "native", "torch", "oidn:high"]
     assert [mark.kind for mark in marks.values()] == ["whole", "rank", "sine", "peer", "peer"]
     assert [mark.executor for mark in marks.values()] == ["opencl"] * 3 + ["", "other"]
     assert [mark.y for mark in marks.values()] == [1e-5, 1e-5, None, None, None]

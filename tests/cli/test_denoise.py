@@ -180,24 +180,24 @@ def test_refusals_of_compiling_a_scene(wamnet, refused, here) -> None:
 def test_a_schedule_by_name(wamnet, refused, here) -> None:
     """The kernel's manifest names it; unknown ones, and ones for scenes, are refused."""
     opencl = ["--target", "opencl", "-o", "kernel"]
-    outcome = wamnet("compile", "model.safetensors", *opencl, "--schedule", "tile8")
+    outcome = wamnet("compile", "model.safetensors", *opencl, "--schedule", "tile:8")
     assert outcome.status == 0
     assert "schedule" not in outcome.out
-    assert json.loads((here / "kernel/manifest.json").read_text())["schedule"]["name"] == "tile8"
+    assert json.loads((here / "kernel/manifest.json").read_text())["schedule"]["name"] == "tile:8"
     line = refused("compile", "model.safetensors", *opencl, "--schedule", "fast")
-    assert "schedule 'fast': unknown to this target (choose one of plain, vector16, tile16" in line
-    line = refused("denoise", "model.safetensors", "noisy.exr", "--schedule", "tile8")
-    assert "schedule 'tile8': unknown to this target (choose one of plain" in line
-    line = refused("compile", "cornell", *opencl, "--schedule", "tile8")
-    assert "--schedule 'tile8': cornell is a scene, whose kernels have one schedule" in line
+    assert "schedule 'fast': unknown to this target (choose one of plain, vector:16, tile:16" in line
+    line = refused("denoise", "model.safetensors", "noisy.exr", "--schedule", "tile:8")
+    assert "schedule 'tile:8': unknown to this target (choose one of plain" in line
+    line = refused("compile", "cornell", *opencl, "--schedule", "tile:8")
+    assert "--schedule 'tile:8': cornell is a scene, whose kernels have one schedule" in line
 
 
 def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> None:
     """The plain kernel is written, and the reason is said."""
     monkeypatch.setattr("wamnet.compiler.schedules.schedules.LARGEST_PRIVATE", 100)
-    outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile8")
+    outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile:8")
     assert outcome.status == 0
-    assert "schedule plain, not tile8: its arrays take" in outcome.out
+    assert "schedule plain, not tile:8: its arrays take" in outcome.out
     assert json.loads((here / "opencl/manifest.json").read_text())["schedule"]["name"] == "plain"
 
 

@@ -39,7 +39,7 @@ def test_a_scene_comes_along_and_the_check_is_told(wamnet, samples, tmp_path):
     assert [kernel["role"] for kernel in manifest["kernels"]] == ["path", "encode", "denoise"]
 
 
-@pytest.mark.parametrize(("asked", "name"), [([], "tile8"), (["--schedule", "plain"], "plain")])
+@pytest.mark.parametrize(("asked", "name"), [([], "tile:8"), (["--schedule", "plain"], "plain")])
 def test_the_schedule_is_the_fastest_or_the_named_one(wamnet, samples, tmp_path, asked, name):
     """EXP-12: the output, the manifest and the README say which."""
     outcome = wamnet("export", samples / "model.safetensors", "--target", "c", *asked, "-o", "x")
@@ -48,13 +48,13 @@ def test_the_schedule_is_the_fastest_or_the_named_one(wamnet, samples, tmp_path,
     manifest = json.loads((tmp_path / "x/manifest.json").read_text())
     assert manifest["kernels"][-1]["schedule"]["name"] == name
     assert manifest["schedules"] == [
-        "tile8",
-        "tile16",
-        "tile4",
-        "fft32x8",
-        "fft32",
-        "fft32x4",
-        "dot16",
+        "tile:8",
+        "tile:16",
+        "tile:4",
+        "fft:8",
+        "fft:16",
+        "fft:4",
+        "dot:16",
         "plain",
     ]
     assert f"* Schedule: {name}: " in (tmp_path / "x/README.md").read_text()
@@ -100,8 +100,8 @@ def test_help_names_every_target():
         (["--target", "html", "--weights", "inline"], "--weights 'inline': a web page has its own"),
         (["--target", "html", "--schedule", "plain"], "--schedule 'plain': a web page has its own"),
         (
-            ["--target", "wgsl", "--schedule", "tile8"],
-            "--schedule 'tile8': is not available for target wgsl with --weights",
+            ["--target", "wgsl", "--schedule", "tile:8"],
+            "--schedule 'tile:8': is not available for target wgsl with --weights",
         ),
         (["--target", "c", "-o", "noisy.exr"], "output folder 'noisy.exr': is a file"),
     ],

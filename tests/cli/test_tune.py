@@ -29,7 +29,7 @@ def test_tuning_is_kept_shown_and_used(wamnet, executor_named, here) -> None:
     outcome = wamnet(*arguments)
     assert outcome.status == 0, outcome.err
     assert "12x12, 96-8-3, color + normal, window 4 (clamp)" in outcome.out
-    for word in ("plain", "vector16", "tile16", "tile8", "tile4", "group", "group4", "s to compile"):
+    for word in ("plain", "vector:16", "tile:16", "tile:8", "tile:4", "group:1", "group:4", "s to compile"):
         assert word in outcome.out
     assert "for 1 picture: " in outcome.out
     assert "for 1000 pictures: " in outcome.out

@@ -30,7 +30,7 @@ def here(samples, tmp_path, monkeypatch):
     digest = variants.digest_of(load_model(tmp_path / "model.safetensors"))
     points = [
         Point("full", "plain", "opencl", 10.0, 1e-6, 1e-7, 0.0, 1e-3),
-        Point("window3", "tile8", "opencl", 5.0, 0.1, 0.01, 0.2, 1.0),
+        Point("window3", "tile:8", "opencl", 5.0, 0.1, 0.01, 0.2, 1.0),
         Point("window3", "inlined", "opengl", 1.0, 0.1, 0.01, 0.2, 1.0),
     ]
     data = Curve(digest, "somewhere", (64, 64), "ieee", tuple(points)).as_data()
@@ -90,13 +90,13 @@ def test_a_curve_is_chosen_from(wamnet, here) -> None:
     outcome = wamnet(*COMPILE, "--max-loss-db", 0.3, "--curve", "curve.json")
     assert outcome.status == 0
     assert outcome.out.splitlines()[0] == (
-        "chosen: window3, schedule tile8: 5 ms, error 0.1, PSNR loss 0.2 dB (64x64 on somewhere)"
+        "chosen: window3, schedule tile:8: 5 ms, error 0.1, PSNR loss 0.2 dB (64x64 on somewhere)"
     )
     manifest = json.loads((here / "k" / "manifest.json").read_text())
-    assert (manifest["variant"]["name"], manifest["schedule"]["name"]) == ("window3", "tile8")
+    assert (manifest["variant"]["name"], manifest["schedule"]["name"]) == ("window3", "tile:8")
     outcome = wamnet(*COMPILE, "--max-error", 0.01, "--curve", "curve.json")
     assert "chosen: full, schedule plain" in outcome.out
-    assert "not window3, schedule tile8: --max-error 0.01 (0.1)" in outcome.out
+    assert "not window3, schedule tile:8: --max-error 0.01 (0.1)" in outcome.out
     outcome = wamnet(*COMPILE, "--max-error", 0.2, "--schedule", "plain", "--curve", "curve.json")
     assert "chosen: full, schedule plain" in outcome.out
 

@@ -87,8 +87,8 @@ def put(node, place, value):
     ("target", "schedule"),
     [
         ("opencl", "plain"),
-        ("opencl", "tile16"),
-        ("opencl", "vector16"),
+        ("opencl", "tile:16"),
+        ("opencl", "vector:16"),
         ("opengl", "inlined"),
         ("numpy", "plain"),
     ],
@@ -136,7 +136,7 @@ def test_any_number_made_smaller_is_refused(path, changed):
 # ---- spectra ---------------------------------------------------------------------------------------------
 
 
-def spectral(folder, target="opencl", schedule="fft32", activation="sine"):
+def spectral(folder, target="opencl", schedule="fft:16", activation="sine"):
     """Write a kernel of spectra: 12 channels, of which 6 are centred, and 5 pairs of neurons."""
     window = Window(9, "zero")
     network = siren.init((window.size**2 * 12, 21, 6, 3), 2.0, 3.0, 5, activation=activation)
@@ -155,7 +155,7 @@ def of_spectra(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("target", "schedule", "activation"),
-    [("opencl", "fft32", "sine"), ("opencl", "fft32x4", "relu"), ("c", "fft32x8", "sine")],
+    [("opencl", "fft:16", "sine"), ("opencl", "fft:4", "relu"), ("c", "fft:8", "sine")],
 )
 def test_certificates_of_spectra_hold(tmp_path, target, schedule, activation):
     path = spectral(tmp_path, target, schedule, activation)
@@ -263,7 +263,7 @@ def test_each_rule_of_spectra_is_needed(of_spectra, monkeypatch, mutant):
 
 
 @pytest.mark.parametrize("omega_0", [1.0, 3.0])
-@pytest.mark.parametrize("schedule", ["plain", "tile16"])
+@pytest.mark.parametrize("schedule", ["plain", "tile:16"])
 def test_certificates_of_rectifiers_hold(tmp_path, schedule, omega_0):
     path = written(tmp_path, schedule=schedule, omega_0=omega_0, activation="relu")
     held = checker.check(path)

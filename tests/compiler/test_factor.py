@@ -117,7 +117,7 @@ def test_a_bound_of_fewer_ranks_is_larger() -> None:
 
 
 def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
-    found = compile_program(program(), "opencl", "ieee", "tile8", rank=5)
+    found = compile_program(program(), "opencl", "ieee", "tile:8", rank=5)
     names = [path.name for path in artifact.write(found, tmp_path)]
     assert names == [
         *("horizontal.denoise.cl", "horizontal.weights.bin", "denoise.cl", "weights.bin", "manifest.json")
@@ -137,7 +137,7 @@ def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
     assert max(manifest["factored"]["rounding"]["output"]) < max(manifest["bound"]["output"])
     assert "pass      1 of 2: sums along the rows" in (tmp_path / "horizontal.denoise.cl").read_text()
     assert "bound is that of both passes, against program " in (tmp_path / "denoise.cl").read_text()
-    other = compile_program(program(), "opencl", "ieee", "tile8", rank=4)
+    other = compile_program(program(), "opencl", "ieee", "tile:8", rank=4)
     assert other.digest != found.digest
 
 

@@ -30,7 +30,7 @@ from wamnet.refimpl.network.denoise import denoise_pixel
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
-FFT32 = schedule_named("opencl", "fft32")
+FFT32 = schedule_named("opencl", "fft:16")
 CONTRACT = sine_contract("ieee", "opencl")
 
 
@@ -245,8 +245,8 @@ def paper(channels=6, size=12, hidden=32):
 
 
 def test_the_manifest_states_the_bound_of_spectra() -> None:
-    found, tiled = (compile_program(paper(), "opencl", "ieee", name) for name in ("fft32", "tile16"))
-    assert found.manifest["schedule"]["name"] == "fft32"
+    found, tiled = (compile_program(paper(), "opencl", "ieee", name) for name in ("fft:16", "tile:16"))
+    assert found.manifest["schedule"]["name"] == "fft:16"
     assert (found.manifest["schedule"]["pixels"], found.manifest["schedule"]["rows"]) == (42, 21)
     assert found.certificate is not None
     proven = found.certificate["bound"]["output"]
@@ -269,11 +269,11 @@ def test_rows_of_a_picture_have_the_bounds_of_the_picture() -> None:
 
 
 REFUSED = {
-    "small": (lambda: paper(size=3), "tile16", r"the direct sum takes 108 operations .*, spectra 7\d"),
-    "large": (lambda: paper(size=32, channels=1), "tile16", "a window of 32 x 32 pixels in a tile of 32"),
+    "small": (lambda: paper(size=3), "tile:16", r"the direct sum takes 108 operations .*, spectra 7\d"),
+    "large": (lambda: paper(size=32, channels=1), "tile:16", "a window of 32 x 32 pixels in a tile of 32"),
     "private": (
         lambda: paper(hidden=160),
-        "tile16",
+        "tile:16",
         rf"its arrays take \d+ bytes a work item, of at most {LARGEST_PRIVATE}",
     ),
     "component": (
@@ -292,8 +292,8 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_it_does_not_hold_is_tiled_with_the_reason(case) -> None:
     make, instead, reason = REFUSED[case]
-    found = compile_program(make(), "opencl", "ieee", "fft32").manifest["schedule"]
-    assert (found["name"], found["asked"]) == (instead, "fft32")
+    found = compile_program(make(), "opencl", "ieee", "fft:16").manifest["schedule"]
+    assert (found["name"], found["asked"]) == (instead, "fft:16")
     assert re.match(reason, found["reason"])
 
 
@@ -314,9 +314,9 @@ def test_two_readers_are_refused(function, reason) -> None:
 
 
 def test_windows_along_one_axis_are_refused() -> None:
-    found = compile_program(paper(), "opencl", "ieee", "fft32", rank=4).manifest
+    found = compile_program(paper(), "opencl", "ieee", "fft:16", rank=4).manifest
     assert found["schedule"]["reason"] == "a window of 12 x 1 pixels in a tile of 32"
-    assert found["schedule"]["name"] == "tile16"
+    assert found["schedule"]["name"] == "tile:16"
 
 
 def test_sums_that_may_overflow_are_refused() -> None:
@@ -328,7 +328,7 @@ def test_sums_that_may_overflow_are_refused() -> None:
     assert found[index].overflows
     assert np.isinf(found[index].error).all()
     with pytest.raises(CompileError, match=r"affine \(layer 0, %\d\) may hold numbers up to"):
-        compile_program(traced, "opencl", "ieee", "fft32")
+        compile_program(traced, "opencl", "ieee", "fft:16")
 
 
 def emitted(program):

@@ -37,8 +37,8 @@ def written(folder, target="opencl", schedule="plain", **kwargs):
 @pytest.mark.parametrize(
     ("target", "schedule"),
     [
-        *(("opencl", "plain"), ("opencl", "dot16"), ("c", "tile8"), ("c", "dot16"), ("wgsl", "plain")),
-        *((target, "groupdot") for target in ("opencl", "cuda", "wgsl", "glsl-vulkan")),
+        *(("opencl", "plain"), ("opencl", "dot:16"), ("c", "tile:8"), ("c", "dot:16"), ("wgsl", "plain")),
+        *((target, "groupdot:4") for target in ("opencl", "cuda", "wgsl", "glsl-vulkan")),
     ],
 )
 @pytest.mark.parametrize("amplitude", [127, 511])

@@ -115,7 +115,7 @@ def test_a_plan_is_resolved_once(kit, monkeypatch):
 def test_a_plan_travels_to_another_process(kit, images):
     """Targets go by name; what was computed is computed again there."""
     program = kit.denoiser(kit.network([27, 5, 3], (3.0, 3.0)), CHANNELS, 3, "clamp")
-    plan = plan_program(program, "opencl", schedule="tile16")
+    plan = plan_program(program, "opencl", schedule="tile:16")
     artifact = compile_plan(plan)
     there = pickle.loads(pickle.dumps(artifact))
     assert there.plan.target is plan.target
@@ -127,8 +127,8 @@ def test_another_schedule_is_another_plan(kit):
     program = kit.denoiser(kit.network([27, 5, 3], (3.0, 3.0)), CHANNELS, 3, "clamp")
     plan = plan_program(program, "opencl")
     assert plan.schedule.name == "plain"
-    assert plan.scheduled("tile16").schedule.name == "tile16"
+    assert plan.scheduled("tile:16").schedule.name == "tile:16"
     assert plan.schedule.name == "plain"
-    assert compile_program(program, "opencl", "ieee", "tile16").plan.asked == "tile16"
+    assert compile_program(program, "opencl", "ieee", "tile:16").plan.asked == "tile:16"
     with pytest.raises(CompileError, match="schedule 'spiral': unknown to this target"):
         plan.scheduled("spiral").bound  # noqa: B018

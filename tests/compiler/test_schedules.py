@@ -14,6 +14,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.schedules.inlined import LARGEST_WEIGHTS
+from wamnet.compiler.schedules.names import FORMER, parse, split
 from wamnet.compiler.schedules.schedules import Tile
 from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
 from wamnet.compiler.targets import TARGETS, schedule_named, target_named
@@ -50,33 +51,33 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
 @pytest.mark.parametrize(
     ("target", "profile", "name", "border"),
     [
-        ("opencl", "ieee", "vector16", "clamp"),
-        ("opencl", "ieee", "tile16", "zero"),
-        ("c", "ieee", "tile16", "zero"),
-        ("c", "ieee", "tile4", "clamp"),
+        ("opencl", "ieee", "vector:16", "clamp"),
+        ("opencl", "ieee", "tile:16", "zero"),
+        ("c", "ieee", "tile:16", "zero"),
+        ("c", "ieee", "tile:4", "clamp"),
     ],
 )
 def test_golden_tiles(golden, target, profile, name, border):
     found = compile_program(small(border), target, profile, name)
-    golden(f"{name}.{found.source_name}", found.source)
+    golden(f"{name.replace(':', '')}.{found.source_name}", found.source)
 
 
 @pytest.mark.parametrize(
     ("target", "name", "border"),
     [
-        ("opencl", "group", "clamp"),
-        ("opencl", "group4", "zero"),
-        ("opengl", "compute", "zero"),
-        ("opengl", "compute4", "clamp"),
+        ("opencl", "group:1", "clamp"),
+        ("opencl", "group:4", "zero"),
+        ("opengl", "group:1", "zero"),
+        ("opengl", "group:4", "clamp"),
     ],
 )
 def test_golden_groups(golden, target, name, border):
     found = compile_program(small(border), target, "ieee", name)
-    golden(f"{name}.{found.source_name}", found.source)
+    golden(f"{name.replace(':', '')}.{found.source_name}", found.source)
 
 
 def test_a_compute_shader_says_what_it_is():
-    found = compile_program(small(), "opengl", "ieee", "compute4")
+    found = compile_program(small(), "opengl", "ieee", "group:4")
     assert found.source_name == "denoise.comp"
     assert found.manifest["language"] == "GLSL 4.30, compute shader"
     assert found.manifest["files"].keys() == {"denoise.comp", "weights.bin"}
@@ -103,11 +104,11 @@ def wide(hidden, channels=(3,), size=1):
     ],
 )
 def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
-    found = compile_program(program, "opencl", "ieee", "group4").manifest["schedule"]
-    assert found["name"] in ("plain", "group")
-    assert found["asked"] == "group4"
+    found = compile_program(program, "opencl", "ieee", "group:4").manifest["schedule"]
+    assert found["name"] in ("plain", "group:1")
+    assert found["asked"] == "group:4"
     assert re.match(reason, found["reason"])
-    assert ("group" in found) == (found["name"] == "group")
+    assert ("group" in found) == (found["name"] == "group:1")
 
 
 @given(
@@ -119,7 +120,7 @@ def test_groups_find_every_weight(channels, size, hidden):
     """Read the array as the kernel's loops do: image, four channels, tap, channel."""
     network = siren.init((size * size * sum(channels), hidden, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     program = gathered(lambda x: denoise_pixel(network, x), channels, size)
-    group = schedule_named("opencl", "group4")
+    group = schedule_named("opencl", "group:4")
     packed, layout = group.pack(program), group.layout(program)
     for name, slot in layout.items():
         assert slot.offset % 4 == 0
@@ -158,11 +159,11 @@ def test_too_many_weights_to_inline_are_plain():
 
 
 def test_the_manifest_says_what_was_picked():
-    found = compile_program(small(), "opencl", "ieee", "tile8").manifest
-    assert found["schedule"]["name"] == "tile8"
+    found = compile_program(small(), "opencl", "ieee", "tile:8").manifest
+    assert found["schedule"]["name"] == "tile:8"
     assert found["schedule"]["pixels"] == 6
     assert "block by block" in found["weights"]["order"]
-    assert schedule_text(found["schedule"]).startswith("tile8: the same for 16 registers of 8 numbers")
+    assert schedule_text(found["schedule"]).startswith("tile:8: the same for 16 registers of 8 numbers")
     plain = compile_program(small(), "opencl").manifest
     assert plain["schedule"] == {"name": "plain", "idea": OPENCL_PLAIN.idea, "pixels": 1}
     assert plain["bound"] == found["bound"]
@@ -173,11 +174,34 @@ OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
 
 
 def test_unknown_schedule_is_told_with_the_known_ones():
-    known = "plain, vector16, tile16, tile8, tile4, fft32, fft32x8, fft32x4, dot16, group, group4, groupdot"
-    with pytest.raises(CompileError, match=rf"schedule 'tile3': unknown .* choose one of {known}\)$"):
-        compile_program(small(), "opencl", schedule="tile3")
-    with pytest.raises(CompileError, match=r"schedule 'tile16': unknown .*choose one of plain\)"):
-        compile_program(small(), "numpy", schedule="tile16")
+    known = "plain, vector:16, tile:16, tile:8, tile:4, fft:16, fft:8, fft:4, dot:16, group:1, group:4"
+    with pytest.raises(
+        CompileError, match=rf"schedule 'fast': unknown .*choose one of {known}, groupdot:4\)$"
+    ):
+        compile_program(small(), "opencl", schedule="fast")
+    of_tiles = r"did you mean 'tile:8'\? choose one of tile:16, tile:8, tile:4\)$"
+    for name in ("tile:3", "tile"):
+        with pytest.raises(CompileError, match=rf"schedule '{name}': unknown .*{of_tiles}"):
+            compile_program(small(), "opencl", schedule=name)
+    with pytest.raises(CompileError, match=r"schedule 'tile:16': unknown .*choose one of plain\)"):
+        compile_program(small(), "numpy", schedule="tile:16")
+
+
+@pytest.mark.parametrize(("former", "present"), FORMER.items())
+def test_a_former_name_is_told_with_the_present_one(former, present):
+    target = "opengl" if former.startswith("compute") else "opencl"
+    with pytest.raises(CompileError, match=rf"schedule '{former}': unknown .*its name is {present} now\)$"):
+        compile_program(small(), target, schedule=former)
+    assert schedule_named(target, present).name == present
+
+
+def test_names_are_families_with_their_parameter():
+    names = {schedule.name for target in TARGETS.values() for schedule in target.schedules}
+    assert {parse(name) for name in names} > {("plain", None), ("inlined", None), ("tile", 8), ("group", 1)}
+    for name in names:
+        for form in ("", "whole8", "window6+rank12"):
+            kernel = f"opencl:{name}:{form}" if form else f"opencl:{name}"
+            assert split(kernel) == ("opencl", name, form)
 
 
 REFUSED = {
@@ -202,11 +226,11 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
     program, reason = REFUSED[case]
-    found, plain = (compile_program(program, target, "ieee", name) for name in ("tile16", "plain"))
+    found, plain = (compile_program(program, target, "ieee", name) for name in ("tile:16", "plain"))
     assert found.manifest["schedule"]["name"] == "plain"
-    assert found.manifest["schedule"]["asked"] == "tile16"
+    assert found.manifest["schedule"]["asked"] == "tile:16"
     assert re.match(reason, found.manifest["schedule"]["reason"])
-    assert re.search(rf"\(not tile16: {reason}", schedule_text(found.manifest["schedule"]))
+    assert re.search(rf"\(not tile:16: {reason}", schedule_text(found.manifest["schedule"]))
     assert found.source == plain.source
 
 
@@ -254,7 +278,7 @@ def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, h
     ("target", "array"), [("opencl", r"float number|float16 v\d+"), ("c", r"float v\d+")]
 )
 def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
-    artifact = compile_program(small(), target, "ieee", "tile16")
+    artifact = compile_program(small(), target, "ieee", "tile:16")
     sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
     arrays = re.findall(rf"(float patch_\w+|{array})\[([^]]+)\];", artifact.source)
     counts = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for _, text in arrays]
@@ -267,7 +291,7 @@ def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
 
 def test_products_may_be_fused_in_tiles_of_c_only():
     """KER-16, KER-22: the header states it, whatever the compiler's default is."""
-    for schedule, word in (("tile8", "fast"), ("plain", "off")):
+    for schedule, word in (("tile:8", "fast"), ("plain", "off")):
         source = compile_program(small(), "c", schedule=schedule).source
         assert f'#pragma GCC optimize("fp-contract={word}")' in source
         assert f"#pragma STDC FP_CONTRACT {'ON' if word == 'fast' else 'OFF'}" in source

@@ -31,7 +31,9 @@ def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
     assert found["sums"] == 2 * size + 3
 
 
-@pytest.mark.parametrize(("target", "schedule"), [("c", "tile8"), ("opencl", "tile8"), ("opencl", "tile16")])
+@pytest.mark.parametrize(
+    ("target", "schedule"), [("c", "tile:8"), ("opencl", "tile:8"), ("opencl", "tile:16")]
+)
 @pytest.mark.parametrize("activation", ["sine", "relu"])
 def test_register_tiles_compute_what_is_certified(target, schedule, activation, tmp_path):
     path = kernel(tmp_path, target, schedule, activation=activation)
@@ -83,7 +85,7 @@ def test_what_is_not_known_is_not_skipped(plain):
         run_text(*changed(plain, "float v1[6];", "while (x < 0) { x = 0; } float v1[6];"))
 
 
-@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile8", 12)])
+@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile:8", 12)])
 def test_planted_faults_are_noticed(target, schedule, count, tmp_path, capsys):
     """TXT-8: what holds the reader."""
     assert unnoticed(parts(kernel(tmp_path, target, schedule)), count) == []

@@ -57,7 +57,7 @@ def test_faults_of_the_language_of_schedules_are_rejected(what, of, old, new, tm
         ("output", "name", "normal"),
         ("schedule", "rows", 2),
         ("schedule", "pixels", 1.5),
-        ("schedule", "name", "group"),
+        ("schedule", "name", "group:1"),
         ("images", "channels", 4),
         ("images", "name", "albedo"),
         ("images", "high", 2.0),

@@ -18,21 +18,21 @@ TARGETS = ("cuda", "glsl-vulkan", "metal", "opencl", "wgsl")
 @pytest.fixture(scope="module", params=["wgsl", "opencl"])
 def one(request, tmp_path_factory):
     """Text of one pixel an item, in the language of the parameter."""
-    return parts(kernel(tmp_path_factory.mktemp("one"), request.param, "group"))
+    return parts(kernel(tmp_path_factory.mktemp("one"), request.param, "group:1"))
 
 
 @pytest.fixture(scope="module")
 def four(tmp_path_factory):
-    return parts(kernel(tmp_path_factory.mktemp("four"), "glsl-vulkan", "group4"))
+    return parts(kernel(tmp_path_factory.mktemp("four"), "glsl-vulkan", "group:4"))
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("schedule", ["group", "group4"])
+@pytest.mark.parametrize("schedule", ["group:1", "group:4"])
 @pytest.mark.parametrize(("border", "activation", "size"), [("zero", "sine", 3), ("clamp", "relu", 4)])
 def test_groups_compute_what_is_certified(target, schedule, border, activation, size, tmp_path):
     path = kernel(tmp_path, target, schedule, border=border, activation=activation, size=size)
     pixels = json.loads((tmp_path / "manifest.json").read_text())["schedule"]["pixels"]
-    assert pixels == (4 if schedule == "group4" else 1)
+    assert pixels == (4 if schedule == "group:4" else 1)
     assert check_text(path)["sums"] == pixels * (2 * size + 3)
 
 
@@ -90,7 +90,7 @@ def test_constants_as_large_as_a_group_are_refused(four):
 
 
 def test_a_barrier_of_other_memory_is_refused(tmp_path):
-    given = parts(kernel(tmp_path, "opencl", "group"))
+    given = parts(kernel(tmp_path, "opencl", "group:1"))
     with pytest.raises(Unread, match="no 'CLK_LOCAL_MEM_FENCE'"):
         run_text(*changed(given, "CLK_LOCAL_MEM_FENCE", "CLK_GLOBAL_MEM_FENCE"))
 
@@ -110,13 +110,15 @@ def test_an_item_of_its_own_sum_is_refused(four):
 
 def test_places_of_an_item_are_told_apart(tmp_path):
     """Their names and attributes are those of the compiler's own kernels."""
-    source, *others = parts(kernel(tmp_path, "wgsl", "group"))
+    source, *others = parts(kernel(tmp_path, "wgsl", "group:1"))
     for new in (("(local_invocation_id)", "(workgroup_id)"), ("item_place", "invocation")):
         with pytest.raises(Unread, match="not a frame of"):
             run_text(source.replace(*new), *others)
 
 
-@pytest.mark.parametrize(("target", "schedule", "count"), [("wgsl", "group4", 16), ("opencl", "group", 24)])
+@pytest.mark.parametrize(
+    ("target", "schedule", "count"), [("wgsl", "group:4", 16), ("opencl", "group:1", 24)]
+)
 def test_planted_faults_in_groups_are_noticed(target, schedule, count, tmp_path):
     """TXT-8: what holds the reader."""
     assert unnoticed(parts(kernel(tmp_path, target, schedule)), count) == []

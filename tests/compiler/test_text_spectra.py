@@ -128,7 +128,7 @@ def test_texts_of_spectra_compute_what_is_certified(target, tiles, kwargs, tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_path):
     network = siren.init((81 * 6, 21, 6, 3), 2.0, 3.0, 5)
     given = Model(network, ("color", "normal"), Window(9, "zero"), Normalization())

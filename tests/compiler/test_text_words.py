@@ -16,22 +16,22 @@ GROUPS = ("cuda", "glsl-vulkan", "opencl", "wgsl")
 
 @pytest.fixture(scope="module")
 def dot16(tmp_path_factory):
-    return parts(planned(tmp_path_factory.mktemp("dot16"), "opencl", "dot16", border="clamp"))
+    return parts(planned(tmp_path_factory.mktemp("dot:16"), "opencl", "dot:16", border="clamp"))
 
 
 @pytest.fixture(scope="module", params=["cuda", "opencl"])
 def grouped(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("grouped")
-    return parts(planned(folder, request.param, "groupdot", border="clamp"))
+    return parts(planned(folder, request.param, "groupdot:4", border="clamp"))
 
 
 @pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     ("target", "schedule", "compilers"),
     [
-        ("opencl", "dot16", 2), ("c", "dot16", 2), ("cuda", "groupdot", 1), ("wgsl", "groupdot", 1),
-        ("opencl", "groupdot", 2), ("glsl-vulkan", "groupdot", 2), ("opencl", "tile16", 1),
-        ("glsl-vulkan", "group4", 1),
+        ("opencl", "dot:16", 2), ("c", "dot:16", 2), ("cuda", "groupdot:4", 1), ("wgsl", "groupdot:4", 1),
+        ("opencl", "groupdot:4", 2), ("glsl-vulkan", "groupdot:4", 2), ("opencl", "tile:16", 1),
+        ("glsl-vulkan", "group:4", 1),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize(("border", "size"), [("zero", 3), ("clamp", 4)])
@@ -89,7 +89,9 @@ def test_weights_in_another_order_are_refused(dot16):
         run_text(source, held, manifest, turned)
 
 
-@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "dot16", 8), ("wgsl", "groupdot", 8)])
+@pytest.mark.parametrize(
+    ("target", "schedule", "count"), [("opencl", "dot:16", 8), ("wgsl", "groupdot:4", 8)]
+)
 def test_planted_faults_in_bytes_are_noticed(target, schedule, count, tmp_path):
     """TXT-8: what holds the reader."""
     assert unnoticed(parts(planned(tmp_path, target, schedule)), count) == []

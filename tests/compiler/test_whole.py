@@ -167,7 +167,7 @@ def smallest(channels) -> Program:
 
 @pytest.mark.parametrize("dialect", [CUDA(), WGSL(), Vulkan(), OpenCL()])
 def test_the_text_of_grouped_dots(golden, dialect) -> None:
-    tiny = GroupDot("groupdot", "a tiny group", dialect, 1, (4, 2))
+    tiny = GroupDot("groupdot:1", "a tiny group", dialect, 1, (4, 2))
     found = tiny.emit(smallest({"a": 3, "b": 2}), ["a tiny kernel"], False)
     golden(f"groupdot.denoise{dialect.suffix}", found)
 
@@ -176,7 +176,7 @@ def test_the_text_of_grouped_dots(golden, dialect) -> None:
 def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
     """Read the array as the kernel does: four words at a time, tap by tap, word by word."""
     found, held = smallest(channels), sum(channels.values())
-    tiny = GroupDot("groupdot", "a tiny group", CUDA(), 1, (4, 2))
+    tiny = GroupDot("groupdot:1", "a tiny group", CUDA(), 1, (4, 2))
     packed, slots = tiny.pack(found), tiny.layout(found)
     windowed = True
     for name, matrix in found.parameters.items():
@@ -201,14 +201,14 @@ def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
 def test_a_tile_of_words_takes_a_quarter() -> None:
     """Five channels are two words of a pixel; 21 are six, of which four are in the tile at once."""
     for channels, words in (({"a": 3, "b": 2}, 2), ({"a": 4, "b": 17}, 4)):
-        tiny = GroupDot("groupdot", "a tiny group", WGSL(), 4, (8, 8))
+        tiny = GroupDot("groupdot:4", "a tiny group", WGSL(), 4, (8, 8))
         assert tiny.details(smallest(channels))["shared_bytes"] == 4 * words * (8 * 4 + 1) * (8 + 1)
 
 
 def test_the_text_of_dots(golden) -> None:
     found = smallest(CHANNELS)
     for dialect in (C(), OpenCL()):
-        tiny = Dot("dot4", "a tiny tile", dialect, 4, 2)
+        tiny = Dot("dot:4", "a tiny tile", dialect, 4, 2)
         golden(f"dot4.denoise{dialect.suffix}", tiny.emit(found, ["a tiny kernel"], True))
 
 
@@ -221,7 +221,7 @@ def test_the_bytes_of_dots_are_the_weights() -> None:
             lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, Gather(Window(2, "clamp"), images)
         )
     )
-    dot = Dot("dot4", "a tiny tile", C(), 4, 2)
+    dot = Dot("dot:4", "a tiny tile", C(), 4, 2)
     packed, slots = dot.pack(found), dot.layout(found)
     assert packed.size == sum(int(np.prod(slot.shape)) for slot in slots.values())
     for name, matrix in found.parameters.items():
@@ -236,7 +236,7 @@ def test_the_bytes_of_dots_are_the_weights() -> None:
         assert not begun[len(matrix) :].any()
 
 
-@pytest.mark.parametrize("schedule", ["dot16", "groupdot"])
+@pytest.mark.parametrize("schedule", ["dot:16", "groupdot:4"])
 @pytest.mark.parametrize("halved", ["weights", "numbers", "nothing"])
 def test_halves_are_no_bytes(schedule, halved) -> None:
     """They do not round, so that the program is exact; as bytes they would lose their halves."""
@@ -263,7 +263,7 @@ def test_what_bytes_do_not_hold_is_refused(changed, reason) -> None:
     net = changed(network())
     pixel = forward_whole if isinstance(net, Whole) else siren.forward
     found = program(lambda window: pixel(net, window), is_whole=isinstance(net, Whole))
-    assert reason in Dot("dot16", "", C(), 16, 14).refusal(found)
-    assert bool(reason) == bool(Dot("dot16", "", C(), 16, 14).refusal(found))
-    assert (reason in GroupDot("groupdot", "", WGSL(), 4).refusal(found)) or not reason
-    assert bool(reason) == bool(GroupDot("groupdot", "", WGSL(), 4).refusal(found))
+    assert reason in Dot("dot:16", "", C(), 16, 14).refusal(found)
+    assert bool(reason) == bool(Dot("dot:16", "", C(), 16, 14).refusal(found))
+    assert (reason in GroupDot("groupdot:4", "", WGSL(), 4).refusal(found)) or not reason
+    assert bool(reason) == bool(GroupDot("groupdot:4", "", WGSL(), 4).refusal(found))

@@ -126,16 +126,16 @@ def test_a_record_of_a_benchmark_shows_what_the_benchmark_showed(tmp_path):
     ms = {"median": 2.0, "min": 1.0, "max": 3.0, "spread": 1.0, "rounds": [1.0, 2.0, 3.0]}
     loss = {"psnr_db": 35.0, "psnr_loss_db": 0.25, "psnr_frames_db": [35.0]}
     bounds = {"max": 2e-7, "bound": 1e-5, "bound_all": 1e-4, "certified": True}
-    kernel = {"kind": "kernel", "executor": "opencl", "schedule": "tile16", "window": 8, "rank": None}
+    kernel = {"kind": "kernel", "executor": "opencl", "schedule": "tile:16", "window": 8, "rank": None}
     kernel |= {"parameters": 100, "ms": ms, "kernel_ms": None, "quality": loss, "reason": ""}
     rows = [
-        {**kernel, "name": "opencl:tile16:window8", "profile": "ieee", "degree": 11, "rounding": bounds},
-        {**kernel, "name": "opencl:tile16:native", "profile": "native", "degree": None}
+        {**kernel, "name": "opencl:tile:16:window8", "profile": "ieee", "degree": 11, "rounding": bounds},
+        {**kernel, "name": "opencl:tile:16:native", "profile": "native", "degree": None}
         | {"rounding": {**bounds, "bound": None, "bound_all": None, "certified": False}},
         {"name": "oidn:high", "kind": "peer", "ms": ms, "quality": loss, "reason": "", "executor": None},
         {"name": "torch", "kind": "peer", "ms": None, "reason": "not installed"},
     ]
-    front = {"error": [], "quality": ["oidn:high"], "rounding": ["opencl:tile16:window8"]}
+    front = {"error": [], "quality": ["oidn:high"], "rounding": ["opencl:tile:16:window8"]}
     data = {"schema": "wamnet-bench-2", "contenders": rows, "network": {"window": 12}, "front": front}
     data |= {"size_px": 64, "unseen_frames": 1, "frames": {"draws": []}, "sizes": [], "limits": None}
     (tmp_path / "bench-x.json").write_text(json.dumps(checked(of_bench(data, "wamnet bench"))))

@@ -17,8 +17,8 @@ from wamnet.kernels.export.shelf import random_model
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 
 CERTIFIED = [
-    *(("whole", way) for way in ("opencl tile16", "opencl plain", "opencl fft32", "c fft32")),
-    ("whole8", "opencl dot16"),
+    *(("whole", way) for way in ("opencl tile:16", "opencl plain", "opencl fft:16", "c fft:16")),
+    ("whole8", "opencl dot:16"),
 ]
 """Forms and ways of the rows of wamnet's kernels that have a certificate in the record."""
 

@@ -17,8 +17,8 @@ EXPORTS = [
 ]
 CERTIFIED = [
     {"target": "opencl", "schedule": "plain", "variant": "full", "text": "computes it: 2 sums"},
-    {"target": "opencl", "schedule": "fft32", "variant": "full", "text": "not looked at"},
-    {"target": "opencl", "schedule": "dot16", "variant": "whole8", "text": "computes it: 2 sums"},
+    {"target": "opencl", "schedule": "fft:16", "variant": "full", "text": "not looked at"},
+    {"target": "opencl", "schedule": "dot:16", "variant": "whole8", "text": "computes it: 2 sums"},
 ]
 FAULTS = [
     {"target": "cuda", "planted": "60", "accepted": "1"},
@@ -32,8 +32,8 @@ def test_cells_are_of_the_records(tmp_path):
         (tmp_path / f"{name}.json").write_text(written(data_of(kept)))
     lines = support.matrix(Records(tmp_path)).splitlines()[2:]
     assert lines == [
-        "| `opencl` | 1 kB | a driver | pthread-x | CPU | plain, fft32; integers: dot16 "
-        "| plain; integers: dot16 | – |",
+        "| `opencl` | 1 kB | a driver | pthread-x | CPU | plain, fft:16; integers: dot:16 "
+        "| plain; integers: dot:16 | – |",
         "| `cuda` | 2 kB | nvcc | a card | a card | – | – | 1 of 65 |",
         "| `shadertoy` | – | beyond a limit | – | – | – | – | – |",
     ]

@@ -80,12 +80,12 @@ def test_what_is_not_here_is_said(case, monkeypatch, capsys):
 )
 def test_what_a_way_lacks_is_said_once(monkeypatch, lacks, tmp_path):
     """One row for all schedules, and no process."""
-    way = replace(numpy_way(), schedules=("plain", "tile16"), way_out="build it", **lacks)
+    way = replace(numpy_way(), schedules=("plain", "tile:16"), way_out="build it", **lacks)
     monkeypatch.setattr(same_bits, "WAYS", (way,))
     monkeypatch.setattr(same_bits, "asked", lambda *asked: pytest.fail("it is not here"))
     (cells,) = same_bits.rows([], tmp_path, "")
     assert cells[1].startswith("NOT HERE: there is no ")
-    assert cells[3] == "plain, tile16"
+    assert cells[3] == "plain, tile:16"
 
 
 def test_a_way_that_lacks_nothing():
@@ -105,14 +105,14 @@ def test_rows_of_a_document():
         def records(self):
             return [
                 row("a", "plain", "12", "yes", "9.5%"),
-                row("a", "tile16", "12", "NO: pixel (0, 0)", "75.0%"),
+                row("a", "tile:16", "12", "NO: pixel (0, 0)", "75.0%"),
                 row("a", "group", "12", "yes", "refused"),
                 row("b", "plain, group", "-", "-", "-"),
             ]
 
     lines = same.summary({same.RECORD: Results()}).splitlines()
     assert lines[2:] == [
-        "| a | device | - | plain, tile16, group | 2 of 3 | 9.5% to refused |",
+        "| a | device | - | plain, tile:16, group | 2 of 3 | 9.5% to refused |",
         "| b | device | - | plain, group | - | - |",
     ]
 

@@ -10,7 +10,7 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * schedule  group4: the same with 4 pixels an item, which share each weight
+ * schedule  group:4: the same with 4 pixels an item, which share each weight
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights, at an address that is a multiple of 16; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height.

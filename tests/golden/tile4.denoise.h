@@ -10,7 +10,7 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * schedule  tile4: the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums
+ * schedule  tile:4: the same for 16 registers of 4 numbers: 6 pixels, 12 vectors of sums
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height: fewer than 2^31 numbers an image.

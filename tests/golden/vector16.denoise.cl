@@ -10,7 +10,7 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * schedule  vector16: a layer's neurons side by side in vectors of 16, one pixel after another
+ * schedule  vector:16: a layer's neurons side by side in vectors of 16, one pixel after another
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights, at an address that is a multiple of 64; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height.

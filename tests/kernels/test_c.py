@@ -91,7 +91,7 @@ def test_source_is_clean_under_warnings_and_sanitizers(executor_named, case, tmp
 
 
 WAYS = (["-march=native"], ["-DWAMNET_PORTABLE"])
-TILES = [(name, way) for name in ("tile16", "tile8", "tile4") for way in WAYS]
+TILES = [(name, way) for name in ("tile:16", "tile:8", "tile:4") for way in WAYS]
 """The tiled schedules, with the vectors of GCC and clang, where the processor has those, and without."""
 
 
@@ -161,9 +161,9 @@ def test_building_again_costs_nothing(executor_named, case, monkeypatch):
 @pytest.mark.parametrize(
     ("native", "lanes", "schedule"),
     [
-        ("-mno-avx", 4, "fft32x4"),
-        ("-mavx2 -mno-avx512f", 8, "fft32x8"),
-        ("-mavx512f", 16, "fft32"),
+        ("-mno-avx", 4, "fft:4"),
+        ("-mavx2 -mno-avx512f", 8, "fft:8"),
+        ("-mavx512f", 16, "fft:16"),
     ],
 )
 def test_the_schedule_follows_from_the_registers(
@@ -203,8 +203,8 @@ def test_spectra_say_to_other_compilers_what_they_take(executor_named, kit, tmp_
     """FOU-9: without the vectors of GCC and clang the text is one error, before anything else goes wrong."""
     executor_named("c")
     program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
-    artifact = compile_program(program, "c", "ieee", "fft32x8")
-    assert artifact.manifest["schedule"]["name"] == "fft32x8"
+    artifact = compile_program(program, "c", "ieee", "fft:8")
+    assert artifact.manifest["schedule"]["name"] == "fft:8"
     (tmp_path / "denoise.c").write_text(artifact.source)
     for options, status in (((), 0), (("-U__GNUC__",), 1)):
         command = ["cc", "-E", *options, "-o", "out", "denoise.c"]
@@ -248,7 +248,7 @@ def test_options_that_relax_arithmetic_are_taken_back(executor_named, case, monk
     monkeypatch.setenv("CC", f"cc {relaxed}")
     with kernels.open_executor("c") as executor:
         assert np.array_equal(executor.run(artifact, images).view(np.uint32), wanted.view(np.uint32))
-        assert within_bound(case, executor.run(compile_program(program, "c", schedule="tile16"), images))
+        assert within_bound(case, executor.run(compile_program(program, "c", schedule="tile:16"), images))
     # A number below the smallest normal one, 2^-126, which a process that flushes them loses.
     assert np.float32(2.0**-133) * np.float32(1) == np.float32(2.0**-133)
 
@@ -349,7 +349,7 @@ HOSTILE = ["-Ofast", "-march=native", "-funsafe-math-optimizations"]
     ],
     ids=["clean", "clean with vectors", "hostile", "hostile and portable"],
 )
-@pytest.mark.parametrize("schedule", ["plain", "tile8", "dot16"])
+@pytest.mark.parametrize("schedule", ["plain", "tile:8", "dot:16"])
 def test_integers_are_exact_whatever_the_options(executor_named, tmp_path, schedule, options, border):
     """Layers fill no vector, pictures no tile, rows of taps no four bytes."""
     executor_named("c")

@@ -9,7 +9,7 @@ import pytest
 
 from wamnet.kernels import cache
 
-DATA = {"winner": "tile16", "ms": [1.5, 2.25], "none": None}
+DATA = {"winner": "tile:16", "ms": [1.5, 2.25], "none": None}
 """Some data."""
 
 
@@ -47,7 +47,7 @@ DAMAGES = {
     "empty": lambda text: "",
     "half": lambda text: text[: len(text) // 2],
     "number": lambda text: text.replace("1.5", "0.5"),
-    "winner": lambda text: text.replace("tile16", "tile8"),
+    "winner": lambda text: text.replace("tile:16", "tile:8"),
     "checksum": lambda text: text.replace('"sha256": "', '"sha256": "0'),
     "form": lambda text: text.replace(cache.SCHEMA, "wamnet-cache-0"),
     "foreign": lambda text: json.dumps({"data": DATA}),

@@ -21,7 +21,7 @@ from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
 
 
-def point(variant, ms, error=0.1, loss=0.0, schedule="tile16", mean=0.01):
+def point(variant, ms, error=0.1, loss=0.0, schedule="tile:16", mean=0.01):
     return Point(variant, schedule, "opencl", ms, error, mean, loss, 1.0)
 
 
@@ -75,8 +75,8 @@ def test_ties_are_decided_by_accuracy_then_by_names() -> None:
         assert choose(order, Limits(max_ms=10.0)).point.variant == "rank16"
     faster = [*points, point("window6", 9.0, 0.1)]
     assert choose(faster, Limits(max_ms=10.0)).point.variant == "window6"
-    same = [point("full", 1.0, schedule=name) for name in ("tile8", "tile16")]
-    assert choose(same, Limits(max_error=1.0)).point.schedule == "tile16"
+    same = [point("full", 1.0, schedule=name) for name in ("tile:8", "tile:16")]
+    assert choose(same, Limits(max_error=1.0)).point.schedule == "tile:16"
 
 
 @pytest.mark.parametrize("number", curve.NUMBERS)
@@ -94,7 +94,7 @@ def test_numbers_that_are_none_break_every_rule(number) -> None:
 
 def test_where_nothing_fits_the_nearest_point_is_named() -> None:
     with pytest.raises(
-        InputError, match=r"limit '--max-ms 30': no point .* nearest is rank16, schedule tile16"
+        InputError, match=r"limit '--max-ms 30': no point .* nearest is rank16, schedule tile:16"
     ):
         choose(POINTS, Limits(max_ms=30.0))
     with pytest.raises(InputError, match=r"nearest is window8.*: 60 ms"):
@@ -241,10 +241,10 @@ def test_a_measurement_has_every_variant(executor_named, model) -> None:
 
 def test_schedules_that_are_named_are_measured(executor_named, model) -> None:
     found = measure_curve.measure(
-        executor_named("opencl"), model, (9, 18), "ieee", frames(), ("full", "rank2"), ("plain", "tile8"), 1
+        executor_named("opencl"), model, (9, 18), "ieee", frames(), ("full", "rank2"), ("plain", "tile:8"), 1
     )
     assert [(p.variant, p.schedule) for p in found.points] == [
-        *(("full", "plain"), ("full", "tile8"), ("rank2", "plain"), ("rank2", "tile8"))
+        *(("full", "plain"), ("full", "tile:8"), ("rank2", "plain"), ("rank2", "tile:8"))
     ]
     assert len(measure_curve.promising(executor_named("opencl"), model, "ieee")) == 2
 

@@ -29,21 +29,28 @@ LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] 
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
 
 
-SPECTRA = ("fft32", "fft32x8", "fft32x4")
+SPECTRA = ("fft:16", "fft:8", "fft:4")
 """The schedules of transforms."""
 
-LARGEST = {"inlined": (3, 10), "compute": (6, 10), "compute4": (6, 10), **dict.fromkeys(SPECTRA, (20, 32))}
-"""Largest window and layer by schedule: Mesa compiles two thousand weights a second, and layers in straight
-code in a time that grows with the square; a tile's sums must fit the stack. The other schedules' layers may
-have more neurons than a block."""
+SHADERS = (("opengl", "group:1"), ("opengl", "group:4"))
+"""The schedules of compute shaders."""
 
-LARGEST_LAYERS = {"group": (12, 30), "group4": (12, 30)}
+LARGEST = {
+    **{way: (3, 10) for way in LADDER if way[1] == "inlined"},
+    **dict.fromkeys(SHADERS, (6, 10)),
+    **{way: (20, 32) for way in LADDER if way[1] in SPECTRA},
+}
+"""Largest window and layer by target and schedule: Mesa compiles two thousand weights a second, and layers in
+straight code in a time that grows with the square; a tile's sums must fit the stack. The other schedules'
+layers may have more neurons than a block."""
+
+LARGEST_LAYERS = {("opencl", "group:1"): (12, 30), ("opencl", "group:4"): (12, 30)}
 """The same of schedules that unroll layers on PoCL."""
 
 UNLIMITED = (12, 70)
 """The same of those that have loops: in long runs half of their networks are as wide as trained ones."""
 
-GROUPED = {s.name: s for t in DENOISERS.values() for s in t.schedules if hasattr(s, "group")}
+GROUPED = {(t.name, s.name): s for t in DENOISERS.values() for s in t.schedules if hasattr(s, "group")}
 """The schedules whose groups share a tile."""
 
 
@@ -87,15 +94,15 @@ def executor_of(executor_named, target):
 @settings(max_examples=EXAMPLES)
 @given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
 def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
-    case = data.draw(cases({**LARGEST, **LARGEST_LAYERS}.get(schedule, UNLIMITED)))
+    case = data.draw(cases({**LARGEST, **LARGEST_LAYERS}.get((target, schedule), UNLIMITED)))
     executor = executor_of(executor_named, target)
     network = kit.network(case["widths"], (9.0, 3.0), case["seed"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
     with pytest.MonkeyPatch.context() as patch:
         for name in ("LOCAL_SIZE", "TILE_LOCAL_SIZE"):
             patch.setattr(opencl_executor, name, group)
-        if schedule in GROUPED:
-            patch.setattr(GROUPED[schedule], "group", group)
+        if (target, schedule) in GROUPED:
+            patch.setattr(GROUPED[target, schedule], "group", group)
         artifact = compile_program(program, target, "ieee", schedule)
         assert artifact.manifest["schedule"]["name"] == schedule
         executor._built.clear()
@@ -107,8 +114,8 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_the_paper_s_network(executor_named, kit, target, schedule, border):
-    size = LARGEST.get(schedule, (12,))[0]  # the paper's is 12
-    layers = [32] if schedule.startswith("compute") else [32, 32, 32, 32]
+    size = LARGEST.get((target, schedule), (12,))[0]  # the paper's is 12
+    layers = [32] if (target, schedule) in SHADERS else [32, 32, 32, 32]
     network = kit.network([6 * size * size, *layers, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, size, border)
     random = np.random.default_rng(5)
@@ -157,7 +164,7 @@ array."""
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("schedule", ["tile16", "tile4"])
+@pytest.mark.parametrize("schedule", ["tile:16", "tile:4"])
 @pytest.mark.parametrize("target", ["opencl", "c"])
 def test_a_wrong_tile_is_caught(executor_named, kit, target, schedule, fault):
     executor = executor_named(target)
@@ -190,7 +197,7 @@ FOURIER_FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FOURIER_FAULTS)
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_a_wrong_spectrum_is_caught(executor_named, kit, target, schedule, fault):
     executor = executor_named(target)
     program = kit.denoiser(kit.network([150, 20, 3], (3.0, 3.0)), {"a": 6}, 5, "clamp")
@@ -256,7 +263,7 @@ kernel wrote there before, and then the wrong one is right.
 
 
 @pytest.mark.parametrize("fault", GROUP_FAULTS)
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "group4"), ("opengl", "compute4")])
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "group:4"), ("opengl", "group:4")])
 def test_a_wrong_group_is_caught(executor_named, kit, target, schedule, fault):
     executor = executor_of(executor_named, target)
     program = kit.denoiser(kit.network([48, 9, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
@@ -268,7 +275,7 @@ def test_a_wrong_group_is_caught(executor_named, kit, target, schedule, fault):
 
 def test_no_barrier_is_a_race_that_groups_do_not_have(kit):
     """The tile is read only between two barriers: after it was filled, and before it is filled again."""
-    program = compile_program(paper(kit), "opencl", "ieee", "group4")
+    program = compile_program(paper(kit), "opencl", "ieee", "group:4")
     statements = [line.strip() for line in program.source.splitlines()]
     steps = [s for s in statements if s.startswith(("barrier(", "tile[")) or "= tile[" in s]
     kinds = [
@@ -287,13 +294,13 @@ def paper(kit):
 def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
     executor = executor_named("opencl")
     artifact = compile_program(
-        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opencl", "ieee", "group4"
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opencl", "ieee", "group:4"
     )
     monkeypatch.setattr(opencl_executor, "STACK_BYTES", 1000)
     executor._built.clear()
     with pytest.raises(
         CompileError,
-        match=r"schedule group4 needs groups of \d+ bytes of variables, on a proc.* at most 1000",
+        match=r"schedule group:4 needs groups of \d+ bytes of variables, on a proc.* at most 1000",
     ):
         executor.build(artifact)
     large = replace(
@@ -310,18 +317,18 @@ def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
 def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
     executor = executor_named("opengl-egl")
     artifact = compile_program(
-        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opengl", "ieee", "compute"
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opengl", "ieee", "group:1"
     )
     monkeypatch.setattr(opengl_executor, "SHADER_VERSION", 460)
     executor._built.clear()
     with pytest.raises(
         CompileError,
-        match=r"has OpenGL 4\.5: schedule compute is a compute shader, which OpenGL 4\.6 has; use",
+        match=r"has OpenGL 4\.5: schedule group:1 is a compute shader, which OpenGL 4\.6 has; use",
     ):
         executor.build(artifact)
 
 
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft32"), ("c", "fft32x8")])
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_layers_of_64_neurons_have_spectra(executor_named, target, schedule):
     """Arrays of 800 kB fit a thread's stack; both kernels are within their bounds of the exact picture."""
     recipe = PRESETS["sky"]

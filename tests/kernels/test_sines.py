@@ -111,7 +111,7 @@ def test_beyond_the_domain_in_vectors(executor_named, kit, name):
     program = kit.program(lambda x: np.matmul(np.sin(np.matmul(x, 6000.0 * eye)), eye), {"a": 3})
     image = np.zeros((6, 1, 3), np.float32)
     image[:, 0, 0] = [1.0, 2.2, -2.2, 1e30, np.inf, np.nan]
-    known = {"opencl": ("tile16", "tile8", "vector16"), "opengl": ("inlined",), "c": ("tile16", "tile4")}
+    known = {"opencl": ("tile:16", "tile:8", "vector:16"), "opengl": ("inlined",), "c": ("tile:16", "tile:4")}
     schedules = known.get(executor.name, ())
     for schedule in ("plain", *schedules):
         artifact = compile_program(program, executor.name, "ieee", schedule)

@@ -105,7 +105,7 @@ def test_all_agree(executor_named, model, images):
     """Every executor, every schedule: a kernel for each one that is not replaced by another."""
     found = verdicts_of(runners(executor_named, *WAYS), model, images, which=triage.EVERY)
     assert {v.kernel.runner.way for v in found} == set(WAYS)
-    assert {v.kernel.schedule for v in found if v.kernel.runner.way == "opencl"} > {"plain", "tile4"}
+    assert {v.kernel.schedule for v in found if v.kernel.runner.way == "opencl"} > {"plain", "tile:4"}
     assert [v.state for v in found] == ["within"] * len(found)
     assert triage.conclusion(found) == f"{len(found)} kernels within their bounds"
 

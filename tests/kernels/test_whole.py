@@ -25,7 +25,7 @@ EXAMPLES = max(settings.default.max_examples // 50, 1)
 WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules]
 """Each schedule with its target."""
 
-SLOW = {"inlined", "compute", "compute4", "group", "group4", "groupdot"}
+SLOW = {"inlined", "group:1", "group:4", "groupdot:4"}
 """Schedules in straight code, which compilers take long for."""
 
 
@@ -109,7 +109,7 @@ def chosen(executor, whole):
 def test_bytes_are_chosen_where_they_are_multiplied(executor_named, monkeypatch, tmp_path, name) -> None:
     monkeypatch.setenv("WAMNET_CACHE", str(tmp_path))  # nothing is tuned there
     executor = executor_named(name)
-    direct = {"fft32": "tile16", "fft32x8": "tile8", "fft32x4": "tile4"}[executor.schedule]
+    direct = {"fft:16": "tile:16", "fft:8": "tile:8", "fft:4": "tile:4"}[executor.schedule]
     assert chosen(executor, True) == (executor.byte_schedule or direct)
     assert chosen(executor, False) == executor.schedule
     monkeypatch.setattr(executor, "byte_schedule", "")

@@ -107,8 +107,8 @@ def test_training_is_the_references(frame, model):
 
 def test_a_kernel_is_compiled_saved_and_certified(tmp_path):
     model = Model(siren.init([27, 4, 4, 3], 2.0, 2.0, seed=5), ("color",), Window(3), Normalization())
-    kernel = wamnet.compile(model, "c", schedule="tile8")
-    assert (kernel.target, kernel.schedule) == ("c", "tile8")
+    kernel = wamnet.compile(model, "c", schedule="tile:8")
+    assert (kernel.target, kernel.schedule) == ("c", "tile:8")
     assert f"{kernel.weights.size} weights" in repr(kernel)
     assert kernel.bound is not None
     files = kernel.save(tmp_path / "kernel")

@@ -399,7 +399,7 @@ def denoise_bindings() -> list[str]:
     kinds = (
         ("opencl", "plain", "c"),
         ("opengl", "plain", "glsl"),
-        ("opengl", "compute", "glsl"),
+        ("opengl", "group:1", "glsl"),
         ("c", "plain", "c"),
     )
     lines: list[str] = []

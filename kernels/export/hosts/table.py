@@ -73,7 +73,7 @@ ROWS = (
         "seen.ppm",
         ("common.h",),
         {"host.h": launches.header},
-        schedule="tile8",  # spectra need more of a thread's stack than some drivers give it
+        schedule="tile:8",  # spectra need more of a thread's stack than some drivers give it
     ),
     Host(
         "vulkan",

@@ -229,9 +229,10 @@ def tiny(kit):
 
 KINDS = [*((target, "plain") for target in LANGUAGES), ("opencl", "tile"), ("c", "tile")]
 LARGE = [
-    ("opencl", "fft32"), ("c", "fft32"), ("opencl", "dot16"), ("c", "dot16"), ("cuda", "groupdot"),
-    ("opengl", "inlined"), ("opengl", "compute"), ("glsl-es", "packed"), ("metal", "group"),
-    ("wgsl", "group4"), ("glsl-vulkan", "tile4"), ("wgsl", "tile4"), ("metal", "tile4"), ("cuda", "tile4"),
+    ("opencl", "fft:16"), ("c", "fft:16"), ("opencl", "dot:16"), ("c", "dot:16"), ("cuda", "groupdot:4"),
+    ("opengl", "inlined"), ("opengl", "group:1"), ("glsl-es", "packed"), ("metal", "group:1"),
+    ("wgsl", "group:4"), ("glsl-vulkan", "tile:4"), ("wgsl", "tile:4"), ("metal", "tile:4"),
+    ("cuda", "tile:4"),
 ]  # fmt: skip
 SIGNS = re.findall(
     r"\S+", "+ - * / < <= > && 0 1 2 i j x y dx row column width height ( ) [ ] { } ; , float int ="

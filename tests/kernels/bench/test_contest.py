@@ -66,7 +66,7 @@ def names_on(executor) -> list[Contender]:
     """Return the plain kernel of an executor, others of OpenCL, and one of a rank."""
     found = [contenders.kernel(executor.name, "plain")]
     if executor.name == "opencl":
-        found += [contenders.kernel("opencl", name) for name in ("vector16", "tile4")]
+        found += [contenders.kernel("opencl", name) for name in ("vector:16", "tile:4")]
     return [*found, contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
 
 
@@ -412,7 +412,7 @@ def test_the_crop_is_the_picture_s_corner(monkeypatch, model) -> None:
 
 def test_variants_are_data() -> None:
     """A kernel of a variant is named after it; the whole network is not."""
-    assert contenders.kernel("opencl", "tile16").name == "opencl:tile16"
+    assert contenders.kernel("opencl", "tile:16").name == "opencl:tile:16"
     variant = contenders.VARIANTS[0]
-    assert contenders.kernel("opencl", "tile16", variant).name == f"opencl:tile16:{variant.name}"
+    assert contenders.kernel("opencl", "tile:16", variant).name == f"opencl:tile:16:{variant.name}"
     assert FULL not in contenders.VARIANTS

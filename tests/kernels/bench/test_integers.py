@@ -34,7 +34,7 @@ def model():
 
 
 @pytest.mark.parametrize(
-    ("executor", "schedule"), [("opencl", "dot16"), ("opencl", "tile16"), ("c", "dot16")]
+    ("executor", "schedule"), [("opencl", "dot:16"), ("opencl", "tile:16"), ("c", "dot:16")]
 )
 def test_kernels_of_integers_give_the_reference_s_bits(executor_named, model, executor, schedule):
     executor_named(executor)

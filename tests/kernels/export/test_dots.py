@@ -37,7 +37,7 @@ def kernel(target):
     images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 4), ("b", 1)))
     types = {"window": Type(shape=(45,))}
     program = trace(lambda window: forward_whole(NETWORK, window), types, Gather(WINDOW, images))
-    return compile_program(program, target, "native", "groupdot")
+    return compile_program(program, target, "native", "groupdot:4")
 
 
 def is_right(opened, artifact):

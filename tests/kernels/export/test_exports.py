@@ -353,7 +353,7 @@ def test_the_usual_schedule_gives_way_and_says_why():
     """A first layer in two passes has more channels between them than a tile holds."""
     whole = export(Request(model((96, 8, 3)), "cuda", variant="rank6"))
     picked = whole.manifest["kernels"][-1]["schedule"]
-    assert (picked["name"], picked["asked"]) == ("plain", "group4")
+    assert (picked["name"], picked["asked"]) == ("plain", "group:4")
     assert "a tile holds 4 channels at once" in picked["reason"]
     assert picked["reason"] in whole.files["README.md"].decode()
 
@@ -378,16 +378,16 @@ def test_a_variant_of_low_rank_is_two_kernels(target):
         (Request(model(), "onnx", weights="buffer"), "--weights 'buffer': a graph holds its weights"),
         (Request(model(), "onnx", schedule="plain"), "--schedule 'plain': a runtime orders a graph's work"),
         (
-            Request(model(), "wgsl", schedule="tile16"),
-            "--schedule 'tile16': is not available for target wgsl",
+            Request(model(), "wgsl", schedule="tile:16"),
+            "--schedule 'tile:16': is not available for target wgsl",
         ),
         (
-            Request(model(), "cuda", weights="inline", schedule="group"),
-            "--schedule 'group': is not available for target cuda with --weights inline",
+            Request(model(), "cuda", weights="inline", schedule="group:1"),
+            "--schedule 'group:1': is not available for target cuda with --weights inline",
         ),
         (
-            Request(model(), "cuda", variant="rank6", schedule="group4"),
-            "--schedule 'group4': cannot hold this model: a tile holds 4 channels at once",
+            Request(model(), "cuda", variant="rank6", schedule="group:4"),
+            "--schedule 'group:4': cannot hold this model: a tile holds 4 channels at once",
         ),
         (
             Request(model((96, 48, 3)), "glsl-es", weights="uniform"),

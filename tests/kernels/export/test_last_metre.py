@@ -57,7 +57,7 @@ def compiled(made, folder, compiler, *options):
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize(("compiler", "standard"), [("cc", "-std=c99"), ("c++", "-std=c++17")])
 @pytest.mark.parametrize(
-    ("weights", "schedule"), [("buffer", "plain"), ("buffer", "tile8"), ("inline", "plain")]
+    ("weights", "schedule"), [("buffer", "plain"), ("buffer", "tile:8"), ("inline", "plain")]
 )
 def test_all_headers_of_a_rank_are_one_file(compiler, standard, weights, schedule, tmp_path):
     """As C and as C++; no name of theirs clashes with another's or with the program's."""
@@ -68,7 +68,7 @@ def test_all_headers_of_a_rank_are_one_file(compiler, standard, weights, schedul
 
 
 @pytest.mark.needs("devices")
-@pytest.mark.parametrize("schedule", ["tile16", "tile4", "fft32x8"])
+@pytest.mark.parametrize("schedule", ["tile:16", "tile:4", "fft:8"])
 def test_each_schedule_is_cpp(schedule, tmp_path):
     """The window is one for which spectra take fewer operations."""
     network = siren.init((12 * 12 * 3, 32, 3), 2.0, 2.0, 5, np.float32)

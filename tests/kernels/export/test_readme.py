@@ -110,7 +110,7 @@ def test_it_says_which_file_is_a_translation_that_nobody_reads():
         ("c", {"variant": "rank2"}, "There is no certificate: it is two kernels, one after the other"),
         ("c", {"profile": "native"}, "There is no certificate: nothing is promised of the sine"),
         (ONNX, {}, "There is no certificate: a runtime makes kernels of its own"),
-        ("cuda", {"profile": "native"}, "(schedule group4, profile native) it does not know."),
+        ("cuda", {"profile": "native"}, "(schedule group:4, profile native) it does not know."),
         ("glsl-es", {"weights": "inline"}, "(schedule inlined, profile ieee) it does not know."),
         ("opencl", {"weights": "uniform"}, "whose kind (schedule plain, profile ieee) it does not know."),
     ],

@@ -74,7 +74,7 @@ def test_denoiser_keeps_its_bound(runner, kit, case):
 
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
-@pytest.mark.parametrize("schedule", ["tile4", "group", "group4"])
+@pytest.mark.parametrize("schedule", ["tile:4", "group:1", "group:4"])
 def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
     """KER-18 in every language that has them: pictures of several groups, none of them whole.
 
@@ -96,7 +96,7 @@ def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
 
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
-@pytest.mark.parametrize("schedule", ["plain", "group", "group4", "groupdot"])
+@pytest.mark.parametrize("schedule", ["plain", "group:1", "group:4", "groupdot:4"])
 def test_integers_have_the_reference_s_digest(runner, schedule, border):
     """WHO-10: the SHA-256 of the picture is the same in every language."""
     if schedule not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
@@ -129,7 +129,7 @@ def test_bytes_at_the_ends_of_their_range(runner, shape, border):
 
     A byte that is taken for one without a sign, or that carries into the next one, is found by each product.
     """
-    if "groupdot" not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
+    if "groupdot:4" not in {each.name for each in EXPORTED.get(runner.name, DENOISERS["c"]).schedules}:
         pytest.skip("its language has no products of bytes")
     random = np.random.default_rng(4)
     network = rounded(siren.init([4 * 21, 9, 6, 3], 3.0, 5.0, seed=1), 2)
@@ -140,7 +140,7 @@ def test_bytes_at_the_ends_of_their_range(runner, shape, border):
     check_whole(network)
     numbers = random.choice(np.float32([-127, 127]), (*shape, 21))
     channels = {"a": 4, "b": 1, "c": 16}
-    found, held = denoised(runner, "groupdot", network, Window(2, border), channels, numbers)
+    found, held = denoised(runner, "groupdot:4", network, Window(2, border), channels, numbers)
     assert len(np.unique(held)) >= min(50, held.size)
     assert found.tobytes() == held.tobytes()
 
@@ -150,7 +150,7 @@ def test_a_group_that_does_not_wait_is_found(runner, kit):
     if runner.name not in ("cuda", "metal"):
         pytest.skip("its device runs the items of a group in step, whatever the source says")
     program = kit.denoiser(kit.network([45, 7, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, "clamp")
-    artifact = compile_program(program, runner.name, "ieee", "group")
+    artifact = compile_program(program, runner.name, "ieee", "group:1")
     wait = {"cuda": "__syncthreads();", "metal": "threadgroup_barrier(mem_flags::mem_threadgroup);"}
     wrong = kit.with_source(artifact, wait[runner.name], "")
     random = np.random.default_rng(2)

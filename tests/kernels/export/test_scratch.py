@@ -16,7 +16,7 @@ from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
 
-SCHEDULES = ("plain", "tile16", "fft32")
+SCHEDULES = ("plain", "tile:16", "fft:16")
 
 CALLER = """\
 #include <stdio.h>

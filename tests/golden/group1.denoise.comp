@@ -10,7 +10,7 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * schedule  compute: a tile of the image in memory that a work group shares; layers in registers, one pixel an item
+ * schedule  group:1: a tile of the image in memory that a work group shares; layers in registers, one pixel an item
  * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
  *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
  *           bottom, or the window stands on its head;

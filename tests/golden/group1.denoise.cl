@@ -10,7 +10,7 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * schedule  group: a tile of the image in memory that a work group shares; layers in registers, one pixel an item
+ * schedule  group:1: a tile of the image in memory that a work group shares; layers in registers, one pixel an item
  * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
  *           weights, at an address that is a multiple of 16; result: width * height * 2 floats in the same order, encoded as `output` says;
  *           width; height.

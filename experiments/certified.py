@@ -1,7 +1,7 @@
 """What is proven of the kernels of the shipped models: bounds for all frames, and whether texts are checked.
 
     python experiments/certified.py
-    python experiments/certified.py --models minicubes --only opencl:fft32,c:tile8
+    python experiments/certified.py --models minicubes --only opencl:fft:16,c:tile:8
 
 Each kernel is compiled, its certificate checked by the independent checker, and its text by the reader
 [spec/certificate.md, spec/text.md]. A Markdown table is printed: the largest bound of an output, in steps of
@@ -24,7 +24,8 @@ from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.reading.check import check_text
 from wamnet.compiler.reading.lanes import Unread
-from wamnet.compiler.variants import plan_model
+from wamnet.compiler.schedules.names import split
+from wamnet.compiler.variants import FULL, plan_model
 from wamnet.models.model_file import load_model
 
 ROOT = Path(__file__).parents[1]
@@ -33,10 +34,10 @@ MODELS = ("minicubes", "cornell", "glossy")
 """The shipped models."""
 
 KERNELS = (
-    "opencl:plain", "opencl:tile16", "opencl:fft32", "opencl:plain:whole8", "opencl:dot16:whole8",
-    "opengl:plain", "c:plain", "c:tile8", "c:fft32x8", "c:plain:whole8", "c:dot16:whole8", "wgsl:plain",
-    "wgsl:group4", "cuda:plain", "cuda:group4", "opencl:tile16:whole8", "cuda:groupdot:whole8",
-    "wgsl:groupdot:whole8", "opencl:groupdot:whole8", "glsl-vulkan:groupdot:whole8",
+    "opencl:plain", "opencl:tile:16", "opencl:fft:16", "opencl:plain:whole8", "opencl:dot:16:whole8",
+    "opengl:plain", "c:plain", "c:tile:8", "c:fft:8", "c:plain:whole8", "c:dot:16:whole8", "wgsl:plain",
+    "wgsl:group:4", "cuda:plain", "cuda:group:4", "opencl:tile:16:whole8", "cuda:groupdot:4:whole8",
+    "wgsl:groupdot:4:whole8", "opencl:groupdot:4:whole8", "glsl-vulkan:groupdot:4:whole8",
 )  # fmt: skip
 """Targets, schedules and variants."""
 
@@ -55,9 +56,9 @@ HEADS = (
 
 def row(model: str, name: str, folder: Path) -> list[str]:
     """Return a row of the table: of one kernel."""
-    target, schedule, *rest = name.split(":")
-    variant = rest[0] if rest else "full"
-    plan = plan_model(load_model(ROOT / "models" / f"{model}.safetensors"), target, "ieee", schedule, variant)
+    target, schedule, variant = split(name)
+    network = load_model(ROOT / "models" / f"{model}.safetensors")
+    plan = plan_model(network, target, "ieee", schedule, variant or FULL)
     write(compile_plan(plan), folder)
     begun = time.process_time()
     bound = max(check(folder / CERTIFICATE_NAME)["bound"]["output"])
@@ -70,7 +71,7 @@ def row(model: str, name: str, folder: Path) -> list[str]:
     read = time.process_time()
     proven = "0: the same bits" if bound == 0 else f"{bound:.2g}"
     seconds = [f"{checked - begun:.1f}", text, f"{read - checked:.1f}"]
-    return [model, target, schedule, variant, proven, f"{bound * 255:.2f}", *seconds]
+    return [model, target, schedule, variant or FULL, proven, f"{bound * 255:.2f}", *seconds]
 
 
 def rows(models: Sequence[str], kernels: Sequence[str]) -> Iterator[list[str]]:

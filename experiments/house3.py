@@ -66,14 +66,14 @@ SMALL = "small"
 """A network of 3 x 3 pixels with a border of zeros, whose layers fill no vector."""
 
 DENOISED: Mapping[tuple[str, str, str], Sequence[str]] = {
-    ("opencl", "minicubes", "full"): ("plain", "tile16", "fft32", "group4"),
-    ("opencl", "cornell", "full"): ("plain", "vector16", "tile8", "fft32x8"),
-    ("opencl", "glossy", "whole8"): ("plain", "tile16", "dot16", "groupdot"),
-    ("opencl", SMALL, "full"): ("plain", "tile4", "vector16", "group"),
-    ("c", "minicubes", "full"): ("plain", "tile16", "fft32"),
-    ("c", "cornell", "full"): ("tile8", "fft32x8"),
-    ("c", "glossy", "whole8"): ("plain", "dot16"),
-    ("c", SMALL, "full"): ("plain", "tile4", "tile8"),
+    ("opencl", "minicubes", "full"): ("plain", "tile:16", "fft:16", "group:4"),
+    ("opencl", "cornell", "full"): ("plain", "vector:16", "tile:8", "fft:8"),
+    ("opencl", "glossy", "whole8"): ("plain", "tile:16", "dot:16", "groupdot:4"),
+    ("opencl", SMALL, "full"): ("plain", "tile:4", "vector:16", "group:1"),
+    ("c", "minicubes", "full"): ("plain", "tile:16", "fft:16"),
+    ("c", "cornell", "full"): ("tile:8", "fft:8"),
+    ("c", "glossy", "whole8"): ("plain", "dot:16"),
+    ("c", SMALL, "full"): ("plain", "tile:4", "tile:8"),
     ("opengl", "cornell", "full"): ("plain",),
     ("opengl", "glossy", "whole8"): ("plain",),
     ("opengl", SMALL, "full"): ("plain", "inlined"),
@@ -223,9 +223,9 @@ SIZE, ROUNDS = 512, 9
 """Width and height of the frames that are timed, and how often each entry has its turn."""
 
 TIMED = (
-    ("opencl", "plain", "full"), ("opencl", "fft32", "full"), ("opencl", "tile16", "full"),
-    ("opencl", "dot16", "whole8"), ("c", "plain", "full"), ("c", "fft32", "full"), ("c", "tile16", "full"),
-    ("c", "dot16", "whole8"),
+    ("opencl", "plain", "full"), ("opencl", "fft:16", "full"), ("opencl", "tile:16", "full"),
+    ("opencl", "dot:16", "whole8"), ("c", "plain", "full"), ("c", "fft:16", "full"), ("c", "tile:16", "full"),
+    ("c", "dot:16", "whole8"),
 )  # fmt: skip
 """Backend, schedule and variant of the denoisers that are timed, of the mini-cubes model."""
 

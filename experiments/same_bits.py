@@ -181,7 +181,7 @@ def _executors() -> Iterator[Way]:
     yield Way("numpy", "NumPy", on(lambda: open_executor("numpy")))
     opencl, schedules = (
         on(lambda: open_executor("opencl")),
-        ("plain", "group4", "vector16", "tile16", "dot16"),
+        ("plain", "group:4", "vector:16", "tile:16", "dot:16"),
     )
     for environment in ({}, RELAXED):
         options = " ".join(environment.values())
@@ -194,7 +194,7 @@ def _executors() -> Iterator[Way]:
     yield Way("opengl", "GLSL, fragments", egl, options="vectors of 4", environment=NARROW)
     yield Way("opengl", "GLSL, fragments", on(lambda: open_executor("opengl", context="osmesa")))
     yield Way("opengl", "GLSL, fragments", egl, options="softpipe", environment=SOFTPIPE)
-    yield Way("opengl", "GLSL, compute", on(ComputeRunner), (), slow=("plain", "group"))
+    yield Way("opengl", "GLSL, compute", on(ComputeRunner), (), slow=("plain", "group:1"))
     yield Way("opengl", "GLSL ES", on(ESRunner))
     yield Way("opengl", "Godot", on(GodotRunner))
 
@@ -211,7 +211,7 @@ SOFTPIPE = {"GALLIUM_DRIVER": "softpipe", "LIBGL_ALWAYS_SOFTWARE": "1"}
 
 def _compilers() -> Iterator[Way]:
     """Yield compilers of C and C++, strict and as fast as they can."""
-    tiles = ("plain", "tile8", "dot16")
+    tiles = ("plain", "tile:8", "dot:16")
     for compiler, fast in C_COMPILERS.items():
         for options in dict.fromkeys(((), tuple(fast))):
             environment, text = {"CC": compiler}, " ".join(options)
@@ -220,12 +220,12 @@ def _compilers() -> Iterator[Way]:
         for compiler in ("g++", "clang++"):
             name = f"{language} as C++, {compiler}"
             relaxed = on(lambda made=runner: made(*FAST))
-            yield Way("c++", name, relaxed, ("plain", "group4"), " ".join(FAST), {"CXX": compiler})
+            yield Way("c++", name, relaxed, ("plain", "group:4"), " ".join(FAST), {"CXX": compiler})
 
 
 def _others() -> Iterator[Way]:
     """Yield Vulkan, WebGPU, ONNX and browsers."""
-    groups = ("group", "group4")
+    groups = ("group:1", "group:4")
     yield Way("vulkan", "WGSL, naga", on(WgpuRunner), slow=groups)
     yield Way("vulkan", "WGSL, Tint, SPIR-V", on(TintRunner), ("plain", *groups))
     tint_gles = on(lambda: TintRunner("opengles"))

@@ -37,9 +37,9 @@ from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
 
 TILES = (
-    ("c", "tile8", "full"), ("opencl", "tile8", "full"), ("opencl", "group", "full"),
-    ("wgsl", "group4", "full"), ("c", "dot16", "whole8"), ("opencl", "dot16", "whole8"),
-    ("cuda", "groupdot", "whole8"),
+    ("c", "tile:8", "full"), ("opencl", "tile:8", "full"), ("opencl", "group:1", "full"),
+    ("wgsl", "group:4", "full"), ("c", "dot:16", "whole8"), ("opencl", "dot:16", "whole8"),
+    ("cuda", "groupdot:4", "whole8"),
 )  # fmt: skip
 """Targets, schedules and variants of small kernels, in addition to the plain ones."""
 
@@ -235,34 +235,34 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
 
 LOAD = "    memcpy(to->lane, from, sizeof to->lane);"
 OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
-    ("a vector of a comma", "metal group full", "return float4(element", "return (float4)(element"),
-    ("one number for a group", "cuda group full", "float x0_0 = ", "__shared__ float x0_0; x0_0 = "),
-    ("one vector for a group", "opencl group full", "float4 part_0_0 =",
+    ("a vector of a comma", "metal group:1 full", "return float4(element", "return (float4)(element"),
+    ("one number for a group", "cuda group:1 full", "float x0_0 = ", "__shared__ float x0_0; x0_0 = "),
+    ("one vector for a group", "opencl group:1 full", "float4 part_0_0 =",
         "__local float4 part_0_0; part_0_0 ="),
-    ("more memory for a group", "metal group full", "threadgroup float tile",
+    ("more memory for a group", "metal group:1 full", "threadgroup float tile",
         "threadgroup float spare[200000]; threadgroup float tile"),
-    ("an operator that vectors lack", "cuda group full", "v1_0_0 += part_0_0;",
+    ("an operator that vectors lack", "cuda group:1 full", "v1_0_0 += part_0_0;",
         "v1_0_0 = v1_0_0 + part_0_0;"),
-    ("operands that an operator lacks", "cuda group full", "part_0_0 += m * x0_0", "part_0_0 += x0_0 * m"),
-    ("a vector for a number", "opencl group full", "float4 t4 = ", "float t4 = "),
-    ("a size behind its use", "opencl group full", "#define GROUP_HEIGHT 8\n", ""),
-    ("vectors of another size", "opencl dot16 whole8", "typedef int16 sums", "typedef int8 sums"),
-    ("no header of a function", "c dot16 whole8", "#include <string.h>\n", ""),
-    ("a copy to itself", "c dot16 whole8", LOAD, LOAD + LOAD.replace("from", "to->lane")),
-    ("a copy of less than nothing", "c dot16 whole8", LOAD, LOAD + "memcpy(to->lane, from, -4);"),
-    ("weights seen as integers", "c dot16 whole8", LOAD, "const int32_t *w = (const int32_t *)from;\n"
+    ("operands that an operator lacks", "cuda group:1 full", "part_0_0 += m * x0_0", "part_0_0 += x0_0 * m"),
+    ("a vector for a number", "opencl group:1 full", "float4 t4 = ", "float t4 = "),
+    ("a size behind its use", "opencl group:1 full", "#define GROUP_HEIGHT 8\n", ""),
+    ("vectors of another size", "opencl dot:16 whole8", "typedef int16 sums", "typedef int8 sums"),
+    ("no header of a function", "c dot:16 whole8", "#include <string.h>\n", ""),
+    ("a copy to itself", "c dot:16 whole8", LOAD, LOAD + LOAD.replace("from", "to->lane")),
+    ("a copy of less than nothing", "c dot:16 whole8", LOAD, LOAD + "memcpy(to->lane, from, -4);"),
+    ("weights seen as integers", "c dot:16 whole8", LOAD, "const int32_t *w = (const int32_t *)from;\n"
         "    for (int i = 0; i < LANES; ++i) { to->lane[i] = w[i]; }"),
-    ("an address of other numbers", "opencl dot16 whole8", "((const fours *)(", "((const uint *)("),
-    ("an address of another space", "opencl group full",
+    ("an address of other numbers", "opencl dot:16 whole8", "((const fours *)(", "((const uint *)("),
+    ("an address of another space", "opencl group:1 full",
         "__global const float4 *w = (__global const float4 *)", "const float4 *w = (const float4 *)"),
-    ("a cast to integers", "opencl group full",
+    ("a cast to integers", "opencl group:1 full",
         "const float4 *w = (__global const float4 *)", "const int4 *w = (__global const int4 *)"),
-    ("truths as floats", "opencl group full", "int4 t47 =", "float4 t47 ="),
-    ("a union of other numbers", "opencl tile8 full", "]; float number", "]; int number"),
-    ("a union of other sizes", "opencl tile8 full", " * 8]; }", " * 4]; }"),
-    ("a component of a colour", "cuda group full", "v90_0_0.x;", "v90_0_0.r;"),
-    ("a pragma of no loop", "c tile8 full", "    int top = y", "    WAMNET_UNROLL int top = y"),
-    ("a row of an array by another", "c tile8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
+    ("truths as floats", "opencl group:1 full", "int4 t47 =", "float4 t47 ="),
+    ("a union of other numbers", "opencl tile:8 full", "]; float number", "]; int number"),
+    ("a union of other sizes", "opencl tile:8 full", " * 8]; }", " * 4]; }"),
+    ("a component of a colour", "cuda group:1 full", "v90_0_0.x;", "v90_0_0.r;"),
+    ("a pragma of no loop", "c tile:8 full", "    int top = y", "    WAMNET_UNROLL int top = y"),
+    ("a row of an array by another", "c tile:8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
 )  # fmt: skip
 """What a fault is, in which language, schedule and variant, and what it puts instead of what."""
 

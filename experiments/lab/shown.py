@@ -287,8 +287,8 @@ def generalisation(records: Records) -> str:
 
 
 BENCH = {
-    "opencl:fft32": "OpenCL, PoCL, `fft32`: first layer by FFT",
-    "opencl:tile16": "OpenCL, PoCL, `tile16`: register tiles",
+    "opencl:fft:16": "OpenCL, PoCL, `fft:16`: first layer by FFT",
+    "opencl:tile:16": "OpenCL, PoCL, `tile:16`: register tiles",
     "opencl:plain": "OpenCL, PoCL, `plain`: the human-readable kernel",
     "opengl:inlined": "OpenGL, llvmpipe, `inlined`",
     "torch.compile": "`torch.compile`",
@@ -296,9 +296,9 @@ BENCH = {
     "onnxruntime": "ONNX Runtime",
     "oidn:fast": "Open Image Denoise, fast (another network)",
     "oidn:high": "Open Image Denoise, high",
-    "c:tile16": "C, GCC, `tile16`",
-    "opencl:dot16:whole8": "OpenCL, PoCL, integers, `dot16`: byte products",
-    "c:dot16:whole8": "C, GCC, integers, `dot16`",
+    "c:tile:16": "C, GCC, `tile:16`",
+    "opencl:dot:16:whole8": "OpenCL, PoCL, integers, `dot:16`: byte products",
+    "c:dot:16:whole8": "C, GCC, integers, `dot:16`",
     "onnxruntime:int8": "ONNX Runtime, 8 bits",
     "openvino:int8": "OpenVINO, 8 bits",
 }  # contenders of `wamnet bench` that a page shows, with their names there

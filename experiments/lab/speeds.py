@@ -23,12 +23,12 @@ def speed_against_error(record: str) -> TableOf:
 
 
 SPEED_SHORT = {
-    ("window6+rank12", "opencl tile16"): "wamnet, window of 6 pixels and rank 12",
-    ("window8+rank16", "opencl tile16"): "wamnet, window of 8 pixels and rank 16",
-    ("whole", "opencl fft32"): "wamnet, FFT (`fft32`)",
-    ("whole", "c fft32"): "wamnet, FFT (`fft32`) in C, by GCC",
-    ("whole", "opencl tile16"): "wamnet, register tiles (`tile16`)",
-    ("whole8", "opencl dot16"): "wamnet, bit-identical everywhere (`whole8`)",
+    ("window6+rank12", "opencl tile:16"): "wamnet, window of 6 pixels and rank 12",
+    ("window8+rank16", "opencl tile:16"): "wamnet, window of 8 pixels and rank 16",
+    ("whole", "opencl fft:16"): "wamnet, FFT (`fft:16`)",
+    ("whole", "c fft:16"): "wamnet, FFT (`fft:16`) in C, by GCC",
+    ("whole", "opencl tile:16"): "wamnet, register tiles (`tile:16`)",
+    ("whole8", "opencl dot:16"): "wamnet, bit-identical everywhere (`whole8`)",
     ("whole", "opencl plain"): "wamnet, the human-readable kernel (`plain`)",
     ("torch.compile", "–"): "the same network in `torch.compile`",
     ("onnxruntime", "–"): "the same network in ONNX Runtime",

@@ -2,7 +2,7 @@
 
 Eager, and compiled by `torch.compile` with its default options. Pictures are in channels-last order, which is
 the order of rows with interleaved channels: nothing is copied on the way in or out. Compiled with `torch.fft`
-the first layer is computed by the algorithm of our schedule `fft32`, in tiles of `TILE` pixels [`_spectra`].
+the first layer is computed by the algorithm of our schedule `fft:16`, in tiles of `TILE` pixels [`_spectra`].
 
 It trains too, eager and with its own Adam: a peer of the compiled trainer [`trainer`].
 """
@@ -27,7 +27,7 @@ MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""
 
 TILE = 32
-"""Width and height of a tile of spectra, as of the schedule `fft32`."""
+"""Width and height of a tile of spectra, as of the schedule `fft:16`."""
 
 
 def _spectra(model: Model) -> Callable[[Any], Any]:

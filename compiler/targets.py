@@ -116,13 +116,12 @@ def dots(dialect: Dialect) -> tuple[Schedule, ...]:
 
 
 def groups(dialect: Dialect) -> tuple[Schedule, ...]:
-    """Return the schedules for graphics processors; none of them has been measured on one."""
+    """Return the schedules for graphics processors: more pixels share weights, until registers are short."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
-    four = "the same with 4 pixels an item, which share each weight"
-    found: list[Schedule] = [
-        Grouped("group:1", one, dialect, 1),
-        Grouped("group:4", four, dialect, 4, instead="group:1"),
-    ]
+    found: list[Schedule] = [Grouped("group:1", one, dialect, 1)]
+    for pixels in (2, 4):
+        idea = f"the same with {pixels} pixels an item, which share each weight"
+        found.append(Grouped(f"group:{pixels}", idea, dialect, pixels, instead="group:1"))
     if dialect.words:
         idea = f"group:4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
         found.append(GroupDot("groupdot:4", idea, dialect, 4, instead="group:4"))

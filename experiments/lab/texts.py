@@ -84,7 +84,8 @@ def fact(records: Records, record: str, key: str) -> str:
     """Return the machine that a record is from, or the version of a package there."""
     data = records[record].data()
     if key == "machine":
-        return f"{data['machine']['cores']} cores of {data['machine']['processor']}"
+        here = data["machine"]
+        return str(here.get("device") or f"{here['cores']} cores of {here['processor']}")
     if key not in data["versions"]:
         raise InputError("figure", f"{record}@{key}", "the record does not know that package", "correct it")
     return str(data["versions"][key])

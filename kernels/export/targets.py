@@ -106,7 +106,7 @@ def _texture(side: int) -> Limit:
     return Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
 
 
-GROUPED = ("group:4", "group:1", PLAIN)
+GROUPED = ("group:4", "group:2", "group:1", PLAIN)
 """Schedules of languages for graphics processors, the usual one first."""
 
 GROUPED_BYTES = (*GROUPED, "groupdot:4")
@@ -228,7 +228,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "glsl-compute",
         "GLSL 4.30, compute shader",
-        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE"),
+        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE", ("group:2", *GROUPED)),
         _as(".comp"),
         "numbered",
         _buffers_code("GLuint"),

@@ -79,8 +79,9 @@ class NvccRunner(BufferRunner):
             name = ctypes.create_string_buffer(256)
             version = self._runtime.wamnet_name(name, len(name))
             if version < 0:
-                raise ExecutorUnavailable(f"CUDA: no device (error {-version}): a driver of NVIDIA is needed")
-        except CompileError as error:
+                raise ExecutorUnavailable(f"no device (error {-version}): a driver of NVIDIA is needed")
+        except (CompileError, ExecutorUnavailable) as error:
+            self.close()
             # -arch=native is refused where there is no device.
             raise ExecutorUnavailable(f"CUDA: {error}") from None
         self.device = f"{name.value.decode()}, CUDA {version // 1000}.{version % 1000 // 10}"

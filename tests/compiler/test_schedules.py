@@ -174,7 +174,9 @@ OPENCL_PLAIN = TARGETS["opencl"].schedules[0]
 
 
 def test_unknown_schedule_is_told_with_the_known_ones():
-    known = "plain, vector:16, tile:16, tile:8, tile:4, fft:16, fft:8, fft:4, dot:16, group:1, group:4"
+    known = (
+        "plain, vector:16, tile:16, tile:8, tile:4, fft:16, fft:8, fft:4, dot:16, group:1, group:2, group:4"
+    )
     with pytest.raises(
         CompileError, match=rf"schedule 'fast': unknown .*choose one of {known}, groupdot:4\)$"
     ):

@@ -56,7 +56,7 @@ def cases(draw):
     }
 
 
-ONE_IMAGE = (("opengl", "group:1"), ("opengl", "group:4"))
+ONE_IMAGE = tuple(("opengl", f"group:{pixels}") for pixels in (1, 2, 4))
 """Schedules that write four channels: a first pass with more is plain. Mesa compiles four layers of straight
 code in a minute, so that the paper's network is left out."""
 

@@ -32,7 +32,7 @@ LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] 
 SPECTRA = ("fft:16", "fft:8", "fft:4")
 """The schedules of transforms."""
 
-SHADERS = (("opengl", "group:1"), ("opengl", "group:4"))
+SHADERS = tuple(("opengl", f"group:{pixels}") for pixels in (1, 2, 4))
 """The schedules of compute shaders."""
 
 LARGEST = {
@@ -44,7 +44,7 @@ LARGEST = {
 straight code in a time that grows with the square; a tile's sums must fit the stack. The other schedules'
 layers may have more neurons than a block."""
 
-LARGEST_LAYERS = {("opencl", "group:1"): (12, 30), ("opencl", "group:4"): (12, 30)}
+LARGEST_LAYERS = {("opencl", f"group:{pixels}"): (12, 30) for pixels in (1, 2, 4)}
 """The same of schedules that unroll layers on PoCL."""
 
 UNLIMITED = (12, 70)

@@ -50,7 +50,7 @@ WIDTH, HEIGHT = 40, 27
 SEED = 4_000_000_007
 """Seed of the noise, which no training has."""
 
-LONG_TO_COMPILE = ("inlined", "group:1", "group:4")
+LONG_TO_COMPILE = ("inlined", "group:1", "group:2", "group:4")
 """Schedules in straight code: Mesa compiles one of these for 40 s on a core that has nothing else to do."""
 
 DISPLAY_STEP = 1 / 255

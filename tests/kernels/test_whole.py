@@ -25,7 +25,7 @@ EXAMPLES = max(settings.default.max_examples // 50, 1)
 WAYS = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules]
 """Each schedule with its target."""
 
-SLOW = {"inlined", "group:1", "group:4", "groupdot:4"}
+SLOW = {"inlined", "group:1", "group:2", "group:4", "groupdot:4"}
 """Schedules in straight code, which compilers take long for."""
 
 

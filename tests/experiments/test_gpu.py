@@ -1,0 +1,89 @@
+"""Denoising kernels on a GPU: the rehearsal on PoCL, wrong and missing kernels, and a time limit."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+import gpu
+import numpy as np
+import pytest
+from lab import nvcc
+from lab.results import Results
+
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+
+NETWORK = "paper's layers"
+
+
+def measured(tmp_path, *options):
+    gpu.main(["--only", "opencl", "--models", NETWORK, "--rounds", "1", "-o", str(tmp_path), *options])
+    return Results.read(tmp_path / "gpu.json")
+
+
+def test_a_kernel_is_checked_and_timed_and_one_that_does_not_exist_is_named(executor_named, tmp_path, capsys):
+    executor_named("opencl")
+    found = measured(tmp_path, "--size", "32", "--schedules", "tile:8,tile:5")
+    values = found.get(f"opencl, tile:8, {NETWORK}", 0)
+    assert 0 < values["share"] <= 1
+    assert 0 < values["error"] < 1e-5
+    assert values["least"] <= values["ms"] <= values["most"]
+    assert "did you mean 'tile:8'" in found.get(f"opencl, tile:5, {NETWORK}", 0)["missing"]
+    shown = capsys.readouterr()
+    assert f"| opencl | tile:8 |  |  |  |  | {values['ms']:.2f} |" in shown.out
+    assert "tile:5" in shown.err
+
+
+def test_a_process_that_takes_too_long_ends(executor_named, tmp_path):
+    executor_named("opencl")
+    found = measured(tmp_path, "--size", "32", "--schedules", "plain", "--seconds", "0.1")
+    (record,) = found.records()
+    assert "status -9" in record["values"]["missing"]
+
+
+@pytest.mark.parametrize(
+    ("change", "least"), [(lambda v: v, 0), (lambda v: v + 1, 1), (lambda v: v * np.float32(np.nan), 1)]
+)
+def test_errors_are_shares_of_the_bound(change, least):
+    value = np.zeros((2, 2, 3), np.float32)
+    patch = (slice(0, 2), slice(0, 2))
+    wanted = gpu.Wanted([patch], [value.astype(np.float64)], [np.full(value.shape, 0.5)])
+    error, share = wanted.share(change(value))
+    assert (share > 1, error >= least) == (least == 1, True)
+
+
+def test_what_is_prepared_is_what_is_computed(tmp_path):
+    plan, images = gpu.planned(NETWORK, "numpy", "plain"), gpu.images_for(NETWORK, (16, 70))
+    computed = gpu.wanted(plan, NETWORK, images, None)
+    for _ in range(2):  # written, then read
+        kept = gpu.wanted(plan, NETWORK, images, tmp_path)
+        for name in ("value", "bound"):
+            assert all(
+                np.array_equal(*pair)
+                for pair in zip(getattr(kept, name), getattr(computed, name), strict=True)
+            )
+
+
+def test_a_group_may_have_another_size():
+    plan = gpu.planned("minicubes", "opengl", "group:2@8x4s")
+    assert plan.schedule.group == (8, 4)
+    assert not plan.schedule.dialect.wide
+    assert gpu.planned("minicubes", "opengl", "group:2").schedule.dialect.wide
+
+
+def test_an_unknown_language_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"language or network 'hlsl': must be among cuda, opencl"):
+        gpu.main(["--only", "hlsl", "-o", str(tmp_path)])
+
+
+def test_nvcc_without_a_device_or_a_compiler_is_missing(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(ExecutorUnavailable, match="nvcc is not installed"):
+        nvcc.NvccRunner()
+
+
+def test_tasks_end_with_what_may_not_end():
+    given = argparse.Namespace(only=("opencl", "torch"), models=("minicubes",), schedules=())
+    listed = list(gpu.tasks(given))
+    assert [task[0] for task in listed] == ["opencl", "torch", "opencl", "opencl", "opencl"]
+    assert json.dumps(listed[-1]) == '["opencl", "minicubes, integers", ["groupdot:4"]]'

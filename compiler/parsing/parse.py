@@ -293,7 +293,7 @@ class Parser(Expressions):
         step = const(1)
         if self.language.lets and self._now(1) == "++":
             self._take(counter, "++")
-        elif not self._has("++", counter):
+        elif self.language.lets or not self._has("++", counter):
             self._take(counter, "+=")
             step = self._expression()
         self._take(")", "{")

@@ -339,3 +339,11 @@ def test_refused(tiny, old, new, reason):
     assert parse(source, "opencl", channels) == canonical(kernel)
     with pytest.raises(Unread, match=reason):
         parse(source.replace(old, new, 1), "opencl", channels)
+
+
+def test_a_step_of_another_language_is_refused(tiny):
+    """`++j` is no statement of WGSL."""
+    source = rendered(plain(tiny), "wgsl", pack(tiny))
+    assert "j++) {" in source
+    with pytest.raises(Unread, match="no 'j'"):
+        parse(source.replace("j++) {", "++j) {", 1), "wgsl", {"image_a": 1})

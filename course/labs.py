@@ -68,7 +68,7 @@ LABS = (
     Lab("lab07_network", "A network and its gradient", "SIR-1, SIR-2, SIR-7", 90),
     Lab("lab08_adam", "Adam and training", "ADM-1, TRN-4", 60),
     Lab("lab09_tracer", "An intermediate representation and a tracer", "IR-1, IR-2, IR-3, IR-5, IR-6", 120),
-    Lab("lab10_emitter", "An emitter for OpenCL and GLSL", "IR-3, IR-6, KER-1", 120),
+    Lab("lab10_emitter", "A schedule and a language", "IR-3, KER-24, KER-25, KER-26", 120),
     Lab("lab11_bound", "A bound and a certificate", "PRO-6, CER-2, CER-3", 120),
     Lab("lab12_integers", "Integers, the same bits", "WHO-3, WHO-4, WHO-5", 75),
     Lab("extra1_sine", "A sine for kernels", "SIN-1, SIN-3, SIN-4", 90),

@@ -70,6 +70,7 @@ RECORDS = {
         ("wamnet.refimpl.light.intersection", ("Surface",)),
         ("wamnet.refimpl.network.dataset", ("Window",)),
         ("wamnet.compiler.core.ir", ("Program", "Node", "Type", "Gather", "Image")),
+        ("wamnet.compiler.kernel.kernel", ("Expr", "Type", "Let", "Store", "For")),
     )
     for name in names
 } | {f"{STUDENT}:{name}": (__name__, name) for name in ("Node", "Program")}

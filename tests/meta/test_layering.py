@@ -136,6 +136,53 @@ def test_rooms_are_small_and_import_one_way(house):
     house.refuse(wrong, "A room has at most 20 modules and imports those before it: move the code.")
 
 
+CIRCLES = (
+    {f"compiler.reading.{name}" for name in (
+        "builtins", "claim", "groups", "kinds", "machine", "memory", "together", "words",
+    )},
+    {"kernels.devices.opengl_executor", "kernels.devices.registry"},
+    {"refimpl.light.scene", "refimpl.light.shapes.box", "refimpl.light.shapes.shape"},
+)  # fmt: skip
+"""Modules that import each other today, also inside functions or for type checkers. No circle is added."""
+
+
+def reached(graph, module):
+    """Return the modules that a module imports, directly or by others."""
+    found, ahead = set(), [module]
+    while ahead:
+        new = graph[ahead.pop()] - found
+        found |= new
+        ahead += new
+    return found
+
+
+def circles(graph):
+    """Return the groups of modules that import each other; `graph`: what each one imports."""
+    every = {module: reached(graph, module) for module in graph}
+    return {frozenset(m for m in every[one] if one in every[m]) for one in graph if one in every[one]}
+
+
+def test_no_circle_of_imports_is_added(house):
+    modules = {source.path.removesuffix(".py").replace("/", "."): source for source in house.parts()}
+    graph = {
+        module: {
+            own
+            for _, name in imports(source)
+            for end in (name, name.rpartition(".")[0])
+            if (own := end.removeprefix("wamnet.")) in modules and own != module
+        }
+        for module, source in modules.items()
+    }
+    assert sum(map(len, graph.values())) > len(graph), "imports are found"
+    added = [sorted(found) for found in circles(graph) if not any(found <= known for known in CIRCLES)]
+    assert added == [], "Modules import each other: move what both need to a module below them."
+
+
+def test_circles_are_found():
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a", "d"}, "e": set()}
+    assert circles(graph) == {frozenset("bc"), frozenset("d")}
+
+
 def test_the_wheel_does_not_grow():
     total = sum(map(budget.lines, budget.packages().values()))
     assert total <= budget.MAX_LINES, "The wheel has more lines than MAX_LINES: remove some elsewhere."

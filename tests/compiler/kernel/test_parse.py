@@ -342,7 +342,7 @@ def test_refused(tiny, old, new, reason):
 
 
 def test_a_step_of_another_language_is_refused(tiny):
-    """`++j` is no statement of WGSL."""
+    """WGSL has `j++` as a statement, and not `++j`."""
     source = rendered(plain(tiny), "wgsl", pack(tiny))
     assert "j++) {" in source
     with pytest.raises(Unread, match="no 'j'"):

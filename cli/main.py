@@ -229,7 +229,7 @@ def _usage(error: Any) -> str:
     """Return what is wrong with an option, and where help is."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "wamnet"
-    return f"{error.format_message().rstrip('.')}; see {command} --help"
+    return f"{error.format_message().replace('Value error, ', '').rstrip('.')}; see {command} --help"
 
 
 def _fail(message: str) -> int:

@@ -78,6 +78,8 @@ def start(
     """Write the skeletons of all labs, a Makefile and a README to a new folder."""
     from .start import begin
 
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError("output folder", str(folder), "is not empty", "name another folder")
     with making_folder(folder) as new:
         names = begin(new)
     say(

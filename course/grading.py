@@ -77,7 +77,7 @@ def grade(
         try:
             files = sources(folder)
             if lab.file not in files:
-                rule = "a plain file of this name, at most one megabyte"
+                rule = "it is in another folder, which is named after the lab; or not a plain file below 1 MB"
                 raise Wrong("", LOADING, lab.file, "no such file", rule)
             with deadline(limits.longest_wait_s):
                 student.request(os.getpid)

@@ -72,12 +72,10 @@ def certify(
     from ...compiler.reading.check import check_text
     from ...compiler.reading.lanes import Unread
 
-    path = file / CERTIFICATE_NAME if file.is_dir() else file
+    inside = [file / CERTIFICATE_NAME, file / "denoise" / CERTIFICATE_NAME] if file.is_dir() else [file]
+    path = next(filter(Path.is_file, inside), inside[0])
     if not path.is_file():
-        rule = "not found"
-        raise InputError(
-            "certificate", str(path), rule, "kernels of profile ieee have one; see wamnet compile"
-        )
+        raise InputError("certificate", str(path), "not found", "only kernels of profile ieee have one")
     if source is not None:
         if not text:
             raise InputError(

@@ -231,7 +231,8 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
         passed, unsupported = known.found.get(PASS, 0), known.found.get(UNSUPPORTED, 0)
         others = {word: n for word, n in known.found.items() if word not in (PASS, UNSUPPORTED)}
         text = ", ".join(f"{n} {word}" for word, n in others.items()) or "0"
-        rows.append((known.kind, str(known.cases), str(passed), text, str(unsupported), f"{known.ratio:.2f}"))
+        ratio = f"{known.ratio:.2f}" if passed else "-"
+        rows.append((known.kind, str(known.cases), str(passed), text, str(unsupported), ratio))
     header = ("kind", "cases", "pass", "failed", "unsupported", "error / bound")
     table(f"Conformance of {name}, profile {profile}", header, rows)
     failed = sum(verdict.failed for verdict in verdicts)

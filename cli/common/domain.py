@@ -45,7 +45,8 @@ def check_domain(
         way_out = "export it as the training frames were, or give --anyway"
         raise InputError(f"{path}: distance from the model's domain", round(found.distance, 2), rule, way_out)
     if foreign:
-        say(f"{path}: another program's frame, of which the model reads {read}")
+        scene = model.info.get("trained_on_scene", "other frames")
+        say(f"{path}: another program's frame, of which the model, trained on {scene}, reads {read}")
     if found and domain and is_outside:
         named = [f"outside the model's domain: {'; '.join([how_far(found, domain), *named])}"]
     for sentence in named:

@@ -189,7 +189,7 @@ def _layer(
                 for (index, prefix), planes in complete.items()
             ]
             rule = f"each of them could be {name}"
-            way_out = "name a part or view layer with denoise --view-layer, or leave others out"
+            way_out = "export one of them alone, or name a part or view layer with denoise --view-layer"
             raise InputError(f"{path}: layers", ", ".join(sorted(labels)), rule, way_out)
         if complete:
             return next(iter(complete.values()))

@@ -227,7 +227,8 @@ def far_away(student: Any) -> None:
     bound = 2.3 * FAR * 16 * 2.0**-24
     if not error <= bound:
         lost = (
-            "b * b - (f . f - r * r) loses the radius: measure the discriminant at the nearest point f + b d"
+            "b * b - (f . f - r * r) loses the radius: measure the discriminant at the point of the ray that "
+            "is nearest to the centre, f - (f . d) d"
         )
         what = f"the error at a distance of {FAR:g} in float32"
         raise Wrong("ISC-6", what, f"at most {bound:.3g}", f"{error:.3g}", lost)

@@ -57,8 +57,11 @@ RESULTS = ("quality.md", "hard-light.md", "paper.md")
 SPEED = ("frames.md", "path-tracer.md", "rows.md")
 """Pages of speed/, in their order."""
 
-LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs)/[\w./-]+)")
-"""A link from docs/ to spec/, or back, as it works in the repository."""
+LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs|examples)/[\w./-]+)")
+"""A link from docs/ to spec/ or examples/, or back, as it works in the repository."""
+
+DOWNLOADS = ("examples/scenes/still-life.json", "examples/c99/wamnet.c", "spec/vectors/schema.json")
+"""Files that pages link to and that the wheel does not have as files of a user's."""
 
 FOREIGN = re.compile(r"https://(?:unpkg\.com|api\.github\.com)/[\w./@-]*")
 """Addresses in the theme's scripts, for diagrams and counts of stars that this site does not have."""
@@ -88,7 +91,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"API": ["reference.md"]},
         {"Spec": parts},
         {"Results": [*measured("results", RESULTS), *measured("speed", SPEED)]},
-        {"Contribute": ["recipes.md"]},
+        {"Contribute": ["recipes.md", "trials.md"]},
     ]
     return config
 
@@ -124,7 +127,8 @@ def in_order(docs: Path) -> list[str]:
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Bring in the spec and the source files that texts name."""
     texts = {path: path.read_text() for path in [*SPEC.glob("*.md"), *Path(config.docs_dir).rglob("*.md")]}
-    for path in [*sorted(SPEC.glob("*.md")), SPEC / "vectors/README.md"]:
+    pages = [*sorted(SPEC.glob("*.md")), SPEC / "vectors/README.md"]
+    for path in [*pages, *(ROOT / name for name in DOWNLOADS)]:
         name = path.relative_to(ROOT).as_posix()
         files.append(File.generated(config, name, abs_src_path=str(path)))
     files.append(File.generated(config, figures.LIVE, content=figures.live_page()))

@@ -282,19 +282,18 @@ def _moving(facts: Mapping[str, Any]) -> list[str]:
 def _rays(facts: Mapping[str, Any]) -> list[str]:
     """Return the line about features of more camera rays than the colour's."""
     rays, own = facts["model"]["feature_spp"], facts["scene"] and facts["scene"]["feature_rays"]
-    if rays < 2 or facts["scene"] is None:
+    if rays < 2:
         return []
-    if own:
-        return [
-            f"* The model has learned from features that are means over {rays} camera rays: the path kernel "
-            f"traces {own['count']}, spread evenly ({own['sampler']}), whatever the number of samples. Give "
-            "the encoding the sums of one launch, of fewer samples than that."
-        ]
-    return [
-        f"* The model has learned from features that are means over {rays} camera rays. Run the path kernel "
-        f"again with samples = {rays}, divide all planes but the colour's by {rays}, and give the encoding "
-        "those, with sample_count = 1; with features of one ray edges are worse."
-    ]
+    line = f"* The model was trained on features averaged over {rays} camera rays per pixel"
+    if facts["scene"] is None:
+        line += ": give it such images; with features of one ray edges are worse."
+    elif own:
+        line += f": the path kernel traces {own['count']}, spread evenly ({own['sampler']}), for any "
+        line += "number of samples. Give the encoding the sums of one launch, of fewer samples than that."
+    else:
+        line += f". Run the path kernel with samples = {rays}, divide all planes but the colour's by {rays}, "
+        line += "and give the encoding those, with sample_count = 1; with one ray edges are worse."
+    return [line]
 
 
 def _proof(facts: Mapping[str, Any], denoiser: Artifact | None) -> list[str]:

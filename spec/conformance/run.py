@@ -120,7 +120,7 @@ def introduced(session: Session) -> Mapping[str, Any]:
         return session.hello()
     except NoAnswerError as error:
         rule = f"must answer to hello ({error.verdict}: {error})"
-        way_out = "see spec/conformance.md; --timeout gives it more time"
+        way_out = "see spec/conformance.md; give a path such as ./mine, flush each answer; or set --timeout"
         raise InputError("--program", " ".join(session.command), rule, way_out) from None
 
 

@@ -22,6 +22,12 @@ def test_a_certificate_holds(wamnet, kernel, name):
     assert "of half an 8-bit step" in outcome.out
 
 
+def test_the_folder_of_an_export_has_a_certificate(wamnet, samples):
+    """It lies in the folder of the denoiser."""
+    assert wamnet("export", samples / "model.safetensors", "--target", "c", "-o", "made").status == 0
+    assert "holds: |output - reference| <= " in wamnet("certify", "made", "--no-text").out
+
+
 def test_the_text_is_read(wamnet, kernel):
     assert "\ntext: computes that program: " in wamnet("certify", kernel).out
     assert "text:" not in wamnet("certify", kernel, "--no-text").out

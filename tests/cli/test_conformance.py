@@ -47,6 +47,16 @@ def test_an_executor_and_the_reference_pass(wamnet):
         assert "14 of 14 cases passed" in done.out
 
 
+def test_a_kind_that_is_not_supported_has_no_error(wamnet, program):
+    done = wamnet("conformance", "--program", program(), "-k", "random.block", "-k", "metric.mse")
+    rows = {words[0]: words for words in map(str.split, done.out.splitlines()) if words}
+    assert (rows["random.block"][-1], rows["metric.mse"][-1]) == ("0.00", "-")
+
+
+def test_a_program_that_is_not_found_is_named_by_a_path(refused):
+    assert "give a path such as ./mine" in refused("conformance", "--program", "mine", "-k", "sine")
+
+
 def test_a_failure_tells_everything_and_how_to_repeat_it(wamnet, program):
     command = program("1 / 2.4", "1 / 2.2")
     done = wamnet("conformance", "--program", command, "-k", "display")

@@ -38,8 +38,15 @@ def test_a_folder_has_skeletons_and_no_answers(started):
 
 def test_a_folder_that_holds_something_is_refused(started, refused):
     (started / "lab01_sphere.py").write_text("mine")
-    assert "output folder 'mine': is not empty" in refused("course", "start", "mine")
+    told = refused("course", "start", "mine")
+    assert "output folder 'mine': is not empty (name another folder)" in told  # it has no option -o
     assert (started / "lab01_sphere.py").read_text() == "mine"
+
+
+def test_a_check_in_another_folder_says_where_answers_are_named(started, wamnet):
+    outcome = wamnet("course", "check", "1")
+    assert outcome.status == 1
+    assert "it is in another folder, which is named after the lab" in outcome.out
 
 
 def test_a_check_says_clause_expected_found_and_likely(started, wamnet):

@@ -36,6 +36,11 @@ def test_a_range_that_is_none_is_refused(refused, text):
     assert "two numbers in order" in told
 
 
+def test_weights_without_a_graph_are_named(refused, samples):
+    told = refused("import", samples / "model.safetensors")
+    assert "holds weights, no graph (use torch.onnx.export)" in told
+
+
 def test_other_commands_refuse_it(wamnet, refused):
     assert wamnet("import", FOLDER / "pixels.onnx", "-o", "p.safetensors").status == 0
     told = refused("tune", "p.safetensors")

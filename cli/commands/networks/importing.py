@@ -75,6 +75,8 @@ def import_model(
     from ....models.model_file import save_model
 
     check_input(network)
+    if network.suffix == SUFFIX:
+        raise InputError("network", str(network), "holds weights, no graph", "use torch.onnx.export")
     path = output or Path(network.with_suffix(SUFFIX).name)
     check_output(path, (SUFFIX,), [network])
     given = dict(map(_range, ranges or []))

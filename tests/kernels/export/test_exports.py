@@ -197,6 +197,14 @@ def test_what_is_drawn_shows_which_numbers_move(kind):
     assert not np.array_equal(motion.other(settings), inputs.values(scene))
 
 
+def test_the_rays_of_features_are_stated_without_a_scene():
+    """A host that brings its own features has to know how many rays they are averaged over."""
+    made = export(Request(replace(model(), info={"trained_on_feature_spp": "16"}), "glsl"))
+    told = "The model was trained on features averaged over 16 camera rays per pixel: give it such images"
+    assert told in made.files["README.md"].decode()
+    assert "camera rays" not in export(Request(model(), "glsl")).files["README.md"].decode()
+
+
 def test_the_domain_is_exported():
     """DOM-6: the manifest has what the model states, the README its threshold; without one neither."""
     rng = np.random.default_rng(1)

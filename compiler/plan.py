@@ -255,11 +255,11 @@ def plan_program(
     """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     if kernel_gather(program).whole and rank:
-        raise CompileError(f"rank {rank}: rounds sums, and an integer network does not (leave it out)")
+        raise CompileError(f"rank {rank}: is for float networks, not for integer ones (leave it out)")
     common = analysed(program)
     if rank and chosen.most is not None and rank > chosen.most:
         raise CompileError(
-            f"rank {rank}: the image between both passes has as many channels, and {chosen.language} "
+            f"rank {rank}: the intermediate image has as many channels, and {chosen.language} "
             f"writes at most {chosen.most}; use a smaller rank, or OpenCL or C, which have no such limit"
         )
     cut = factor(common, rank, chosen.widest) if rank else None
@@ -274,9 +274,9 @@ def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:
         if enclosure.overflows:
             place = f"layer {layer}, %{index}" if layer >= 0 else f"%{index}"
             raise CompileError(
-                f"{node.op} ({place}) may hold numbers up to {np.nanmax(enclosure.size):.3g}: float32 ends "
-                f"at {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or features of a "
-                "smaller range, or profile native, which then promises nothing"
+                f"{node.op} ({place}) may reach {np.nanmax(enclosure.size):.3g}: the float32 "
+                f"maximum is {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or features "
+                "of a smaller range, or profile native, which then has no bound"
             )
 
 
@@ -285,10 +285,10 @@ def _refuse_domain(
 ) -> None:
     """Raise: a sine may be given an argument for which nothing is proven."""
     raise CompileError(
-        f"sine {number} of {count} (layer {number - 1}, %{index}) may be given arguments from {found[0]:.6g} "
+        f"sine {number} of {count} (layer {number - 1}, %{index}) may get arguments from {found[0]:.6g} "
         f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; "
         "use a smaller omega_0, smaller weights or features of a smaller range, or profile native, which "
-        "promises less"
+        "guarantees less"
     )
 
 

@@ -368,7 +368,7 @@ def parse(text: str) -> Variant:
             r"(without-)([a-z]+)|(window|hidden|rank|sine|half|whole)([1-9][0-9]{0,3})", part
         )
         if match is None:
-            rule = f"{part!r} is not an approximation; there are: {KNOWN}"
+            rule = f"{part!r} is not an approximation; supported: {KNOWN}"
             raise InputError("variant", text, rule, f"use {FULL}, or some of them, as in {EXAMPLE}")
         name, feature, kind, number = match.groups()
         steps.append((name, feature) if name else (kind, int(number)))

@@ -334,7 +334,7 @@ def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) ->
     if name not in texts:
         present = ", ".join(sorted(texts))
         raise InputError(
-            f"{path}: list of header texts", present, f"{name!r} must be among them", "train again"
+            f"{path}: list of header entries", present, f"{name!r} must be among them", "train again"
         )
     try:
         return parse(texts[name])

@@ -178,7 +178,7 @@ def _check_sizes(layers: Mapping[str, Floats]) -> None:
     if len(set(sizes.values())) > 1:
         text = ", ".join(f"{name} {width}x{height}" for name, (height, width) in sizes.items())
         raise InputError(
-            "sizes of the layers", text, "all layers must have one size", "render them in one run"
+            "sizes of the layers", text, "all layers must have the same size", "render them in one run"
         )
 
 

@@ -335,7 +335,7 @@ class _Converter:
             return _text(value, path)
         if hint == dict[str, str]:
             if not isinstance(value, dict):
-                raise InputError(path, value, "must map texts to texts", "write {} for none")
+                raise InputError(path, value, "must map strings to strings", "write {} for none")
             return {_text(key, path): _text(item, f"{path}.{key}") for key, item in value.items()}
         if is_dataclass(hint):
             return to_dataclass(hint, value, path, largest=self.largest, special=self.special)  # type: ignore[arg-type]

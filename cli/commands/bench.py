@@ -121,7 +121,7 @@ Budget = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="Time budget per contender and size, in seconds; slower ones get fewer repetitions, or none.",
+        help="Time budget per program and size, in seconds; slower ones get fewer repetitions, or none.",
         show_default="30; quick: 4",
     ),
 ]
@@ -181,7 +181,7 @@ def bench(
 ) -> None:
     """Measure speed against error: kernels, schedules, variants of the network, and baselines.
 
-    All contenders are interleaved, so that drift of the machine affects them alike.
+    All programs are interleaved, so that drift of the machine affects them alike.
 
     The bundled mini-cubes model is measured on unseen frames of its scene; another model on its training
     scene or a data set. Installed baselines take part: PyTorch, ONNX Runtime, OpenVINO, Halide,

@@ -79,7 +79,7 @@ def certify(
     if source is not None:
         if not text:
             raise InputError(
-                "option --source", str(source), "with --no-text nothing is read", "leave one out"
+                "option --source", str(source), "with --no-text no source is checked", "leave one out"
             )
         read_file(source, "kernel", "name a text in the kernel's language")
     try:

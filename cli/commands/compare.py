@@ -79,8 +79,8 @@ def compare(
     With --paths every step of every path has a rounding-error bound; a larger difference is
     [bold]unexplained[/]. A step whose decision is within the bound of its threshold is
     [bold]undecided[/], and [bold]different[/] if it went the other way than the reference. Of the
-    reference's paths, [bold]parted[/] have taken another course so far; the vertices of the others have
-    [bold]moved[/]. Welch's test compares the images. The exit status is 1 if anything is unexplained or
+    reference's paths, [bold]parted[/] have diverged so far; the vertices of the others have
+    [bold]moved[/]. Welch's test compares the images. The exit status is 1 if a difference is unexplained or
     the test fails.
     """
     if paths is None:
@@ -108,7 +108,7 @@ def compare_pictures(image: Path, reference: Path, exposure: float, as_json: boo
     if a.display.shape != b.display.shape:
         (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape
         rule = f"{reference} has {columns}x{rows}"
-        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare images of one size")
+        raise InputError(f"size of {image}", f"{width}x{height}", rule, "compare images of equal size")
     scores = measure(a, b)
     if as_json:
         typer.echo(json.dumps({"image": str(image), "reference": str(reference), **as_data(scores)}))

@@ -299,7 +299,7 @@ def chosen_variant(variant: str | None, rank: int) -> str:
 
 
 def executors() -> None:
-    """List the available backends, and what the others lack."""
+    """List the available backends, and what the others need."""
     found = [probe(name.value) for name in ExecutorName]
     heads = ("name", "state", "schedule", "device, or what is missing")
     table("Executors", heads, found, texts=4)

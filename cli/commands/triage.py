@@ -98,7 +98,7 @@ def triage(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="FOLDER", help="Output folder of the reproducer, if a fault is found."
+            "-o", "--output", metavar="FOLDER", help="Output folder of the reproducer, if a kernel deviates."
         ),
     ] = Path("triage"),
 ) -> None:
@@ -174,7 +174,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
                 raise
             say(f"not here: {error}")
     if not runners:
-        raise ExecutorUnavailable(f"none of {', '.join(wanted)} is here; see wamnet executors")
+        raise ExecutorUnavailable(f"none of {', '.join(wanted)} is available; see wamnet executors")
     return runners
 
 

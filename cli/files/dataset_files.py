@@ -364,7 +364,7 @@ class Store(Generic[BandT]):
         for name in self.pictures:
             path = self.folder / name
             if path.is_dir() and not path.is_symlink():
-                raise InputError("picture", str(path), "is a folder", "move it, or use another -o")
+                raise InputError("image", str(path), "is a folder", "move it, or use another -o")
         remove_temporaries(self.folder)
         names = list(self.pictures)
         self.sums = dict(self.before) | _read_journal(self.unfinished / JOURNAL)

@@ -93,7 +93,7 @@ def write_denoised(
     deep = [part.text("name") for part in file.parts if part.deep]
     if keep and deep:
         rule = "parts with several samples per pixel cannot be kept"
-        raise InputError(f"{source}: deep parts", ", ".join(deep), rule, "leave out --keep-layers, or them")
+        raise InputError(f"{source}: deep parts", ", ".join(deep), rule, "leave out --keep-layers")
     index = selection.layers["color"][0].part
     matrix, _ = _matrix(source, file, index)
     own = np.asarray(color, np.float32)

@@ -122,7 +122,7 @@ def select(path: Path, parts: Sequence[Part], chosen: str = "") -> Selection:
         there = dict.fromkeys(name for name in (*views, *_names(parts), *prefixes) if name)
         rule = f"neither a view, a part nor the first piece of a channel's name; there are {', '.join(there)}"
         rule = rule if there else "the file has one view, without a name"
-        raise InputError(f"{path}: view layer", chosen, rule, "leave it out, or name one that is there")
+        raise InputError(f"{path}: view layer", chosen, rule, "leave it out, or name an existing one")
     layers = {name: planes for name in LAYERS if (planes := _layer(path, parts, name, groups))}
     notes = [note for name, planes in layers.items() if (note := _note(parts, name, planes))]
     others = [f"{other!r}" for other in views if other != view]
@@ -208,7 +208,7 @@ def _components(path: Path, name: str, alias: str, group: Group) -> Sequence[Pla
     planes = [plane for choice in complete for same in choice for plane in same]
     if len(planes) > LAYERS[name].channels:
         names = ", ".join(plane.name for plane in planes)
-        raise InputError(f"{path}: channels", names, f"{name} has these twice", "leave out or rename some")
+        raise InputError(f"{path}: channels", names, f"{name} has duplicates", "leave out or rename some")
     return planes
 
 

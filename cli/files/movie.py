@@ -47,7 +47,7 @@ def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
                 rgb = picture.convert("RGB")
         except OSError as error:
             reason = error.strerror or str(error)
-            raise InputError("picture", str(path), f"cannot be read: {reason}", "make it again") from None
+            raise InputError("image", str(path), f"cannot be read: {reason}", "make it again") from None
         yield rgb
 
 
@@ -60,7 +60,7 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
     except OverflowError:
         # Pillow joins equal pictures to one that is shown for longer.
         rule = f"a GIF shows a frame, or equal frames in a row, for {LONGEST_S_OF_GIF} s at most"
-        raise InputError("film", str(path), rule, "make it shorter, or .mp4") from None
+        raise InputError("animation", str(path), rule, "make it shorter, or .mp4") from None
 
 
 def _write_mp4(path: Path, pictures: Sequence[Path], fps: float) -> None:

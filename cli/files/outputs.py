@@ -35,7 +35,7 @@ def check_output(path: Path, suffixes: Sequence[str] = (), inputs: Sequence[Path
     if path.is_dir():
         raise InputError("output file", str(path), "is a folder", "give the name of a file")
     if path.exists() and not path.is_file():
-        raise InputError("output file", str(path), "is a device or the like", "give the name of a plain file")
+        raise InputError("output file", str(path), "is not a regular file", "give the name of a regular file")
     check_parent(path)
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):

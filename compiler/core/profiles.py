@@ -134,7 +134,7 @@ def profile_named(name: str) -> Profile:
     if name == REMOVED:
         raise CompileError(
             f"profile {name} was removed; use an integer network, variant whole8 (--variant whole8), which "
-            "gives the same bits on every device and compiler"
+            "is bit-identical on every device and compiler"
         )
     base, _, degree = name.partition(DEGREE_WORD)
     if base in PROFILES and PROFILES[base].sine and degree in map(str, sine.POLYNOMIALS):

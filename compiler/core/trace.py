@@ -273,7 +273,7 @@ def _exact_float32(array: NDArray[Any]) -> NDArray[np.float32]:
         rounded = np.ascontiguousarray(array, dtype=np.float32)
     if not np.array_equal(rounded, array):
         raise CompileError(
-            f"{_place()}: an array of {array.dtype}, shape {array.shape}, holds numbers that float32 cannot: "
+            f"{_place()}: an array of {array.dtype}, shape {array.shape}, has values beyond float32: "
             "kernels keep weights in float32; round the weights first (refimpl.network.denoise.as_dtype)"
         )
     return rounded

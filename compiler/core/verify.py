@@ -22,7 +22,7 @@ def known_operations(program: Program) -> Iterator[str]:
     """Every operation is in the table."""
     for index, node in enumerate(program.nodes):
         if node.op not in OPS:
-            yield f"%{index} is {node.op!r}, which is not an operation; there are: {', '.join(OPS)}"
+            yield f"%{index} is {node.op!r}, which is not an operation; supported: {', '.join(OPS)}"
 
 
 def operands_before_use(program: Program) -> Iterator[str]:

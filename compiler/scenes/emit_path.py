@@ -149,12 +149,12 @@ class _Kernel(Lines):
         if len(self.planes) > self.dialect.max_planes:
             raise CompileError(
                 f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
-                f"{self.dialect.max_planes}; ask for fewer groups"
+                f"{self.dialect.max_planes}; request fewer groups"
             )
         if len(self.programs.inputs) > self.dialect.most_numbers:
             raise CompileError(
-                f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} numbers "
-                f"of the scene, and {len(self.programs.inputs)} move: compile fewer times of it, or one"
+                f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} scene "
+                f"parameters, and {len(self.programs.inputs)} move: compile for fewer times, or one"
             )
         if images and not self.dialect.painted:
             raise CompileError(

@@ -84,11 +84,11 @@ def compile_encode(
     if lacking:
         raise CompileError(
             f"the sums have no planes {', '.join(sorted(lacking))}: the features {', '.join(features)} are "
-            "made of them; let the path kernel add them up"
+            "computed from them; add them to the path kernel"
         )
     if not chosen.encodes:
         raise CompileError(
-            f"target {target} has no kernels that encode features: compile for one that has, as opencl"
+            f"target {target} has no kernels that encode features: use one that has them, such as opencl"
         )
     dialect = chosen.dialect
     if dialect:
@@ -127,7 +127,7 @@ def _check_images(images: Sequence[Image], dialect: Dialect) -> None:
     """Refuse more images than a language draws at once."""
     if len(images) > (most := dialect.max_images):
         raise CompileError(
-            f"the kernel encodes {len(images)} features: {dialect.language} draws at most {most} images at "
+            f"the kernel encodes {len(images)} features: {dialect.language} writes at most {most} images at "
             "once; use fewer"
         )
 

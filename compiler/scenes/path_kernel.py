@@ -136,7 +136,7 @@ def compile_path(
     """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     if not chosen.paths:
-        raise CompileError(f"target {target} has no path kernels: compile for one that has, as opencl")
+        raise CompileError(f"target {target} has no path kernels: use one that has them, such as opencl")
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")

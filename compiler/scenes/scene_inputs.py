@@ -140,8 +140,8 @@ def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
     for scene, row in zip(scenes, rows, strict=True):
         if layout_of(row) != layout:
             raise CompileError(
-                f"scene {scene.name}: it is laid out in another way at some of the times or colours that one "
-                "kernel is to show: a kernel takes other numbers, not another layout; leave these out"
+                f"scene {scene.name}: its layout differs at some of the requested times or colours; a "
+                "kernel takes other parameter values, but not another layout; leave these out"
             )
     return SceneInputs(settings, ()).widened(rows)
 

@@ -52,7 +52,7 @@ def kernel_gather(program: Program) -> Gather:
         )
     if any(node.op in LOOPS for node in program.nodes):
         raise CompileError(
-            "the program has a loop over the rows of tables, which this skeleton does not hold: trace it "
+            "the program has a loop over the rows of tables, which this skeleton does not support: trace it "
             "without `most_unrolled`"
         )
     return program.gather

@@ -40,7 +40,7 @@ from .common import kernel_gather
 Array = NDArray[np.float64]
 
 HORIZONTAL = "horizontal"
-"""Name of the image between both passes, of the first one's output, and of its files."""
+"""Name of the intermediate image, of the first one's output, and of its files."""
 
 NO_SINE = SineContract("none: the first pass has no sine", None)
 """The contract of a program without sines."""

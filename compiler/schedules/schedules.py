@@ -585,6 +585,6 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
         chosen = known[chosen.instead]
     if chosen is schedules[0] and (reason := chosen.impossible(program)):
         raise CompileError(
-            f"no schedule of this target holds the program: {reason}; compile for another target"
+            f"no schedule of this target can run the program: {reason}; compile for another target"
         )
     return Pick(chosen, name, chosen.extent(program), first, chosen.details(program))

@@ -66,7 +66,7 @@ def gradient(program: Program, output: str, slope: str) -> tuple[Program, tuple[
     """
     ends = dict(program.outputs)
     if program.nodes[ends[output]].type != program.nodes[ends[slope]].type:
-        raise CompileError(f"outputs {output!r} and {slope!r} have different types; a slope has its value's")
+        raise CompileError(f"outputs {output!r} and {slope!r} have different types; they must be equal")
     walk = _Walk(program)
     walk.slopes[ends[output]] = Traced(walk.builder, ends[slope])
     for index in range(ends[output], -1, -1):
@@ -120,7 +120,7 @@ class _Walk:
         """Add to the slope of an operand."""
         if part.type != self.program.nodes[arg].type:
             op = self.program.nodes[index].op
-            raise CompileError(f"%{index} {op}: a number that depends on weights meets a vector")
+            raise CompileError(f"%{index} {op}: a scalar that depends on weights meets a vector")
         self.slopes[arg] = self.slopes[arg] + part if arg in self.slopes else part
 
     def _sum(self, parameter: str, left: Traced, right: int | None = None) -> None:
@@ -152,6 +152,6 @@ def _rule(node: Node) -> Rule:
     """Return the rule of the node's operation."""
     if node.op not in RULES:
         raise CompileError(
-            f"{node.op} has no derivative rule; there are: {', '.join(('affine', 'parameter', *RULES))}"
+            f"{node.op} has no derivative rule; supported: {', '.join(('affine', 'parameter', *RULES))}"
         )
     return RULES[node.op]

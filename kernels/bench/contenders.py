@@ -149,6 +149,6 @@ def chosen(contenders: Sequence[Contender], only: Sequence[str], executors: Sequ
     for pattern in only:
         if not any(fnmatchcase(each.name, pattern) for each in contenders):
             names = ", ".join(each.name for each in contenders)
-            raise InputError("name of a contender", pattern, "matches none", f"choose one of {names}")
+            raise InputError("name of a program", pattern, "matches none", f"choose one of {names}")
     named = [each for each in contenders if not only or any(fnmatchcase(each.name, p) for p in only)]
     return [each for each in named if not executors or each.executor in (None, *executors)]

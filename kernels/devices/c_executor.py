@@ -337,7 +337,7 @@ class CExecutor(Executor):
             raise InputError(
                 "size of the image for C",
                 f"{size[1]} x {size[0]} with {most} channels",
-                f"one image must hold fewer than {INDEX_LIMIT} numbers",
+                f"one image must hold fewer than {INDEX_LIMIT} values",
                 "split the image, or use executor numpy",
             )
 

@@ -37,7 +37,7 @@ def checked(artifact: Denoiser, inputs: Images) -> Images:
             raise InputError(
                 f"image {image.name!r}",
                 f"{array.dtype} of shape {array.shape}",
-                f"must be float32 of shape (height, width, {image.channels}), all images of one size",
+                f"must be float32 of shape (height, width, {image.channels}), all images of equal size",
                 "encode the frame's features (refimpl.network.dataset.feature_image)",
             )
         _check_range(image, array)
@@ -60,7 +60,7 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
         raise InputError(
             f"image {image.name!r} at row {y}, column {x}",
             array[y, x].tolist(),
-            "all numbers must be finite",
+            "all values must be finite",
             "fix or mask the frame first",
         )
     # In float64: a Python number would be rounded to the array's float32 first.
@@ -69,7 +69,7 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
     raise InputError(
         f"image {image.name!r} at row {y}, column {x}",
         array[y, x].tolist(),
-        f"the kernel's bound holds for numbers in {image.range_text}",
+        f"the kernel's bound holds for values in {image.range_text}",
         "encode the frame's features (refimpl.network.dataset.feature_image)",
     )
 

@@ -121,7 +121,7 @@ def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> ND
     wanted = len(kernel.programs.inputs)
     if numbers.dtype != np.float32 or numbers.shape != (wanted,):
         raise InputError(
-            "numbers of the scene",
+            "scene parameters",
             f"{numbers.dtype} of shape {numbers.shape}",
             f"must be float32 of shape ({wanted},)",
             "read them by the inputs that the kernel was compiled with",

@@ -157,7 +157,7 @@ class OpenCLExecutor(Executor):
             raise InputError(
                 f"size of the image on {self.device}",
                 f"{width} x {height} with {most} channels",
-                f"one image must hold fewer than {INDEX_LIMIT} numbers and at most {largest} bytes",
+                f"one image must hold fewer than {INDEX_LIMIT} values and at most {largest} bytes",
                 "split the image, or use executor numpy",
             )
 
@@ -172,7 +172,7 @@ class OpenCLExecutor(Executor):
         if not items:
             raise CompileError(
                 f"{self.device}: the kernel's arrays take {used} bytes per pixel; at most {STACK_BYTES} fit "
-                "a processor's stack; use narrower layers, or a GPU, or executor numpy"
+                "a CPU thread's stack; use narrower layers, or a GPU, or executor numpy"
             )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
         x = min(wanted[0], items)
@@ -193,7 +193,7 @@ class OpenCLExecutor(Executor):
             if wanted > most:
                 raise CompileError(
                     f"{self.device}: schedule {schedule['name']} needs groups of {wanted} {what}, and at "
-                    f"most {most} are to be had; use schedule plain"
+                    f"most {most} are available; use schedule plain"
                 )
 
     @contextmanager
@@ -207,7 +207,7 @@ class OpenCLExecutor(Executor):
             raise InputError(
                 f"size of the image on {self.device}",
                 f"{size[1]} x {size[0]}",
-                f"the device does not run it: {' '.join(str(error).split())}",
+                f"the device cannot run it: {' '.join(str(error).split())}",
                 "split the image, or use executor numpy",
             ) from None
 
@@ -308,7 +308,7 @@ class OpenCLExecutor(Executor):
             raise InputError(
                 "device that trains",
                 self.device,
-                "the step is scheduled for processors: here it would take very long",
+                "the training step is scheduled for CPUs: on this device it would take very long",
                 f"set {DEVICE_VARIABLE} to a part of a processor's name, such as portable (PoCL)",
             )
         from .opencl_trainer import OpenCLTrainer
@@ -342,8 +342,8 @@ def _choose(wanted: str) -> Any:
     found = _devices()
     if not found:
         raise ExecutorUnavailable(
-            "OpenCL: no platform is installed; pip install 'wamnet[opencl]' brings PoCL on x86-64, other "
-            "processors need a package of the system (Debian: pocl-opencl-icd)"
+            "OpenCL: no platform is installed; pip install 'wamnet[opencl]' installs PoCL on x86-64; other "
+            "processors need a system package (Debian: pocl-opencl-icd)"
         )
     found.sort(key=lambda device: not device.type & cl.device_type.GPU)
     matching = [device for device in found if wanted.lower() in _describe(device).lower()]

@@ -161,7 +161,7 @@ class OpenGLExecutor(Executor):
         if rounds and ORDER_EXTENSION not in self._context.extensions:
             raise CompileError(
                 f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
-                "native, which then promises nothing, or executor opencl or numpy"
+                "native, which then has no bound, or executor opencl or numpy"
             )
 
     def _check_loops(self, artifact: Denoiser) -> None:
@@ -169,8 +169,8 @@ class OpenGLExecutor(Executor):
         count = llvmpipe.iterations(artifact.source) if llvmpipe.NAME in self.device else 0
         if count > llvmpipe.MOST_ITERATIONS:
             raise CompileError(
-                f"{self.device}: the kernel's loops take {count} iterations, and from about "
-                f"{llvmpipe.MOST_ITERATIONS} on this renderer ends loops early, without an error; "
+                f"{self.device}: the kernel's loops take {count} iterations; beyond about "
+                f"{llvmpipe.MOST_ITERATIONS} this renderer exits loops early, without an error; "
                 "use executor c, opencl or numpy, or a variant with fewer products"
             )
 

@@ -238,7 +238,7 @@ def runner(target: str, kernel: str) -> Executor:
     home = kernel.partition(":")[2]
     if home and home not in opened.homes:
         opened.close()
-        raise ExecutorUnavailable(f"nothing runs {target} here with weights in that place")
+        raise ExecutorUnavailable(f"no runner for {target} with this storage of the weights is installed")
     return opened
 
 

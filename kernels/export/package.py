@@ -195,9 +195,9 @@ def _graph(request: Request) -> Export:
         rule = "a graph denoises; it traces no paths"
         raise InputError("--scene", request.scene.name, rule, "leave it out, or choose another target")
     if request.weights not in ("", "inline"):
-        raise InputError("--weights", request.weights, "a graph holds its weights", "leave it out")
+        raise InputError("--weights", request.weights, "the graph contains them", "leave it out")
     if request.schedule:
-        raise InputError("--schedule", request.schedule, "a runtime orders a graph's work", "leave it out")
+        raise InputError("--schedule", request.schedule, "the runtime schedules it", "leave it out")
     varied = vary(parse(request.variant), request.model)
     data = onnx_export.graph(varied.model)
     plan, model = plan_program(lower(varied.model), "numpy"), varied.model

@@ -212,7 +212,7 @@ class TintRunner(BufferRunner):
         except BrokenPipeError:
             told = {"error": "Node has ended"}
         if "error" in told:
-            raise CompileError(f"{self.device} does not take the kernel: {' '.join(told['error'].split())}")
+            raise CompileError(f"{self.device} rejects the kernel: {' '.join(told['error'].split())}")
         return told
 
     def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:

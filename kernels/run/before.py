@@ -91,7 +91,7 @@ def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
     """Render a task's rows; a worker that has another version of this package refuses."""
     if task.version != version():
         rule = f"the data set is made by {task.version}, and every worker must have the same"
-        raise InputError("version of wamnet on a worker", version(), rule, "install that one there")
+        raise InputError("version of wamnet on a worker", version(), rule, "install that version there")
     picture = task.picture
     executor = picture.request.executor
     if picture.before:

@@ -243,7 +243,7 @@ def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInput
     inputs = varying([*animation.scenes, *drawn], settings)
     if len(inputs.places) > 4 * MOST_UNIFORMS:
         rule = f"{len(inputs.places)} of its numbers move; a shader has uniforms for {4 * MOST_UNIFORMS}"
-        raise InputError("scene", scene.name, rule, "show one time of it, or a scene of fewer moving parts")
+        raise InputError("scene", scene.name, rule, "fix its time, or use a scene with fewer moving parts")
     rows = np.stack([inputs.values(one) for one in animation.scenes])
     moving = np.flatnonzero(np.any(rows != rows[0], axis=0))
     return inputs, {

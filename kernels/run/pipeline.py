@@ -265,7 +265,7 @@ class Pipeline:
         """Refuse to read what was not drawn."""
         self._check_open()
         if not self._drawn:
-            raise InputError("pipeline", NO_VALUE, "has drawn no image yet", "draw first")
+            raise InputError("pipeline", NO_VALUE, "has rendered no image yet", "render first")
 
     def _check_open(self) -> None:
         """Refuse work without images."""

@@ -177,7 +177,7 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
     """Compile the step, and put the state on the device."""
     if state.siren.dtype != np.float32:
         rule = "a device trains in float32"
-        raise InputError("type of the state's numbers", str(state.siren.dtype), rule, "use executor numpy")
+        raise InputError("type of the state's values", str(state.siren.dtype), rule, "use executor numpy")
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
     kernel = compile_step(
         recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank, recipe.activation

@@ -122,7 +122,7 @@ def drawn_outside(
     kinds = kinds_outside(ranges, arc_s)
     if count and not kinds:
         rule = "a data set whose frames differ in time only, all of it trained on, has no outside"
-        raise InputError("number of frames outside", count, rule, "give ranges or an arc, or ask for none")
+        raise InputError("number of frames outside", count, rule, "give ranges or an arc, or request none")
     found = []
     for k, draw in enumerate(drawn(seed, ranges, lights, first, count)):
         kind, turn = kinds[k % len(kinds)], k // len(kinds)

@@ -116,7 +116,7 @@ def _needs(values: Sequence[Value], output: Field, depth: int) -> dict[Spot, int
         reads += len(field.terms) * len(places)
         if reads > MOST_READS:
             rule = f"at most {MOST_READS} in all layers"
-            raise InputError("places that a pixel depends on", reads, rule, WAY_OUT)
+            raise InputError("positions that a pixel depends on", reads, rule, WAY_OUT)
         for value, dy, dx in field.terms:
             for row, column in places:
                 place = (row + dy, column + dx)
@@ -217,7 +217,7 @@ class Carrier:
         self.total += neurons * self.width
         if neurons > MOST_NEURONS or self.total > MOST_WEIGHTS:
             rule = f"at most {MOST_NEURONS}, and {MOST_WEIGHTS} weights in all"
-            raise InputError("neurons of a layer on its window", neurons, rule, WAY_OUT)
+            raise InputError("neurons of a layer over its window", neurons, rule, WAY_OUT)
 
     def rows(self, rows: Sequence[Row]) -> Array:
         """Return the weights (n, width) of the channels of fields at places."""

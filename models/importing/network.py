@@ -112,7 +112,7 @@ def _layout(name: str, sizes: tuple[int | None, ...]) -> str:
         return CHANNELS_LAST
     if len(sizes) not in LAYOUTS:
         rule = "rows of values (N, D), or an image (N, C, H, W) or (H, W, C)"
-        raise InputError(f"input {name}: axes", len(sizes), rule, "export the network so")
+        raise InputError(f"input {name}: axes", len(sizes), rule, "export it this way")
     return LAYOUTS[len(sizes)]
 
 
@@ -155,7 +155,7 @@ def _centred(reader: Reader, output: Field) -> tuple[Field, int]:
         if not reader.asked or rows % 2 or columns % 2:
             rule = "a kernel writes an image of the size that it reads"
             way_out = "pad the images, or choose their border with --border zero or clamp"
-            raise InputError("size of the output beside the image's", shown, rule, way_out)
+            raise InputError("sizes of output and input image", shown, rule, way_out)
         output = output.moved(rows // 2, columns // 2, (-rows, -columns))
     # What was cut off has no pixels in the graph, and what was added is in no pixel of the model.
     edges = zip(output.edges, (rows, columns, rows, columns), strict=True)

@@ -64,7 +64,7 @@ class Reader:
         for label, size in zip(layout, of.sizes, strict=True):
             if label != CHANNEL and size and self.sizes.setdefault(label, size) != size:
                 rule = f"{self.sizes[label]} as of the inputs before: all images have one size"
-                raise InputError(f"input {name}: size of axis {label}", size, rule, "export it so")
+                raise InputError(f"input {name}: size of axis {label}", size, rule, "export it this way")
         # Of a batch of any size one image is meant.
         labels = tuple("" if label == BATCH and self.sizes.get(label, 1) == 1 else label for label in layout)
         empty = Field(np.zeros(source.channels), {}, labels, integer=np.dtype(of.dtype).kind in "iu")
@@ -111,7 +111,7 @@ class Reader:
         if not name and default is not None:
             return np.asarray(default)
         if name not in self.graph.constants:
-            node.refuse(f"input {at}", "must be constant: a weight of the graph", "export the network so")
+            node.refuse(f"input {at}", "must be constant: a weight of the graph", "export it this way")
         return self.graph.constants[name]
 
     def weight(self, node: GraphNode, at: int, default: Any = None) -> Array:

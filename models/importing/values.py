@@ -121,7 +121,7 @@ def _per_channel(node: GraphNode, x: Field, array: Array) -> tuple[Array, Field]
     wide = [axis for axis, size in enumerate(sizes) if size != 1]
     if len(sizes) > MOST_AXES or any(x.layout[a] != CHANNEL or sizes[a] != x.channels for a in wide):
         what = f"a constant of shape {array.shape} beside axes {x.shown}"
-        node.refuse(what, "one number, or one for each channel", "export it so")
+        node.refuse(what, "one number, or one for each channel", "export it this way")
     return array.reshape(-1), x
 
 

@@ -175,8 +175,8 @@ def motion(scene: Scene, before: Scene, dtype: DTypeLike = np.float32) -> Motion
     parts, parts_before = _primitives(scene), _primitives(before)
     if list(map(type, parts)) != list(map(type, parts_before)):
         rule = f"{scene.name} has {len(parts)}, and each must have a counterpart of its kind"
-        way_out = "begin a new history where the scene changes"
-        raise InputError("primitives of the scene before", len(parts_before), rule, way_out)
+        way_out = "start a new history when the scene changes"
+        raise InputError("primitives of the previous scene", len(parts_before), rule, way_out)
     rows = [_moved(_pose(now), _pose(then)) for now, then in zip(parts, parts_before, strict=True)]
     rows.append(_moved(_AT_REST, _AT_REST))
     turn, center, shift = (np.array(column, np.float64).astype(dtype) for column in zip(*rows, strict=True))
@@ -440,5 +440,5 @@ def check_picture(job: Job, color: Image, past: History | None = None) -> None:
     for what, size in sizes.items():
         if color.shape != (*size, 3):
             rule = f"{what} has {(*size, 3)}"
-            raise InputError("shape of the colour", color.shape, rule, "begin a new history for another size")
+            raise InputError("shape of the colour", color.shape, rule, "start a new history for another size")
     check_finite("the colour", color)

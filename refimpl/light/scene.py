@@ -185,7 +185,7 @@ Rule = Callable[[Any], bool]
 def validate(scene: Scene) -> Scene:
     """Return the scene itself, or raise InputError with the path of the first value that breaks a rule."""
     _check_camera(scene.camera)
-    rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
+    rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
     _check(scene.background, "scene.background", _is_finite, rule, "fix the number")
     _check(
         scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
@@ -241,7 +241,7 @@ def _check_finite(part: Any, path: str) -> None:
     """Refuse NaN and infinities anywhere in a primitive."""
     for f in fields(part):
         value = getattr(part, f.name)
-        rule = f"all numbers must be finite and at most {LARGEST_NUMBER:g} in magnitude"
+        rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
         _check(value, f"{path}.{f.name}", _is_finite, rule, "fix the number")
 
 

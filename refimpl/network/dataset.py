@@ -412,7 +412,7 @@ def encode_sums(
     encoded = {}
     for feature in (FEATURES[name] for name in features):
         if feature.guides:
-            raise InputError("feature", feature.name, "made of a pixel's own sums", "use feature_image")
+            raise InputError("feature", feature.name, "computed from a pixel's own sums", "use feature_image")
         count = rays if rays and feature.layer != "color" else samples
         values = feature.encode(sums[feature.layer] / count, normalization)
         clipped = np.clip(values, feature.low, feature.high)
@@ -549,7 +549,7 @@ def _check_pairs(pairs: Sequence[tuple[Frame, Frame]]) -> None:
                 f"training pair {index}: sizes of noisy and reference frame",
                 " and ".join(sizes),
                 "must be equal",
-                "render both at one size",
+                "render both at the same size",
             )
 
 

@@ -109,7 +109,7 @@ def _check_layers(siren: Siren) -> None:
         bad = sum(int(np.sum(~(np.abs(array) <= LARGEST_PARAMETER))) for array in (weight, bias))
         if bad:
             raise InputError(
-                f"layer {layer}: number of NaN or infinite parameters, or huge ones,",
+                f"layer {layer}: number of NaN, infinite or huge parameters",
                 bad,
                 f"all must be finite, and at most {LARGEST_PARAMETER:g} in magnitude",
                 "train the model again, with a lower learning rate",

@@ -148,7 +148,7 @@ def check_imported(network: Imported, window: Window) -> None:
         _check_step(f"step of layer {layer}", step)
     ends = [end for end in (network.low, network.high) if not math.isinf(end)]
     if not network.low <= network.high or not all(map(_is_held, ends)):
-        raise InputError("clip", (network.low, network.high), "numbers of float32, in order", AGAIN)
+        raise InputError("clip", (network.low, network.high), "must be float32 values, low < high", AGAIN)
     inputs, outputs = network.widths[0], network.widths[-1]
     wanted = window.size**2 * network.channels
     if inputs != wanted:
@@ -173,7 +173,7 @@ def _check_sources(sources: Sequence[Source]) -> None:
             raise InputError(f"channels of image {source.name}", source.channels, rule, AGAIN)
         if not -LARGEST_PARAMETER <= source.low < source.high <= LARGEST_PARAMETER:
             rule = f"two numbers in order, at most {LARGEST_PARAMETER:g} in magnitude"
-            way_out = "give the range of what the network is run on"
+            way_out = "give the range of the network's inputs"
             raise InputError(f"range of image {source.name}", (source.low, source.high), rule, way_out)
 
 
@@ -184,7 +184,7 @@ def _check_step(what: str, step: Step) -> None:
         raise InputError(what, step.kind, f"a known one: {', '.join(STEPS)}", AGAIN)
     fits = len(step.numbers) == len(kind.names) and all(map(_is_held, step.numbers))
     if not fits or not kind.holds(*step.numbers):
-        raise InputError(f"{what}, {step.kind}", step.numbers, f"{kind.rule}, as float32 holds it", AGAIN)
+        raise InputError(f"{what}, {step.kind}", step.numbers, f"{kind.rule}, exact in float32", AGAIN)
 
 
 def _is_held(number: float) -> bool:

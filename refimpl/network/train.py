@@ -308,7 +308,7 @@ def _check_network(network: Siren, recipe: Recipe) -> None:
     if has != wants:
         rule = f"must be those of the recipe, {wants}"
         what = "widths, omegas and activation of the first network"
-        raise InputError(what, has, rule, "use the recipe that it had")
+        raise InputError(what, has, rule, "use its original recipe")
 
 
 def train(

@@ -132,7 +132,7 @@ def test_unknown_contenders_are_refused(wamnet, here) -> None:
     outcome = wamnet("bench", "--only", "numpy:plain,nobody", "-o", "speed")
     assert outcome.status == 2
     assert (
-        "name of a contender 'nobody': matches none (choose one of numpy:plain, opencl:plain" in outcome.err
+        "name of a program 'nobody': matches none (choose one of numpy:plain, opencl:plain" in outcome.err
     )
 
 

@@ -83,7 +83,7 @@ def test_entry_point_and_centre_are_bound(wamnet, kernel, key):
 def test_a_text_that_is_not_there_is_a_bad_file(refused, kernel):
     assert "no.cl" in refused("certify", kernel, "--source", "no.cl")
     told = refused("certify", kernel, "--no-text", "--source", kernel / "denoise.cl")
-    assert "with --no-text nothing is read" in told
+    assert "with --no-text no source is checked" in told
 
 
 def test_a_smaller_number_is_refused(wamnet, kernel):

@@ -57,7 +57,7 @@ def test_identical_and_tiny_pictures(wamnet, tmp_path) -> None:
         (("a.exr", "a.jpg"), "input file 'a.jpg': must end in .exr or .png (convert it"),
         (("a.exr", "text.exr"), "input file 'text.exr': is not an OpenEXR image"),
         (("a.exr", "text.png"), "input file 'text.png': is not a PNG"),
-        (("a.exr", "small.exr"), "size of a.exr '13x12': small.exr has 2x1 (compare images of one size"),
+        (("a.exr", "small.exr"), "size of a.exr '13x12': small.exr has 2x1 (compare images of equal size"),
         (("a.exr", "depth.exr"), "depth.exr: list of layers 'depth': color must be among them"),
     ],
 )

@@ -68,10 +68,10 @@ def test_views_and_parts(tmp_path: Path, parts: list[RawPart], chosen: str, laye
     [
         ([RawPart(planes(1), name="a"), RawPart(planes(5), name="b")], "R, G, B of part 'a', .*: each of"),
         ([RawPart(planes(1), name="a"), RawPart(planes(5), name="a")], "each of them could be color"),
-        ([RawPart(planes(1) | planes(5, names="r"))], "channels 'R, r, G, B': color has these twice"),
+        ([RawPart(planes(1) | planes(5, names="r"))], "channels 'R, r, G, B': color has duplicates"),
         ([RawPart(planes(1, "Albedo.") | planes(5, "albedo."))], "Albedo, albedo': each of them could be"),
-        ([RawPart(planes(1, "N.") | planes(5, "N.", "XYZ"))], "normal has these twice"),
-        ([RawPart(planes(1) | planes(1, "left."), VIEWS)], "channels '.*left.*': color has these twice"),
+        ([RawPart(planes(1, "N.") | planes(5, "N.", "XYZ"))], "normal has duplicates"),
+        ([RawPart(planes(1) | planes(1, "left."), VIEWS)], "channels '.*left.*': color has duplicates"),
     ],
 )  # fmt: skip
 def test_two_things_of_one_name(tmp_path: Path, parts: list[RawPart], rule: str) -> None:

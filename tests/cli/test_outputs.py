@@ -71,7 +71,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
 def test_a_device_is_no_file() -> None:
     """Replacing a device by a file would break the machine."""
-    with pytest.raises(InputError, match="is a device or the like"):
+    with pytest.raises(InputError, match="is not a regular file"):
         check_output(Path(os.devnull))
 
 

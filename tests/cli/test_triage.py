@@ -218,7 +218,7 @@ def test_one_that_is_not_here_is_told(wamnet, here, monkeypatch, refused) -> Non
     command = ("triage", "model.safetensors", "noisy.exr", "--executor", "opengl")
     outcome = wamnet(*command)
     assert outcome.status == 2
-    assert "none of opengl is here; see wamnet executors" in outcome.err
+    assert "none of opengl is available; see wamnet executors" in outcome.err
 
 
 @pytest.mark.parametrize(

@@ -195,7 +195,7 @@ def test_unknown_target_and_profile():
 def test_sine_that_may_leave_its_domain_is_refused():
     with pytest.raises(
         CompileError,
-        match=r"sine 2 of 2 \(layer 1, %\d+\) may be given arguments from -20000 to 20000: the sine \(.*\) "
+        match=r"sine 2 of 2 \(layer 1, %\d+\) may get arguments from -20000 to 20000: the sine \(.*\) "
         r"is proven for \|x\| <= 12800; use a smaller omega_0",
     ):
         compile_program(gathered(lambda x: np.sin(2e4 * np.sin(x * 100.0))), "opencl")
@@ -204,12 +204,12 @@ def test_sine_that_may_leave_its_domain_is_refused():
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (lambda x: x * 1e30 * 1e30 * 1e-38, r"multiply \(%\d\) may hold numbers up to 1e\+60"),
+        (lambda x: x * 1e30 * 1e30 * 1e-38, r"multiply \(%\d\) may reach 1e\+60"),
         (
             lambda x: np.sin(np.matmul(x, np.full((2, 3), 3e38, np.float32).T) * 1e-38),
-            r"affine \(layer 0, %1\) may hold numbers up to 9e\+38: float32 ends at 3.4e\+38; use",
+            r"affine \(layer 0, %1\) may reach 9e\+38: the float32 maximum is 3.4e\+38; use",
         ),
-        (lambda x: np.maximum(x * 3e38 + 3e38, 0.0), r"add \(%3\) may hold numbers up to 6e\+38"),
+        (lambda x: np.maximum(x * 3e38 + 3e38, 0.0), r"add \(%3\) may reach 6e\+38"),
     ],
 )
 @pytest.mark.parametrize("target", DENOISERS)
@@ -234,7 +234,7 @@ def test_overflow_before_the_sine_leaves_no_bound_on_any_target():
 
     program = gathered(network)
     assert compile_program(program, "opencl", "native").manifest["bound"]["output"] is None
-    with pytest.raises(CompileError, match=r"affine \(layer 1, %\d+\) may hold numbers up to 1.2e\+39"):
+    with pytest.raises(CompileError, match=r"affine \(layer 1, %\d+\) may reach 1.2e\+39"):
         compile_program(program, "opencl")
 
 

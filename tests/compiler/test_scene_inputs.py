@@ -99,14 +99,14 @@ def test_what_moves_and_what_stays():
 
 def test_a_scene_of_another_form_is_refused():
     """The blocks of `glossy` are not turned at time 0: their group has no rotation."""
-    with pytest.raises(CompileError, match=r"laid out in another way.*leave these out"):
+    with pytest.raises(CompileError, match=r"its layout differs.*leave these out"):
         varying([at("glossy", 0.05), at("glossy", 0.0)], SETTINGS)
 
 
 @pytest.mark.parametrize("host", ["shadertoy", "godot"])
 def test_a_host_without_a_place_for_numbers_refuses_them(host):
     programs = lower_scene(at("minicubes", 0.05), SETTINGS, moving=inputs_of("minicubes"))
-    with pytest.raises(CompileError, match=r"take at most 0 numbers of the scene, and \d+ move"):
+    with pytest.raises(CompileError, match=r"take at most 0 scene parameters, and \d+ move"):
         feature_pass(programs, "color", Normalization(), host, [])
 
 
@@ -172,7 +172,7 @@ def test_a_kernel_with_inputs_draws_what_the_constant_one_draws(executor_named, 
     assert np.array_equal(found, expected)
     own = compile_path(lower_scene(at("minicubes", 0.05), settings), executor.name, lanes=lanes)
     assert np.array_equal(executor.trace(kernel, part), executor.trace(own, part))
-    with pytest.raises(InputError, match=r"numbers of the scene 'float32 of shape \(1,\)': must be float32"):
+    with pytest.raises(InputError, match=r"scene parameters 'float32 of shape \(1,\)': must be float32"):
         executor.trace(kernel, part, np.zeros(1, np.float32))
 
 

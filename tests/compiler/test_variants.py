@@ -66,7 +66,7 @@ def test_names_are_read_back(name) -> None:
 
 
 WRONG = {
-    "": "'' is not an approximation; there are: leave out a feature",
+    "": "'' is not an approximation; supported: leave out a feature",
     "rank": "'rank' is not an approximation",
     "rank0": "'rank0' is not an approximation",
     "rank-3": "'rank-3' is not an approximation",
@@ -349,7 +349,7 @@ def test_integers_have_no_variants(text) -> None:
 
 def test_integers_have_no_rank() -> None:
     whole = vary(parse("whole8"), small()).model
-    with pytest.raises(CompileError, match="rank 2: rounds sums, and an integer network does not"):
+    with pytest.raises(CompileError, match="rank 2: is for float networks, not for integer ones"):
         plan_program(lower(whole), "numpy", rank=2)
 
 

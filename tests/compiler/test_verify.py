@@ -162,7 +162,7 @@ CASES = [
     (
         "known_operations",
         plus(Node("tanh", (1,), V3)),
-        "%2 is 'tanh', which is not an operation; there are: input,",
+        "%2 is 'tanh', which is not an operation; supported: input,",
     ),
     ("operands_before_use", plus(Node("add", (1,), V3)), "%2 add has 1 operands; it takes 2"),
     ("operands_before_use", plus(Node("stack", (), V3)), "%2 stack has 0 operands; it takes one or more"),

@@ -79,7 +79,7 @@ def test_a_film_of_other_primitives_is_refused():
     for scene in (scenes.canonical("minicubes"),):
         film.add(scene, job, render(scene, job).frame)
     other = scenes.canonical("cornell")
-    with pytest.raises(InputError, match="primitives of the scene before"):
+    with pytest.raises(InputError, match="primitives of the previous scene"):
         film.add(other, job, render(other, job).frame)
 
 

@@ -210,11 +210,11 @@ def small(executor, kit):
         ({"a": np.zeros((0, 2, 3), np.float32)}, "image 'a' 'float32 of shape"),
         (
             {"a": np.full((2, 2, 3), np.nan, np.float32)},
-            "image 'a' at row 0, column 0 .*: all numbers must be",
+            "image 'a' at row 0, column 0 .*: all values must be",
         ),
         (
             {"a": np.float32([[[0, 0, 0], [2, -2, 0]], [[0, -2.0000002, 0], [9, 9, 9]]])},
-            r"image 'a' at row 1, column 0 \[0.0, -2.000000.*\]: the kernel's bound holds for numbers in "
+            r"image 'a' at row 1, column 0 \[0.0, -2.000000.*\]: the kernel's bound holds for values in "
             r"\[-2.0, 2.0\] \(encode the frame's",
         ),
     ],
@@ -303,7 +303,7 @@ def test_device_that_runs_out_of_memory_is_told_on_one_line(executor_named, kit,
         raise MemoryError("no\nmemory")
 
     monkeypatch.setattr(executor, "_store", full)
-    with pytest.raises(InputError, match=r"'3 x 2': the device does not run it: no memory \(split the image"):
+    with pytest.raises(InputError, match=r"'3 x 2': the device cannot run it: no memory \(split the image"):
         executor.run(artifact, {"a": np.zeros((2, 3, 1), np.float32)})
 
 

@@ -240,7 +240,7 @@ def test_executors_draw_into_as_many_textures_as_ranks_fill(executor_named, kit,
 
 def test_opengl_refuses_ranks_of_more_than_eight_textures(kit) -> None:
     with pytest.raises(
-        CompileError, match=r"rank 33: the image between both passes .* writes at most 32; use a smaller ran"
+        CompileError, match=r"rank 33: the intermediate image .* writes at most 32; use a smaller ran"
     ):
         compile_program(paper_s(kit), "opengl", rank=33)
 
@@ -252,10 +252,10 @@ def test_ranks_that_no_layer_has(kit, rank) -> None:
 
 
 def test_the_images_are_those_of_the_first_pass(executor_named, kit) -> None:
-    """Their ranges are checked; nobody can give the image between both passes."""
+    """Their ranges are checked; nobody can give the intermediate image."""
     artifact = compile_program(paper_s(kit), "opencl", rank=2)
     images = images_of({"color": 3, "normal": 3}, (4, 4))
     with pytest.raises(InputError, match="images for the kernel"):
         executor_named("opencl").run(artifact, {factor.HORIZONTAL: np.zeros((4, 4, 2), np.float32)})
-    with pytest.raises(InputError, match="the kernel's bound holds for numbers in"):
+    with pytest.raises(InputError, match="the kernel's bound holds for values in"):
         executor_named("opencl").run(artifact, {**images, "color": 2 * images["color"]})

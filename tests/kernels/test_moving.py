@@ -140,7 +140,7 @@ def test_pictures_of_a_stream_come_in_order(executor, model):
 def test_an_image_that_is_read_later_is_of_its_own_picture(executor, model):
     shots = [cubes(time) for time in TIMES[:2]]
     with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
-        with pytest.raises(InputError, match="pipeline: has drawn no image yet"):
+        with pytest.raises(InputError, match="pipeline: has rendered no image yet"):
             pipeline.later()
         pipeline.draw(1)
         first, kept = pipeline.later("normal", "color"), pipeline.image("normal")

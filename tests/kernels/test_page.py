@@ -217,5 +217,5 @@ def test_too_many_moving_numbers_are_refused():
 
 
 def test_a_scene_that_changes_its_form_is_refused():
-    with pytest.raises(CompileError, match="laid out in another way"):
+    with pytest.raises(CompileError, match="its layout differs"):
         P.moving_numbers(animation("glossy", 0.0, 0.1), SETTINGS)

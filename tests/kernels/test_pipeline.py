@@ -484,7 +484,7 @@ def test_sums_that_an_encoding_does_not_read_are_refused(executor, sums):
 def test_refusals(executor, model_of):
     model = model_of(("color",), 1, "clamp")
     with Pipeline(executor, scene("empty"), model, (2, 3)) as pipeline:
-        with pytest.raises(InputError, match="pipeline: has drawn no image yet"):
+        with pytest.raises(InputError, match="pipeline: has rendered no image yet"):
             pipeline.picture()
         with pytest.raises(InputError, match="feature image 'normal': is not one of color"):
             pipeline.image("normal")

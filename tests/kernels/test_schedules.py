@@ -309,7 +309,7 @@ def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
     )
     with pytest.raises(
         CompileError,
-        match=r"needs groups of 1048576 items, and at most \d+ are to be had; use schedule plain",
+        match=r"needs groups of 1048576 items, and at most \d+ are available; use schedule plain",
     ):
         executor.build(large)
 

@@ -509,7 +509,7 @@ def test_parameters_that_are_not_finite_are_never_handed_out(opencl: Any) -> Non
 
 def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
     double = train.train(SMALL, PAIRS, until=1, dtype=np.float64)
-    with pytest.raises(InputError, match="type of the state's numbers 'float64': a device trains in float32"):
+    with pytest.raises(InputError, match="type of the state's values 'float64': a device trains in float32"):
         train_on(opencl, SMALL, PAIRS, state=double)
     with pytest.raises(InputError, match=r"executor that trains 'numpy': has no compiled trainer \(use exec"):
         train_on(executor_named("numpy"), SMALL, PAIRS)
@@ -518,7 +518,7 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(opencl, "trains", False)  # as on a GPU
         with pytest.raises(
-            InputError, match=r"device that trains '.*': the step is scheduled for processors"
+            InputError, match=r"device that trains '.*': the training step is scheduled for CPUs"
         ):
             train_on(opencl, SMALL, PAIRS)
     monkeypatch.setattr("wamnet.kernels.devices.opencl_trainer.INDEX_LIMIT", 100)

@@ -175,7 +175,7 @@ def test_a_worker_of_another_version_refuses() -> None:
         carry_out(replace(task, version="99"))
     copy = pickle.loads(pickle.dumps(caught.value))
     assert str(copy) == str(caught.value)
-    assert copy.way_out == "install that one there"
+    assert copy.way_out == "install that version there"
 
 
 def test_animation_times() -> None:

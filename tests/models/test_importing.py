@@ -268,7 +268,7 @@ REFUSED = {
     "large": (
         [("Conv", "xw", "a"), RELU, ("Conv", "bv", "y")],
         {"w": np.float32(np.ones((90, 2, 17, 17))), "v": np.float32(np.ones((1, 90, 17, 17)))},
-        r"neurons of a layer on its window 26010: at most 8192",
+        r"neurons of a layer over its window 26010: at most 8192",
     ),
 }
 """Graphs, and what is said of them."""

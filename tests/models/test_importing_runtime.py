@@ -338,7 +338,7 @@ LARGE = {
             )
         ],
         {"w": ONE[:, :, :16, :16]},
-        "places that a pixel depends on .*: at most 524288 in all layers",
+        "positions that a pixel depends on .*: at most 524288 in all layers",
     ),
     "axes": ([("Unsqueeze", "xa", "b")], {"a": np.arange(10**5)}, "axes of int64, .*: at most 16 integers"),
     "layers": (

@@ -165,7 +165,7 @@ DAMAGE = {
         with_tensor("layer3.weight", np.zeros((3, 3), np.float32)),
         "'layer2.weight' must be",
     ),
-    "no features": (without("features"), "list of header texts '.*': 'features' must be among them"),
+    "no features": (without("features"), "list of header entries '.*': 'features' must be among them"),
     "features unknown": (
         with_text("features", '["glow"]'),
         "model: feature 'glow': unknown",
@@ -196,7 +196,7 @@ DAMAGE = {
     ),
     "not finite": (
         with_tensor("layer1.bias", np.array([0, np.nan, np.inf], np.float32)),
-        "layer 1: number of NaN or infinite parameters, or huge ones, 2",
+        "layer 1: number of NaN, infinite or huge parameters 2",
     ),
     "shape": (with_tensor("layer1.weight", np.zeros((3, 5), np.float32)), r"layer 1 'weights \(3, 5\)"),
     "type": (with_tensor("layer1.bias", np.zeros(3, np.int64)), "types of the parameters 'float32, int64"),

@@ -79,7 +79,7 @@ def test_different_sizes_are_refused() -> None:
     """The message gives each layer's width x height."""
     frame = Frame({"color": np.zeros((2, 3, 3)), "depth": np.zeros((3, 2, 1))})
     with pytest.raises(
-        InputError, match="sizes of the layers 'color 3x2, depth 2x3': all layers must have one size"
+        InputError, match="sizes of the layers 'color 3x2, depth 2x3': all layers must have the same size"
     ):
         validate(frame)
 

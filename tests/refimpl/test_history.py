@@ -90,7 +90,7 @@ def test_the_corners_of_a_box_are_those_of_its_pose():
 
 def test_scenes_of_other_primitives_are_refused():
     """HIS-2."""
-    with pytest.raises(InputError, match=r"primitives of the scene before 33: .*counterpart"):
+    with pytest.raises(InputError, match=r"primitives of the previous scene 33: .*counterpart"):
         H.motion(canonical("cornell"), replace(canonical("minicubes"), lights=()))
 
 

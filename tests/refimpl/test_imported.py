@@ -59,9 +59,9 @@ WRONG = {
     "kind": ({"steps": (Step("tanh", ()),)}, "step of layer 0 'tanh': a known one"),
     "numbers": ({"steps": (Step("sine", (0.0,)),)}, "step of layer 0, sine .*: a scale other than 0"),
     "slope": ({"steps": (Step("leaky", (1.5,)),)}, r"a slope in \[0, 1\]"),
-    "not float32": ({"steps": (Step("relu", (0.1,)),)}, "a floor, as float32 holds it"),
-    "clip": ({"low": 1.0, "high": 0.0}, "clip .*: numbers of float32, in order"),
-    "no number": ({"low": float("nan")}, "clip .*: numbers of float32, in order"),
+    "not float32": ({"steps": (Step("relu", (0.1,)),)}, "a floor, exact in float32"),
+    "clip": ({"low": 1.0, "high": 0.0}, "clip .*: must be float32 values, low < high"),
+    "no number": ({"low": float("nan")}, "clip .*: must be float32 values, low < high"),
 }
 
 

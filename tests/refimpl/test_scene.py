@@ -121,7 +121,7 @@ REFUSALS = [
     ),
     ("name", 3, "scene.name 3: must be a string"),
     ("name", ..., "scene.name: missing"),
-    ("info", [], r"scene.info \[\]: must map texts to texts"),
+    ("info", [], r"scene.info \[\]: must map strings to strings"),
     ("colour", 1, r"scene.colour 1: Scene has no such key \(choose one of name, camera"),
     ("camera", 1, r"scene.camera 1: must be a JSON object \(give the keys of a camera"),
     ("camera.position", [0, 0], r"scene.camera.position \[0, 0\]: must have 3 entries"),
@@ -218,7 +218,7 @@ def test_refuses(path, value, message):
         ),
         (
             {"sun_concentration": float("nan")},
-            r"environment.sun_concentration nan: all numbers must be finite",
+            r"environment.sun_concentration nan: all values must be finite",
         ),
     ],
 )
@@ -242,7 +242,7 @@ def test_refuses_texts_that_are_no_scene(text):
 
 def test_refuses_infinite_numbers_in_scenes_made_in_python():
     scene = replace(EVERYTHING, spheres=(S.Sphere((float("inf"), 0.0, 0.0), 0.25, GREY),))
-    with pytest.raises(InputError, match=r"scene.spheres\[0\].center .*: all numbers must be finite"):
+    with pytest.raises(InputError, match=r"scene.spheres\[0\].center .*: all values must be finite"):
         S.validate(scene)
 
 

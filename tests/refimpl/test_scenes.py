@@ -133,5 +133,5 @@ def test_the_farthest_times_are_scenes(name):
 
 
 def test_a_background_beyond_float32_is_refused():
-    with pytest.raises(InputError, match=r"scene.background .*: all numbers must be finite and at most"):
+    with pytest.raises(InputError, match=r"scene.background .*: all values must be finite and at most"):
         scenes.canonical("empty", background=1e308)

@@ -45,7 +45,7 @@ def exports(
         typer.Option(metavar="NAME,...", help="Export targets to measure.", show_default="all"),
     ] = None,
     places: Annotated[
-        bool, typer.Option("--places", help="Every storage of the weights, without the path tracer.")
+        bool, typer.Option("--places", help="Export every weight storage, without the path tracer.")
     ] = False,
 ) -> None:
     """Export for every target, compile, run, check against the bound, and print the verdicts.

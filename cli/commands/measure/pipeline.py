@@ -70,11 +70,11 @@ def pipeline(
 ) -> None:
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 
-    [bold]ours, moving[/] is one pipeline on a device in which every frame has another time; the table
+    [bold]ours, moving[/] is one pipeline on a device in which every frame has a different time; the table
     has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
     [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
-    own (package bpy). All are interleaved. The first frame waits for its kernel; with empty caches, in a
-    separate process, for all. The network has random weights.
+    own (package bpy). All are interleaved. The first frame includes the compilation of its kernel; with
+    empty caches, in a separate process, that of all kernels. The network has random weights.
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring

@@ -47,8 +47,8 @@ def primitives(
 
     The table has the lines and size of the source, the seconds to trace and emit it, the seconds until
     the driver has built it and traced a first row of paths (without disk caches), and million samples
-    per second: median and range of the interleaved rounds. A star marks the scene's own form; a tree is
-    measured only if it is expected to pay off.
+    per second: median and range of the interleaved rounds. A star marks the form that the compiler
+    chooses; a tree is measured only if it is expected to pay off.
     """
     from ....kernels import open_executor
     from ....kernels.bench import measure_primitives as measuring

@@ -51,10 +51,10 @@ def render(
 ) -> None:
     """Measure samples per second: the reference renderer, its kernels, Mitsuba 3, Embree.
 
-    Each renders its first frame with empty compiler caches, then they are interleaved. The table has the
-    median and the range, samples (paths) per second, and the ratio to the last row's. Below it is the
-    difference of each mean colour from the first one's, in standard errors. [bold]pip install mitsuba[/]
-    adds Mitsuba, which also needs libLLVM; the Embree baseline needs a C compiler and libembree-dev.
+    Each renders its first frame with empty compiler caches, then all are interleaved. The table has the
+    median and the range, samples (paths) per second, and the ratio to the last row's. A second table
+    has the difference of each mean colour from the first one's, in standard errors. [bold]pip install
+    mitsuba[/] adds Mitsuba, which also needs libLLVM; Embree needs a C compiler and libembree-dev.
     """
     from ....kernels.bench import measure_render as measuring
     from ....kernels.bench.workload import check_size

@@ -66,7 +66,7 @@ def import_model(
 ) -> None:
     """Import a small ONNX network as a model that compile, export and certify accept.
 
-    Supported are Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip, as PyTorch exports
+    Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip are supported, as PyTorch exports
     them. A convolution becomes a layer on a window; the border rule of the image is that of the
     network's own padding. An operator that cannot become part of a kernel is rejected with its node's
     name.
@@ -98,7 +98,7 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
         low = high = math.nan
     if not low < high or math.isinf(high - low):
         rule = "must be LOW:HIGH or INPUT=LOW:HIGH, two numbers in order"
-        raise InputError("--range", text, rule, "give what the network is run on, as in --range -1:1")
+        raise InputError("--range", text, rule, "give the range of the network's inputs, as in --range -1:1")
     return name, (low, high)
 
 

@@ -141,9 +141,9 @@ def test_a_biased_affine_map() -> None:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (lambda x: np.floor(affine(x)), "floor has no derivative rule; there are: affine, parameter, add"),
+        (lambda x: np.floor(affine(x)), "floor has no derivative rule; supported: affine, parameter, add"),
         (lambda x: np.sin(affine(x)) + affine(x + 1.0), "parameter W0 is used twice"),
-        (lambda x: x * affine(x)[..., 0], r"%\d+ multiply: a number that depends on weights meets a vector"),
+        (lambda x: x * affine(x)[..., 0], r"%\d+ multiply: a scalar that depends on weights meets a vector"),
         (lambda x: np.stack([affine(x)[..., 0]] * 3, axis=-1), "stack has no derivative rule"),
     ],
 )

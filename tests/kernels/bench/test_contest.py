@@ -368,7 +368,7 @@ def test_choice_by_name_and_executor() -> None:
     assert names(["open*", "peer"], []) == ["opencl:plain", "peer"]
     assert names([], ["numpy"]) == ["numpy:plain", "peer"]
     with pytest.raises(
-        InputError, match=r"name of a contender 'nobody': matches none \(choose one of numpy:plain"
+        InputError, match=r"name of a program 'nobody': matches none \(choose one of numpy:plain"
     ):
         names(["nobody"], [])
 

@@ -383,8 +383,8 @@ def test_a_variant_of_low_rank_is_two_kernels(target):
             "--weights 'texture': is not available for target wgsl",
         ),
         (Request(model(), "onnx", SCENE), "--scene 'lone_light': a graph denoises"),
-        (Request(model(), "onnx", weights="buffer"), "--weights 'buffer': a graph holds its weights"),
-        (Request(model(), "onnx", schedule="plain"), "--schedule 'plain': a runtime orders a graph's work"),
+        (Request(model(), "onnx", weights="buffer"), "--weights 'buffer': the graph contains them"),
+        (Request(model(), "onnx", schedule="plain"), "--schedule 'plain': the runtime schedules it"),
         (
             Request(model(), "wgsl", schedule="tile:16"),
             "--schedule 'tile:16': is not available for target wgsl",

@@ -275,8 +275,8 @@ def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:
             place = f"layer {layer}, %{index}" if layer >= 0 else f"%{index}"
             raise CompileError(
                 f"{node.op} ({place}) may reach {np.nanmax(enclosure.size):.3g}: the float32 "
-                f"maximum is {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or features "
-                "of a smaller range, or profile native, which then has no bound"
+                f"maximum is {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or "
+                "features of a smaller range, or profile native, which then has no bound"
             )
 
 

@@ -150,7 +150,7 @@ def animate(
     _say_what_is_not_learned(output, shots, network)
     with (
         working_in(folder, "drawing pictures"),
-        hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"),
+        hint_on_interrupt(lambda: f"{folder}: the same command resumes"),
     ):
         made, watch = _draw(shots, folder, network, by, rank)
         if is_film:
@@ -185,7 +185,7 @@ def _draw(
         say(line)
     with (
         open_executor(executor) as runner,
-        progress("drawing", len(left)) as advance,
+        progress("rendering", len(left), "frames") as advance,
     ):
         together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
         draw = draw_frames if together else partial(draw_apart, film=shots)
@@ -240,7 +240,7 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
     found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
-        say(f"{output}: {len(unlike)} of {len(shots)} frames are unlike those of the training: {sentence}")
+        say(f"{output}: {len(unlike)} of {len(shots)} frames differ from the training frames: {sentence}")
 
 
 def scene_of(model: Model) -> str:

@@ -210,7 +210,7 @@ def bench(
     forms = _forms(network, train_variants, quick, counts["steps"])
     forms = _needed(forms, *taking_part, size=numbers["size"], quick=quick)
     with working_in(output, "measuring"):
-        with hint_on_interrupt(lambda: f"the same command resumes with the frames and forms in {output}"):
+        with hint_on_interrupt(lambda: f"{output}: the same command resumes"):
             shown = what.frames(network, output, numbers["size"], counts)
             trained = what.train(network, forms, output)
         request = _request(name, network, shown, quick=quick, first_runs=first_runs, **numbers)
@@ -326,7 +326,7 @@ def measure(
         if output:
             make_folder(output)
         contest = Contest(request, taking_part, tools, told=lambda what, share: advance(share))
-        hint = f"what was measured until then is in {output}" if output else "nothing is kept"
+        hint = f"{output}: has the results so far" if output else "nothing is kept"
         with hint_on_interrupt(lambda: hint):
             try:
                 contest.run()

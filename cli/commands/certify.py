@@ -9,7 +9,7 @@ import typer
 
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
-from ..common.terminal import say, table
+from ..common.terminal import progress, say, table
 
 EXAMPLES = """Examples:
 
@@ -85,14 +85,15 @@ def certify(
     try:
         show(check(path))
         if text:
-            done = check_text(path, source)
-            say(f"text: computes that program: {done['sums']} sums, at {done['lanes']} places")
+            with progress("checking the source", None):
+                done = check_text(path, source)
+            say(f"source: computes the certified program: {done['sums']} sums, at {done['lanes']} positions")
             say(ASSUMED)
     except Refused as step:
-        say(f"refused: {step}")
+        say(f"rejected: {step}")
         raise typer.Exit(STATUS_REFUSED) from None
     except Unread as error:
-        say(f"text: not checked: this reader does not know {error}")
+        say(f"source: not checked: the checker does not support {error}")
         raise typer.Exit(STATUS_UNCHECKED) from None
 
 
@@ -102,7 +103,7 @@ def show(held: Any) -> None:
 
     if held["schema"] == INTEGERS:
         table(*sums_table(held))
-        say("holds: no operation rounds; every number is the reference's, for all images of integers")
+        say("holds: no operation rounds; every value equals the reference's, for all integer images")
         return
     table(*layers_table(held))
     bound = max(held["bound"]["output"])

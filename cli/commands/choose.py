@@ -152,11 +152,11 @@ def _kept_or_measured(
     wanted = Curve(variants.digest_of(model), runner.device, (side, side), profile, ())
     key = curve.key_of(wanted, runner.name, digest, names)
     if (kept := curve.cached(key, wanted)) is not None:
-        say(f"curve: {len(kept.points)} points measured before, kept in {cache.path_of(key)}")
+        say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
         return kept
     with progress(f"measuring {len(names)} variants", 1.0) as advance:
         found = measure_curve.measure(runner, model, (side, side), profile, pairs, names, on_done=advance)
     path = cache.write_json(key, found.as_data())
-    where = f"kept in {path}" if path else "not kept: there is no cache folder that can be written"
-    say(f"curve: {len(found.points)} points measured now, {where}")
+    where = f"cached in {path}" if path else "not cached: no cache folder is writable"
+    say(f"curve: {len(found.points)} points, measured now, {where}")
     return found

@@ -131,7 +131,7 @@ def _write(kernel: Files, folder: Path) -> None:
     if "reason" in picked:
         say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
     if not isinstance(kernel, Artifact):
-        say("no certificate: a scene's kernel has none, its path has no bound over all pixels")
+        say("no certificate: path kernels have none, since paths have no bound over all pixels")
     elif kernel.plan.unproven:
         say(f"no certificate: {kernel.plan.unproven}")
 

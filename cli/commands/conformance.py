@@ -206,7 +206,7 @@ def _asked(
     from ...spec.conformance.protocol import Session
 
     total = sum(map(len, cases.values()))
-    with Session(command, timeout) as session, progress("asking", total) as advance:
+    with Session(command, timeout) as session, progress("testing", total, "cases") as advance:
         return list(run.run(session, cases, profile, advance))
 
 
@@ -247,7 +247,7 @@ def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case
 
     first = first_blamed(failed)
     if first is not None and len(failed) > 1:
-        say(f"look first at {first.clause}: {first.id} fails, and what others are made of comes before them")
+        say(f"look first at {first.clause}: {first.id} fails, and others depend on it")
     by_id = {case.id: case for some in cases.values() for case in some}
     for verdict in failed[:SHOWN_FAILURES]:
         for line in about(verdict, by_id[verdict.id], f"{again} {verdict.id}"):

@@ -249,7 +249,7 @@ def _make_from_scene(folder: Path, request: Request, workers: int | None, schedu
     """Make the data set of a request, and say how to resume after an interrupt."""
     from ...models.data.frame_plan import plan
 
-    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
+    with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
         make(folder, request, plan(request), workers, scheduler)
 
 
@@ -261,7 +261,7 @@ def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, .
     known = {*OF_BOTH, *OF_BLENDER, "from_blender", "output"}
     others = [each.name for each in command.command.params if each.name and each.name not in known]
     options.refuse_given(command, others, "with --from-blender")
-    with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
+    with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
         make_it(folder, Asked(*asked))
 
 
@@ -293,12 +293,12 @@ def make(
         # A device that is missing here is reported before a folder needs it.
         open_executor(request.executor).close()
     with (
-        progress("checking", known) as look,
+        progress("checking", known, "bytes") as look,
         dataset_files.Store.open(folder, request, frames, look, nearest) as store,
     ):
         made, again = len(store.missing), [name for name, what in store.missing.items() if what == "damaged"]
         for name in again:
-            say(f"{folder / name}: damaged, is made again")
+            say(f"{folder / name}: damaged, rendered again")
         if made:
             _render(store, request, frames[0], workers, scheduler)
     for line in summed_up(nearest):
@@ -312,7 +312,7 @@ def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     from ...models.data import frame_plan
 
     tests = any(frame.split != frame_plan.TRAIN for frame in frames)
-    with progress("comparing what the frames show", len(frames) if tests else 0) as advance:
+    with progress("comparing views", len(frames) if tests else 0, "frames") as advance:
         found = frame_plan.compared(frames, advance)
     return {split: comparison.as_data() for split, comparison in found.items()}
 
@@ -322,7 +322,7 @@ def summed_up(nearest: Mapping[str, Mapping[str, float]]) -> list[str]:
     return [
         f"{split} frames differ from the nearest training frame in {100 * d['differing']:.0f} % of the "
         f"pixels at least; nearest time {d['time_s']:.3f} s, camera {d['camera_deg']:.2f} degrees, distance "
-        f"{100 * d['distance']:.2f} %, lamps {d['lamps']:.3f}"
+        f"{100 * d['distance']:.2f} %, lights {d['lamps']:.3f}"
         for split, d in nearest.items()
     ]
 
@@ -350,7 +350,7 @@ def _render(
     shown, pixels = first.pictures[KINDS[0]].scene, request.size_px**2
     for line in said_of_rendering(shown, total, pixels, request.executor, workers):
         say(line)
-    with progress("rendering", total) as advance:
+    with progress("rendering", total, "samples") as advance:
         if scheduler is None and workers == 1:
             cluster.do_here(tasks, lambda task: carry_out(task, advance), store.put)
             return
@@ -372,9 +372,9 @@ def check(folder: Path, scene: str | None = None) -> None:
         rule = "--check looks at the folder, whatever it shows"
         raise InputError("argument SCENE", scene, rule, "leave it out: wamnet dataset --check -o FOLDER")
     manifest = dataset_files.read_manifest(folder)
-    with progress("checking", dataset_files.bytes_of(manifest)) as look:
+    with progress("checking", dataset_files.bytes_of(manifest), "bytes") as look:
         wrong = dataset_files.verify(folder, manifest, look)
     for name, what in wrong.items():
         say(f"{folder / name}: {what}")
     dataset_files.refuse_wrong(folder, wrong)
-    say(f"{folder}: {2 * len(manifest['frames'])} pictures are as {dataset_files.MANIFEST} says")
+    say(f"{folder}: {2 * len(manifest['frames'])} images match {dataset_files.MANIFEST}")

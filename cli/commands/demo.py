@@ -139,7 +139,7 @@ def demo(
     size_of = "--quick" if quick else f"--size {plan.size_px}"
     scene_of = [] if scene == Plan.scene else ["--scene", scene]
     command = shlex.join(["wamnet", "demo", *scene_of, *size_of.split(), "-o", str(folder)])
-    with begun(plan, folder), hint_on_interrupt(lambda: f"resume with the same command: {command}"):
+    with begun(plan, folder), hint_on_interrupt(lambda: f"{folder}: the same command resumes ({command})"):
         results = carry_out(plan, folder)
         speed = (
             None if quick else _timed(results.seconds, "speed", lambda: measure_speed(plan, results, folder))
@@ -216,7 +216,7 @@ def _check_note(folder: Path, text: str) -> bool:
 def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
-    say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest that are available here")
+    say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest available")
     for line in said_of_learning(plan.train_frames, plan.size_px**2):
         say(line)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))
@@ -335,7 +335,7 @@ def run_kernels(
     kernels = {target: compile_program(lower(model), target) for target in TARGETS}
     for target, kernel in kernels.items():
         write_kernel(kernel, output / "kernels" / target)
-    with progress("running kernels", len(kernels)) as advance:
+    with progress("running", len(kernels), "kernels") as advance:
         images, runs = run_all(model, frames[0], kernels, advance)
     by = next(name for name in SHOWN_FIRST if name in images)
     with open_executor(by) as executor:

@@ -232,7 +232,7 @@ def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], outpu
         job.write(task[1], task[0], encoded, task[2])
 
     with (
-        hint_on_interrupt(lambda: f"{output}: the same command resumes with the remaining frames"),
+        hint_on_interrupt(lambda: f"{output}: the same command resumes"),
         progress("denoising", len(missing), "frames") as advance,
     ):
         failed = overlapped(missing, lambda task: job.read(task[0]), work, write, advance)

@@ -304,7 +304,7 @@ def _checked(made: Export) -> None:
     for name, value in zip(HEAD, verdict.cells(), strict=True):
         say(f"{name}: {value}")
     if verdict.bound == 0:
-        say(f"SHA-256 of the picture: {verdict.digest}; the reference's: {digest_of(made.pair.output)}")
+        say(f"SHA-256 of the image: {verdict.digest}; the reference's: {digest_of(made.pair.output)}")
     if not verdict.holds:
         say(f"wrong: {verdict.wrong}")
         raise typer.Exit(STATUS_WRONG)

@@ -99,7 +99,7 @@ def render(
     for line in said_of_rendering(loaded, job.samples, width * height, tracer, workers):
         say(line)
     started = clock.perf_counter()
-    with progress(f"rendering {scene}", job.samples) as advance:
+    with progress(f"rendering {scene}", job.samples, "samples") as advance:
         frame = render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
     seconds = clock.perf_counter() - started
     write_picture(path, frame, exposure)

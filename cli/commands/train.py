@@ -313,13 +313,13 @@ def _fit_to_the_end(
     saved = checkpoint_path(output)
 
     def hint() -> str:
-        return f"continue with --resume, from {saved}" if saved.exists() else "no step was done"
+        return f"{saved}: --resume continues from it" if saved.exists() else "no step was done"
 
     with hint_on_interrupt(hint):
         state, _ = fit(recipe, pairs, output, begin, network, executor)
     if begin is not None and recipe.steps != begin.recipe.steps:
         before, now = begin.recipe.steps, recipe.steps
-        say(f"the run of {before} steps became one of {now}: another model than with {now} from the start")
+        say(f"run extended from {before} to {now} steps: the model differs from one of a {now}-step run")
     return state
 
 
@@ -400,7 +400,7 @@ def fit(
 
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
-    with progress("training", recipe.steps - seen) as advance:
+    with progress("training", recipe.steps - seen, "steps") as advance:
 
         def on_progress(now: TrainState, _loss: float) -> None:
             nonlocal kept, seen

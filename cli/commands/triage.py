@@ -129,7 +129,7 @@ def triage(
     if found is None:
         return
     keep(output, task, verdicts, found, model)
-    say(f"{output}: kept what repeats it; {output / README} has the command")
+    say(f"{output}: reproducer written; {output / README} has the command")
     raise typer.Exit(STATUS_DEVIATES)
 
 
@@ -172,7 +172,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
         except ExecutorUnavailable as error:
             if way in wanted:
                 raise
-            say(f"not here: {error}")
+            say(f"not available: {error}")
     if not runners:
         raise ExecutorUnavailable(f"none of {', '.join(wanted)} is available; see wamnet executors")
     return runners
@@ -190,7 +190,7 @@ def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
     if task.kept:
         task.kept.check_ran(kernels)
     judge, verdicts = Judge(task.images), []
-    with progress("kernels", len(kernels)) as advance:
+    with progress("running", len(kernels), "kernels") as advance:
         for kernel in kernels:
             verdicts.append(judge.verdict(kernel))
             advance(1)
@@ -210,7 +210,7 @@ def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
         return None
     found = reduced(verdicts, task.model, task.profile, task.images, task.compiled)
     again = "" if found.repeats else ", because it did not show again"
-    say(f"smallest part that shows it: {found.box.text}{again}")
+    say(f"smallest part that reproduces it: {found.box.text}{again}")
     for stage in found.stages:
         say(stage.text)
     if task.kept:

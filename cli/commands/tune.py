@@ -87,7 +87,7 @@ def tune(
     if known:
         say(f"measured on {found.day}; --force measures again")
     for count, pick in picks.items():
-        say(f"for {count} picture{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
+        say(f"for {count} image{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
 
 
 @contextmanager

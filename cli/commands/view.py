@@ -109,13 +109,13 @@ def serve(page: bytes, port: int, browser: bool) -> None:
         raise InputError("--port", port, f"cannot be opened: {reason}", "choose another, or 0") from None
     with server:
         address = f"http://{HOST}:{server.server_address[1]}/"
-        say(f"{address} (Ctrl-C ends)")
+        say(f"{address} (Ctrl-C to stop)")
         if browser:
             webbrowser.open(address)
         try:
             server.serve_forever()
         except KeyboardInterrupt:
-            say("ended")
+            say("stopped")
 
 
 class PageServer(ThreadingHTTPServer):

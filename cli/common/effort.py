@@ -84,7 +84,7 @@ def said_of_rendering(
         return []
     seconds = seconds_of(count, samples, pixels, executor, workers or len(os.sched_getaffinity(0)))
     work = f"{count:,} primitives and {samples:,} samples"
-    return [f"{work}: {_about(seconds, bytes_of(count, pixels))}; Ctrl-C ends it"]
+    return [f"{work}: {_about(seconds, bytes_of(count, pixels))}; Ctrl-C stops it"]
 
 
 def said_of_compiling(scene: Scene) -> list[str]:
@@ -92,7 +92,7 @@ def said_of_compiling(scene: Scene) -> list[str]:
     count = primitives_of(scene)
     if count < MANY_PRIMITIVES:
         return []
-    return [f"{count:,} primitives: {_about(count * _COMPILE_S, bytes_of(count, 0))}; Ctrl-C ends it"]
+    return [f"{count:,} primitives: {_about(count * _COMPILE_S, bytes_of(count, 0))}; Ctrl-C stops it"]
 
 
 def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) -> list[str]:
@@ -100,9 +100,9 @@ def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) ->
     seconds, pixels = contenders * len(sizes) * budget_s, max(sizes) ** 2
     if seconds < LONG_S and pixels < MANY_PIXELS:
         return []
-    work = f"{contenders} contender{'s' if contenders > 1 else ''} and images of up to {pixels:,} pixels"
+    work = f"{contenders} program{'s' if contenders > 1 else ''} and images of up to {pixels:,} pixels"
     return [
-        f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C ends it"
+        f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C stops it"
     ]
 
 
@@ -111,7 +111,7 @@ def said_of_learning(frames: int, pixels: int) -> list[str]:
     if frames * pixels < MANY_PIXELS:
         return []
     size = f"{frames * pixels * _PAIR_BYTES // 2**20:,} MiB of memory"
-    return [f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C ends it"]
+    return [f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C stops it"]
 
 
 def _about(seconds: float, size: int) -> str:

@@ -1,4 +1,4 @@
-"""The executor that a command runs on: the one that is named, or the fastest that is available here."""
+"""The executor that a command runs on: the one that is named, or the fastest available."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ def fastest(*, because: str = "", trains: bool = False, work: str = "executor") 
     name, passed = ("numpy", []) if because else registry.fastest(trains)
     for reason in passed:
         say(f"not {reason}")
-    say(f"{work} {name}: {because or 'the fastest that is available here'}")
+    say(f"{work} {name}: {because or 'the fastest available'}")
     return name

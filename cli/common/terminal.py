@@ -17,9 +17,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
-    TaskProgressColumn,
     TextColumn,
-    TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.table import Table
@@ -28,8 +26,8 @@ from rich.text import Text
 from ...refimpl.errors import escaped, shown
 
 
-class _Rate(ProgressColumn):
-    """How many of a unit are done per second."""
+class _Work(ProgressColumn):
+    """How much of the total is done, and how much per second; a share where the work has no unit."""
 
     def __init__(self, unit: str) -> None:
         super().__init__()
@@ -37,7 +35,15 @@ class _Rate(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """Return the text of a task."""
-        return Text(f"{task.speed:.1f} {self._unit}/s" if task.speed else "")
+        if not self._unit:
+            return Text(f"{task.percentage:.0f} %,")
+        rate = f", {_short(task.speed, 1)} {self._unit}/s" if task.speed else ""
+        return Text(f"{_short(task.completed)} of {_short(task.total or 0)} {self._unit}{rate},")
+
+
+def _short(number: float, digits: int = 0) -> str:
+    """Return a count or a rate of few characters."""
+    return f"{number / 1e6:.1f}M" if number >= 1e6 else f"{number:,.{digits}f}"
 
 
 Advance = Callable[[float], None]
@@ -65,22 +71,15 @@ def hint_on_interrupt(hint: Callable[[], str]) -> Iterator[None]:
 
 
 @contextmanager
-def progress(title: str, total: float, unit: str = "") -> Iterator[Advance]:
+def progress(title: str, total: float | None, unit: str = "") -> Iterator[Advance]:
     """Show a progress bar on a terminal, and nothing where standard error is a file or a pipe.
 
-    With the name of a `unit` it shows how many of them are done per second.
+    It has one form: a verb, the count of the total in its `unit`, the rate, and the time left; without a
+    total (None) it has only the verb.
     """
     console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("passed,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-        *([_Rate(unit)] if unit else []),
-    )
+    work = () if total is None else (_Work(unit), TimeRemainingColumn(), TextColumn("left"))
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), *work)
     with ExitStack() as opened:
         if unit and console.is_terminal:
             # Threads that read files redirect the descriptor for a moment [files/exr.py].

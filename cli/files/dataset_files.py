@@ -288,7 +288,7 @@ def read_pairs(
         pairs.append((noisy, Frame({"color": target["color"]}, target.info)))
     for text, count in said.items():
         if tell is not None:
-            tell(f"{folder}, {count} of {2 * len(frames)} pictures: {text}")
+            tell(f"{folder}, {count} of {2 * len(frames)} images: {text}")
     return pairs
 
 
@@ -403,10 +403,10 @@ class Store(Generic[BandT]):
 
     def summary(self, made: int) -> list[str]:
         """Return a line per picture with other bytes than an earlier run's, and the number of pictures."""
-        reason = "has other bytes than before; another NumPy or processor made it"
-        count = f"{len(self.pictures)} pictures of {len(self.frames)} frames"
+        reason = "differs from the earlier run's; another NumPy or processor wrote it"
+        count = f"{len(self.pictures)} images of {len(self.frames)} frames"
         changed = [f"{self.folder / name}: {reason}" for name in self.changed]
-        return [*changed, f"{self.folder}: {count}, {made} of them made now"]
+        return [*changed, f"{self.folder}: {count}, {made} of them rendered now"]
 
     def put(self, task: Band, band: Frame) -> None:
         """Keep a rendered band; when it is its picture's last one, finish the picture."""

@@ -38,9 +38,9 @@ def compare_paths(
     check_samples(job)
     view = View(job.width, job.height, job.first_sample, job.seed)
     with kernels.open_executor(executor) as device:
-        with progress(f"paths of {name}", job.settings.max_depth + 1) as advance:
+        with progress(f"comparing paths of {name}", job.settings.max_depth + 1, "bounces") as advance:
             paths = compare_paths(device, scene, job.settings, view, on_progress=advance)
-        with progress(f"pictures of {name}", job.width * job.height * job.spp) as advance:
+        with progress(f"rendering {name}", job.width * job.height * job.spp, "samples") as advance:
             image = compare_images(device, scene, job, on_progress=advance)
     if as_json:
         typer.echo(json.dumps(_as_data(name, device.device, paths, image)))

@@ -106,11 +106,11 @@ def run_text(
             if language.host:
                 check_host(text, language.host, manifest["entry_point"], claim)
     except Wrong as error:
-        raise Refused(f"text: {error}") from error
+        raise Refused(f"source: {error}") from error
     except RecursionError as error:
         raise Unread("expressions, or blocks, so deep in each other") from error
     except MEANINGLESS as error:
-        raise Refused(f"text: it has no meaning to this reader ({error})") from error
+        raise Refused(f"source: it has no meaning to the checker ({error})") from error
     finally:
         add_up_lanes(None)
     return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count, "compilers": len(texts)}

@@ -158,7 +158,7 @@ def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
     save_model(tmp_path / "f.safetensors", replace(network, info=facts))
     two = ("--scene", "mine.json", "--yaw", 9, "--seconds", 0.2, "--fps", 10, "--size", 13)
     outcome = wamnet("animate", "f.safetensors", *two, "-o", "still")
-    assert "2 of 2 frames are unlike those of the training: cornell is another scene file" in outcome.out
+    assert "2 of 2 frames differ from the training frames: cornell is another scene file" in outcome.out
     shown = varied(canonical("cornell"), Variation(9.0))
     for index in (0, 1):
         noisy = encoding.to_display(render(shown, Job(13, 13, seed=2 * index)).frame["color"], 0.0)
@@ -200,7 +200,7 @@ def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
     network = load_model(tmp_path / "m.safetensors")
     learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
     save_model(tmp_path / "n.safetensors", replace(network, info=learned))
-    begin, unlike = "outside the training ranges: ", "frames are unlike those of the training: "
+    begin, unlike = "outside the training ranges: ", "frames differ from the training frames: "
     outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
     assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
     outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")

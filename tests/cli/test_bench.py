@@ -131,9 +131,7 @@ def test_bad_input_is_refused(refused, here, arguments, message) -> None:
 def test_unknown_contenders_are_refused(wamnet, here) -> None:
     outcome = wamnet("bench", "--only", "numpy:plain,nobody", "-o", "speed")
     assert outcome.status == 2
-    assert (
-        "name of a program 'nobody': matches none (choose one of numpy:plain, opencl:plain" in outcome.err
-    )
+    assert "name of a program 'nobody': matches none (choose one of numpy:plain, opencl:plain" in outcome.err
 
 
 def test_an_output_that_is_a_file_is_refused(refused, here) -> None:
@@ -236,8 +234,8 @@ def test_frames_of_the_model_s_scene_are_rendered_once(wamnet, here, monkeypatch
     assert [draw["time_in_training"] for draw in frames["draws"]] == [False, False]
     assert min(draw["noisy_seed"] for draw in frames["draws"]) > bench_frames.TEST_SEED
     assert data["contenders"][0]["quality"]["psnr_loss_db"] is not None
-    assert re.search(r"6 pictures .*, 6 of them made now", said)
-    assert re.search(r"6 pictures .*, 0 of them made now", measured(wamnet, "--only", "numpy:plain")[1])
+    assert re.search(r"6 images .*, 6 of them rendered now", said)
+    assert re.search(r"6 images .*, 0 of them rendered now", measured(wamnet, "--only", "numpy:plain")[1])
 
 
 def test_a_time_of_training_is_named(wamnet, here, monkeypatch) -> None:

@@ -29,7 +29,7 @@ def test_the_folder_of_an_export_has_a_certificate(wamnet, samples):
 
 
 def test_the_text_is_read(wamnet, kernel):
-    assert "\ntext: computes that program: " in wamnet("certify", kernel).out
+    assert "\nsource: computes the certified program: " in wamnet("certify", kernel).out
     assert "text:" not in wamnet("certify", kernel, "--no-text").out
 
 
@@ -39,7 +39,7 @@ def test_a_text_that_was_changed_is_read(wamnet, kernel, tmp_path):
     mine.write_text(source.replace("0.318309873f", "0.318309963f"))
     outcome = wamnet("certify", kernel, "--source", mine)
     assert outcome.status == 1
-    assert "refused: text: output 0 is not the program's" in outcome.out
+    assert "rejected: source: output 0 is not the program's" in outcome.out
     mine.write_text(source.replace("++dx", "dx += 1"))
     assert wamnet("certify", kernel, "--source", mine).status == 0
 
@@ -50,7 +50,7 @@ def test_a_schedule_that_is_not_read_is_said(wamnet, samples):
     assert wamnet("compile", path, "--target", "glsl", "--schedule", "inlined", "-o", "v").status == 0
     outcome = wamnet("certify", "v")
     assert outcome.status == 3
-    assert "text: not checked: " in outcome.out.splitlines()[-1]
+    assert "source: not checked: " in outcome.out.splitlines()[-1]
     assert wamnet("certify", "v", "--no-text").status == 0
 
 
@@ -71,7 +71,7 @@ def test_entry_point_and_centre_are_bound(wamnet, kernel, key):
     changed = {"entry_point": "main", "window": {**manifest["window"], "centre": 0}}
     place = "entry_point" if key == "entry_point" else "window"
     path.write_text(json.dumps({**manifest, place: changed[place]}))
-    assert "refused: " in wamnet("certify", kernel).out
+    assert "rejected: " in wamnet("certify", kernel).out
     certificate = kernel / "denoise.certificate.json"
     stated = json.loads(certificate.read_text())
     del stated[key]
@@ -93,7 +93,7 @@ def test_a_smaller_number_is_refused(wamnet, kernel):
     path.write_text(json.dumps(held))
     outcome = wamnet("certify", path)
     assert outcome.status == 1
-    assert outcome.out.startswith("refused: layer 1: error_bound is ")
+    assert outcome.out.startswith("rejected: layer 1: error_bound is ")
     assert outcome.out.count("\n") == 1
 
 
@@ -102,7 +102,7 @@ def test_other_weights_are_refused(wamnet, kernel):
     path.write_bytes(path.read_bytes()[:-4] + b"\0\0\0\0")
     outcome = wamnet("certify", kernel)
     assert outcome.status == 1
-    assert outcome.out.startswith("refused: digest of weights.bin")
+    assert outcome.out.startswith("rejected: digest of weights.bin")
 
 
 def test_half_a_file_is_a_bad_file(refused, kernel):

@@ -55,7 +55,7 @@ def test_the_index_says_what_certify_finds(wamnet, name):
     assert row["schedule"] == manifest["schedule"]["name"]
     language = manifest["language"].partition(",")[0]
     assert row["text checked"] == (
-        f"yes, as {language}" if "text: computes that program" in outcome.out else "no"
+        f"yes, as {language}" if "source: computes the certified program" in outcome.out else "no"
     )
 
 
@@ -78,4 +78,4 @@ def test_a_text_of_the_shelf_that_is_changed_is_refused(wamnet, tmp_path):
         (tmp_path / "kernel" / file).write_text(json.dumps(told))
     outcome = wamnet("certify", tmp_path / "kernel")
     assert outcome.status == 1
-    assert "refused: text: " in outcome.out
+    assert "rejected: source: " in outcome.out

@@ -42,7 +42,7 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     assert outcome.status == 0
     summary, made = outcome.out.splitlines()
     assert summary.startswith("test frames differ from the nearest training frame in ")
-    assert made == "a: 6 pictures of 3 frames, 6 of them made now"
+    assert made == "a: 6 images of 3 frames, 6 of them rendered now"
     manifest = json.loads((tmp_path / "a/manifest.json").read_text())
     assert set(manifest["nearest"]) == {"test"}
     frames = manifest["frames"]
@@ -60,8 +60,8 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
             assert all((got[name] == values).all() for name, values in want.layers.items())
             assert want.info.items() <= got.info.items()
             assert ranges_from_json(got.info["ranges"]) == Ranges()
-    assert wamnet("dataset", "--check", "-o", "a").out == "a: 6 pictures are as manifest.json says\n"
-    assert wamnet("dataset", *TINY, "--seed", 5, "-o", "a").out.endswith(", 0 of them made now\n")
+    assert wamnet("dataset", "--check", "-o", "a").out == "a: 6 images match manifest.json\n"
+    assert wamnet("dataset", *TINY, "--seed", 5, "-o", "a").out.endswith(", 0 of them rendered now\n")
 
 
 def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
@@ -145,7 +145,7 @@ def test_check_tells_and_a_run_mends(wamnet, tmp_path) -> None:
     assert outcome.err.startswith("wamnet: error: data set 'a': 1 of its images do not match manifest.json")
     assert path.read_bytes() == b"x"
     outcome = wamnet("dataset", *TINY, "-o", "a")
-    assert outcome.out.startswith("a/train/00001-target.exr: damaged, is made again\n")
+    assert outcome.out.startswith("a/train/00001-target.exr: damaged, rendered again\n")
     assert content(tmp_path) == before
 
 
@@ -203,7 +203,7 @@ def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
     if sent == signal.SIGINT:
-        hint = b"wamnet: the same command resumes where it was, in a\n"
+        hint = b"wamnet: a: the same command resumes\n"
         assert (process.returncode, errors) == (130, hint + b"wamnet: interrupted\n")
     done = list((tmp_path / "a").rglob("0*.exr"))
     times = {path: path.stat().st_mtime_ns for path in done}

@@ -47,7 +47,7 @@ def test_frames_of_a_film_become_a_data_set(wamnet, blend, blender, tmp_path):
     outcome = wamnet("dataset", "--from-blender", blend, "--blender", blender, *TINY, "-o", "film")
     assert outcome.status == 0, outcome.err
     assert "frames 1 to 10 of stand-in, view layer View, by Cycles of Blender 9.9" in outcome.out
-    assert "film: 8 pictures of 4 frames, 8 of them made now" in outcome.out
+    assert "film: 8 images of 4 frames, 8 of them rendered now" in outcome.out
     manifest = json.loads((tmp_path / "film/manifest.json").read_text())
     assert manifest["complete"] is True
     assert manifest["request"]["sha256"] == hashlib.sha256(blend.read_bytes()).hexdigest()
@@ -75,9 +75,9 @@ def test_it_is_checked_resumed_and_learned(wamnet, blend, blender, tmp_path, mon
     assert cut.status == 2
     assert "Blender has ended: a warning of a driver" in cut.err
     monkeypatch.delenv("BLENDER_FAULT")
-    assert "8 pictures of 4 frames, 6 of them made now" in wamnet(*command).out
-    assert wamnet("dataset", "--check", "-o", "film").out == "film: 8 pictures are as manifest.json says\n"
-    assert "0 of them made now" in wamnet(*command).out
+    assert "8 images of 4 frames, 6 of them rendered now" in wamnet(*command).out
+    assert wamnet("dataset", "--check", "-o", "film").out == "film: 8 images match manifest.json\n"
+    assert "0 of them rendered now" in wamnet(*command).out
     again = (*command[:-1], "again")
     assert wamnet(*again).status == 0
     for path in (tmp_path / "film").rglob("*.exr"):

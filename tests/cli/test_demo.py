@@ -291,7 +291,7 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -
     monkeypatch.setattr(demo, "carry_out", interrupt)
     outcome = wamnet("demo", *(["--quick"] if quick else []))
     command = "--quick -o out/demo-quick" if quick else "--size 256 -o out/demo"
-    hint = f"resume with the same command: wamnet demo {command}"
+    hint = f"{command.split()[-1]}: the same command resumes (wamnet demo {command})"
     assert outcome.err == f"wamnet: {hint}\nwamnet: interrupted\n"
     assert outcome.status == 130
 

@@ -42,7 +42,7 @@ def test_many_samples_are_said_before_they_start(started):
     line = started(*small, "--spp", 3_000_000_000)
     assert line == (
         "30 primitives and 3,000,000,000 samples: by a rule of thumb about 156 days and 1 MiB of memory; "
-        "Ctrl-C ends it\n"
+        "Ctrl-C stops it\n"
     )
     assert "3,000,000,001 samples" in started(*small, "--feature-spp", 3_000_000_000)
 
@@ -80,8 +80,8 @@ def test_benchmarks_say_it_too(wamnet, capsys, monkeypatch):
         (("--size", 8), ""),
         (
             ("--size", 8, "--sizes", "16,32", "--budget", 1000),
-            "1 contender and images of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
-            "of memory at most, compilation left out; Ctrl-C ends it\n",
+            "1 program and images of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
+            "of memory at most, compilation left out; Ctrl-C stops it\n",
         ),
     ]:
         with pytest.raises(StoppedError, match="the work begins"):

@@ -19,7 +19,7 @@ def test_a_network_becomes_a_kernel_with_a_certificate(wamnet, tmp_path):
     assert "layers 2 -> 8 -> 8 -> 3; window 1 x 1" in outcome.out
     assert "image x: 2 channels in [-1, 1], for which bounds hold" in outcome.out
     assert wamnet("compile", "sines.safetensors", "--target", "c", "-o", "kernel").status == 0
-    assert "text: computes that program" in wamnet("certify", "kernel").out
+    assert "source: computes the certified program" in wamnet("certify", "kernel").out
     assert wamnet("listing", "sines.safetensors", "--target", "glsl").status == 0
 
 

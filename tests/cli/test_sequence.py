@@ -225,7 +225,7 @@ def test_an_interrupted_sequence_says_how_to_go_on(wamnet, here, monkeypatch):
     monkeypatch.setattr(denoise.Job, "write", interrupted)
     outcome = wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out")
     assert outcome.status == 130
-    assert "out: the same command resumes with the remaining frames" in outcome.err
+    assert "out: the same command resumes" in outcome.err
     monkeypatch.setattr(denoise.Job, "write", write)
     assert re.search(
         r": [1-4] frames? in .*; [1-4] were there already",

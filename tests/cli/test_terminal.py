@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import unicodedata
 from contextlib import redirect_stderr, redirect_stdout
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -33,6 +34,22 @@ def test_descriptions_of_progress_are_no_markup(capsys, monkeypatch) -> None:
     with terminal.progress(NAME, 1) as advance:
         advance(1)
     assert NAME in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("unit", "task", "text"),
+    [
+        ("samples", (2e6, 16_777_216, 3.25e6), "2.0M of 16.8M samples, 3.2M samples/s,"),
+        ("steps", (1200, 12_000, 1234.56), "1,200 of 12,000 steps, 1,234.6 steps/s,"),
+        ("frames", (0, 8, None), "0 of 8 frames,"),
+        ("", (0.25, 1, None), "25 %,"),
+    ],
+)
+def test_progress_has_one_form(unit, task, text) -> None:
+    """The count of the total, and the rate; the title before it is a verb, the time left follows."""
+    done, total, speed = task
+    now = SimpleNamespace(completed=done, total=total, speed=speed, percentage=100 * done / total)
+    assert str(terminal._Work(unit).render(now)) == text
 
 
 def test_the_hint_is_said_on_interrupt(capsys) -> None:

@@ -62,7 +62,7 @@ def test_all_within(wamnet, here) -> None:
     assert outcome.status == 0
     assert "model.safetensors on noisy.exr, 13x12, profile ieee" in outcome.out
     lines = [line for line in outcome.out.splitlines() if " within " in line and " row " in line]
-    missing = re.findall(r"not here: ([\w-]+)", outcome.out)
+    missing = re.findall(r"not available: ([\w-]+)", outcome.out)
     assert [line.split()[0] for line in lines] == [way for way in WAYS if way not in missing]
     assert f"{len(lines)} kernels within their bounds" in outcome.out
     assert sorted(path.name for path in here.iterdir()) == ["model.safetensors", "noisy.exr"]
@@ -73,7 +73,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
     outcome = wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd")
     assert outcome.status == 1
     assert "opencl plain is the odd one out: 1 other within its bound" in outcome.out
-    assert "smallest part that shows it: 5x6 pixels from row " in outcome.out
+    assert "smallest part that reproduces it: 5x6 pixels from row " in outcome.out
     assert "opencl plain: no stage deviates by itself" in outcome.out
     odd = here / "odd"
     names = sorted(str(path.relative_to(odd)) for path in odd.rglob("*") if path.is_file())
@@ -208,7 +208,7 @@ def test_one_that_is_not_here_is_told(wamnet, here, monkeypatch, refused) -> Non
     monkeypatch.setenv("WAMNET_OPENCL_DEVICE", "abacus")
     outcome = wamnet("triage", "model.safetensors", "noisy.exr")
     assert outcome.status == 0
-    assert "not here: opencl: OpenCL: no device matches 'abacus'" in outcome.out
+    assert "not available: opencl: OpenCL: no device matches 'abacus'" in outcome.out
     assert "no device matches 'abacus'" in refused("triage", "model.safetensors", "noisy.exr", *TWO)
 
     def missing(way: str) -> None:

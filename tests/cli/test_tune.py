@@ -32,7 +32,7 @@ def test_tuning_is_kept_shown_and_used(wamnet, executor_named, here) -> None:
     for word in ("plain", "vector:16", "tile:16", "tile:8", "tile:4", "group:1", "group:4", "s to compile"):
         assert word in outcome.out
     assert "for 1 picture: " in outcome.out
-    assert "for 1000 pictures: " in outcome.out
+    assert "for 1000 images: " in outcome.out
     assert "--force measures again" not in outcome.out
     (entry,) = (here / "mine").iterdir()
     before = entry.read_bytes()

@@ -113,12 +113,12 @@ def test_a_curve_is_measured_once_and_kept(wamnet, here, monkeypatch) -> None:
     first = wamnet(*command)
     assert first.status == 0, first.err
     # Two variants under two schedules.
-    assert first.out.startswith("curve: 4 points measured now, kept in ")
+    assert first.out.startswith("curve: 4 points, measured now, cached in ")
     (entry,) = (here / "cache").glob("curve-*.json")
     again = wamnet(*command)
-    assert again.out.startswith("curve: 4 points measured before, kept in ")
+    assert again.out.startswith("curve: 4 points, measured before, cached in ")
     entry.write_text(entry.read_text().replace("tile", "file"))
-    assert wamnet(*command).out.startswith("curve: 4 points measured now, kept in ")
+    assert wamnet(*command).out.startswith("curve: 4 points, measured now, cached in ")
 
 
 REFUSED = {

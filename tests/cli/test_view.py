@@ -79,7 +79,7 @@ def test_parameters_of_a_scene_hold_at_all_times():
 
 
 def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
-    """The browser that is opened gets the page, another address nothing; Ctrl-C ends it well."""
+    """The browser that is opened gets the page, another address nothing; Ctrl-C stops it well."""
     found = {}
 
     def browse(address):
@@ -102,7 +102,7 @@ def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
     outcome = wamnet("view", "model.safetensors")
     found["thread"].join()
     assert outcome.status == 0
-    assert outcome.out == f"{found['address']} (Ctrl-C ends)\nended\n"
+    assert outcome.out == f"{found['address']} (Ctrl-C to stop)\nended\n"
     assert found["address"].startswith("http://127.0.0.1:")
     assert found["page"] == "<!DOCTYPE html>"
 

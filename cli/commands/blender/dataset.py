@@ -54,7 +54,7 @@ def make(folder: Path, asked: Asked) -> None:
         if (folder / dataset_files.MANIFEST).exists():
             known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
         with (
-            progress("checking", known) as look,
+            progress("checking", known, "bytes") as look,
             dataset_files.Store.open(folder, request, frames, look) as store,
         ):
             made = len(store.missing)
@@ -84,7 +84,7 @@ def _render(store: dataset_files.Store[Shot], blender: Blender) -> None:
     """Render what is left in the store."""
     tasks = store.tasks()
     with (
-        progress("rendering", sum(shot.samples for shot in tasks)) as advance,
+        progress("rendering", sum(shot.samples for shot in tasks), "samples") as advance,
         tempfile.TemporaryDirectory(prefix="wamnet-blender-") as scratch,
     ):
         path = Path(scratch, "picture.exr")

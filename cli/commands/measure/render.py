@@ -69,7 +69,7 @@ def render(
         check_count(option, value, example)
     job = Job(size, size, spp, settings=Settings(max_depth=depth - 1))
     ways = [way for name in shown for way in measuring.ways_of(name, job, kinds, processes)]
-    with progress("measuring", len(ways) * (repeats + 1)) as advance:
+    with progress("measuring", len(ways) * (repeats + 1), "renders") as advance:
         measuring.measured(ways, repeats, partial(advance, 1.0))
     say(", ".join(facts(numpy_version(), f"{size}x{size}, {spp} spp, {depth} edges")))
     for name in shown:

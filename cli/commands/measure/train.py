@@ -70,7 +70,7 @@ def train(
     pairs = measuring.noise(frames, size)
     for preset in names:
         recipe = PRESETS[preset]
-        with progress(f"measuring {preset}", len(given) * repeats) as advance:
+        with progress(f"measuring {preset}", len(given) * repeats, "rounds") as advance:
             times, sgemm = measuring.measured(recipe, pairs, given, seconds, repeats, partial(advance, 1.0))
         _show(preset, recipe, times, sgemm)
 
@@ -81,7 +81,7 @@ def _show(preset: str, recipe: Recipe, seconds: dict[str, list[float]], sgemm: f
 
     work = operations(recipe)
     say("")
-    say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP a step; sgemm {sgemm / 1e9:.0f} GFLOP/s")
+    say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {sgemm / 1e9:.0f} GFLOP/s")
     say("")
     head("by", "ms a step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
     for name, times in seconds.items():

@@ -119,7 +119,7 @@ def new_temporary(name: str, programs: bool = False) -> tuple[Path, int]:
     where = next((each for each in [first, *others] if not programs or runs_programs(each)), None)
     if where is None or not where.is_dir():
         rule = "neither it nor another folder for temporary files runs programs (mounted noexec)"
-        raise ExecutorUnavailable(f"TMPDIR is {first}: {rule}; set it to a folder of another file system")
+        raise ExecutorUnavailable(f"TMPDIR is {first}: {rule}; set it to a folder on another file system")
     for left in where.iterdir():
         if TEMPORARY.fullmatch(left.name):
             _remove_left(left)

@@ -62,7 +62,7 @@ def widen_stacks() -> None:
             soft, hard = resource.getrlimit(resource.RLIMIT_STACK)
     if soft != unlimited and soft < LEAST_STACK:
         rule = f"compilers and kernels need {LEAST_STACK >> 10} KiB at least"
-        raise ExecutorUnavailable(f"the limit of stacks is {soft >> 10} KiB: {rule}; set ulimit -s 8192")
+        raise ExecutorUnavailable(f"the stack limit is {soft >> 10} KiB: {rule}; set ulimit -s 8192")
     library, attributes = ctypes.CDLL(None), ctypes.create_string_buffer(256)  # glibc's has 56 or 64 bytes
     size = ctypes.c_size_t(THREAD_STACK)
     with suppress(AttributeError):  # another system, whose threads have stacks of their own size

@@ -318,7 +318,7 @@ def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) ->
     version = texts.get("version", "missing")
     if version not in versions:
         rule = f"this program reads version {' and '.join(versions)}"
-        raise InputError(f"{path}: version", version, rule, "use the wamnet that wrote it")
+        raise InputError(f"{path}: version", version, rule, "use the wamnet version that wrote it")
 
 
 def _tensor(path: Path, tensors: Tensors, name: str) -> NDArray[Any]:

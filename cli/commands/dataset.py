@@ -113,7 +113,7 @@ Before = Annotated[
 Workers = Annotated[int | None, typer.Option(help="Number of worker processes.", show_default="one per core")]
 Scheduler = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler whose workers to use."),
+    typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler; its workers are used."),
 ]
 
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Data set folder.")]

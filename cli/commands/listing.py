@@ -43,7 +43,7 @@ def listing(
 ) -> None:
     """Print a kernel interleaved with the lines of the reference that it came from.
 
-    A denoiser has the plain schedule, a scene one path at a time. Only -o writes a file.
+    Denoisers use the plain schedule; scenes trace one path at a time. Only -o writes a file.
     """
     from ...compiler.core.listing import as_text
 

@@ -83,7 +83,7 @@ Begin = Annotated[
     typer.Option(
         "--from",
         metavar="MODEL",
-        help="Start from this model's weights, cut to --rank or --variant, instead of random ones.",
+        help="Start from this model's weights, reduced to --rank or --variant, instead of random ones.",
         show_default=False,
     ),
 ]
@@ -154,7 +154,7 @@ def train(
 
     A checkpoint is kept next to the model. After Ctrl-C, --resume continues from it with bit-identical
     results. With more --steps it continues past the end; the learning rate, which decays over the run,
-    then jumps back up, so the model differs from that of a run with this length from the start.
+    then jumps back up, so the model differs from one trained for this many steps from the start.
     """
     from ...models.model_file import load_checkpoint
 
@@ -268,7 +268,7 @@ def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe
     from ..common.inputs import load_model
 
     if begin is None:
-        raise InputError("--variant", name, "is cut from a trained model", "name one with --from")
+        raise InputError("--variant", name, "is derived from a trained model", "name one with --from")
     return varied(recipe, load_model(begin), name)
 
 

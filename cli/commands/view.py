@@ -66,7 +66,7 @@ def view(
         Path | None,
         typer.Option(
             metavar="MODEL",
-            help="Model for the fast variant, fine-tuned at rank 16; its first layer is cut to rank 16.",
+            help="Model for the fast variant, fine-tuned at rank 16; its first layer is reduced to rank 16.",
             show_default="same as MODEL",
         ),
     ] = None,

@@ -204,7 +204,7 @@ CutRank = Annotated[
     typer.Option(
         "--rank",
         metavar="R",
-        help="Short for --variant rankR: cut the first layer to rank R and run it as two passes, "
+        help="Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
         "rows then columns. Loses little quality after fine-tuning.",
         show_default="no cut",
     ),

@@ -47,7 +47,7 @@ def _opened(pictures: Sequence[Path]) -> Iterator[Any]:
                 rgb = picture.convert("RGB")
         except OSError as error:
             reason = error.strerror or str(error)
-            raise InputError("image", str(path), f"cannot be read: {reason}", "make it again") from None
+            raise InputError("image", str(path), f"cannot be read: {reason}", "render it again") from None
         yield rgb
 
 

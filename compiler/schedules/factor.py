@@ -184,12 +184,12 @@ def _layer(program: Program) -> int:
     if len(readers) != 1 or program.nodes[readers[0]].op != "affine":
         found = ", ".join(f"%{index} ({program.nodes[index].op})" for index in readers) or "nothing"
         raise CompileError(
-            f"{found} reads the window: only a first layer, one affine map, can be cut to a rank; compile "
-            "the program without a rank"
+            f"{found} reads the window: only a first layer that is one affine map can be reduced to a rank; "
+            "compile the program without a rank"
         )
     if names.count(program.nodes[readers[0]]["weight"]) != 1:
         raise CompileError(
-            "the first layer's matrix is applied to another layer too, which a cut would change; compile the "
+            "another layer shares the first layer's matrix and would change with its rank; compile the "
             "program without a rank"
         )
     return readers[0]

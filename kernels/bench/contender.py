@@ -89,7 +89,7 @@ def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
     """Return what a library has for the model's activation, from a table by the names of activations."""
     name = model.siren.activation
     if name not in table:
-        raise ExecutorUnavailable(f"{library} has no function here for {name}, only for {', '.join(table)}")
+        raise ExecutorUnavailable(f"{library} has no implementation of {name}, only of {', '.join(table)}")
     return table[name]
 
 
@@ -192,4 +192,4 @@ def told_as_missing(name: str) -> Iterator[None]:
         raise
     except Exception as error:
         lines = str(error).strip().splitlines() or [type(error).__name__]
-        raise ExecutorUnavailable(f"{name} does not run here: {lines[0]}") from error
+        raise ExecutorUnavailable(f"{name} cannot run here: {lines[0]}") from error

@@ -304,7 +304,7 @@ class CExecutor(Executor):
             done = self._compile(library, glue, ["-shared"])
             if done.returncode or not library.is_file():
                 told = done.stderr.strip()[:MOST_TOLD] or "it writes no library"
-                raise CompileError(f"{self.device} does not build the kernel: {told}; {WAY_OUT}")
+                raise CompileError(f"{self.device} cannot build the kernel: {told}; {WAY_OUT}")
             return base64.b64encode(library.read_bytes()).decode()
 
         content = cache.kept("c-library", [*self._compiler, self._options, kernel.source, glue], built)

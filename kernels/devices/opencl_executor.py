@@ -323,7 +323,7 @@ class OpenCLExecutor(Executor):
             uncached: Any = False
             program.build(options=list(BUILD_OPTIONS), cache_dir=uncached)
         except cl.RuntimeError as error:
-            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
         return program
 
     def _copied(self, array: NDArray[np.float32]) -> Any:

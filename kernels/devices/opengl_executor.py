@@ -185,8 +185,8 @@ class OpenGLExecutor(Executor):
         if self._context.version_code < SHADER_VERSION:
             raise CompileError(
                 f"{self.device} has OpenGL {self._context.version_code / 100:.1f}: schedule "
-                f"{schedule['name']} is a compute shader, which OpenGL "
-                f"{SHADER_VERSION / 100:.1f} has; use schedule plain"
+                f"{schedule['name']} is a compute shader, which needs OpenGL "
+                f"{SHADER_VERSION / 100:.1f}; use schedule plain"
             )
         with ExitStack() as made:
             data = artifact.weights.astype("<f4").tobytes() or bytes(16)
@@ -195,7 +195,7 @@ class OpenGLExecutor(Executor):
             try:
                 program = self._context.compute_shader(artifact.source)
             except moderngl.Error as error:
-                raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+                raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
             made.pop_all()
             width, height = schedule["group"]
             tile = (width * schedule["pixels"], height)
@@ -207,7 +207,7 @@ class OpenGLExecutor(Executor):
             corners = f"{self.version}\n{CORNERS}"
             program = self._context.program(vertex_shader=corners, fragment_shader=source)
         except moderngl.Error as error:
-            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
         made.callback(program.release)
         return program, self._context.vertex_array(program, [])
 

@@ -58,7 +58,7 @@ class ComputeRunner(BufferRunner):
         try:
             return self._context.compute_shader(kernel.source)
         except moderngl.Error as error:
-            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
 
     def _discard(self, prepared: Prepared) -> None:
         prepared.built.release()

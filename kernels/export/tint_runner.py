@@ -167,7 +167,7 @@ class TintRunner(BufferRunner):
         if refused and not set(TRIED[backend]) & set(environment):
             refused = self._open(node, backend, {**environment, **TRIED[backend]}) and refused
         if refused:
-            raise ExecutorUnavailable(f"Dawn has no device of {backend} ({refused}): {WAY_OUT}")
+            raise ExecutorUnavailable(f"Dawn has no {backend} device ({refused}): {WAY_OUT}")
 
     def _open(self, node: str, backend: str, environment: Mapping[str, str]) -> str:
         """Start the process; return why it has no device, or nothing."""

@@ -89,7 +89,7 @@ class WgpuRunner(BufferRunner):
                 layout=layout, compute={"module": module, "entry_point": kernel.entry_point}
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
-            raise CompileError(f"{self.device} does not build the kernel: {error}") from None
+            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
         return pipeline, bound, set(declared(source))
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:

@@ -195,7 +195,7 @@ class Pipeline:
             return
         if spp >= self._rays.count:
             rule = f"features are of {self._rays.count} camera rays: there must be fewer paths"
-            raise InputError("spp", spp, rule, "make a pipeline without feature_spp")
+            raise InputError("spp", spp, rule, "create a pipeline without feature_spp")
         if first_sample and self._rays.sampler != self._settings.sampler:
             rule = f"rays of {self._rays.sampler} begin with the ray of sample 0"
             raise InputError("first_sample", first_sample, rule, "use 0, and another seed")
@@ -270,7 +270,7 @@ class Pipeline:
     def _check_open(self) -> None:
         """Refuse work without images."""
         if self._closed:
-            raise InputError("pipeline", NO_VALUE, "closed", "make another one")
+            raise InputError("pipeline", NO_VALUE, "closed", "open a new one")
 
     def close(self) -> None:
         """Give the images on the device back; the executor stays open."""

@@ -136,7 +136,7 @@ def _check_inside(path: Path, model: Any) -> None:
     for tensor in tensors:
         if tensor.data_location == tensor.EXTERNAL:
             rule = "its numbers are in another file, which is not read"
-            raise InputError(f"{path}: tensor", tensor.name, rule, "export with the weights inside")
+            raise InputError(f"{path}: tensor", tensor.name, rule, "export with the weights embedded")
     # Old files list weights among the inputs too.
     weights = {each.name for each in model.graph.initializer}
     for what, count, most in (

@@ -193,7 +193,7 @@ def _check_whole(recipe: Recipe) -> None:
         value = getattr(recipe, name)
         if value != floats:
             rule = "integer networks have sines, and no rank"
-            raise InputError(f"recipe: {name}", value, rule, f"use {floats}, or train floats")
+            raise InputError(f"recipe: {name}", value, rule, f"use {floats}, or train a float network")
 
 
 def with_activation(recipe: Recipe, name: str) -> Recipe:

@@ -334,7 +334,7 @@ def test_a_narrower_network_is_trained_and_rounded(wamnet, pair, tmp_path, execu
         (["--whole", "--activation", "relu"], "recipe: activation 'relu': integer networks have sines"),
         (["--whole", "--variant", "whole10"], "--variant 'whole10': --whole is short for whole8"),
         (["--variant", "whole9"], "variant 'whole9': there are whole8, whole10"),
-        (["--variant", "window8+whole8"], "--variant 'window8+whole8': is cut from a trained model"),
+        (["--variant", "window8+whole8"], "--variant 'window8+whole8': is derived from a trained model"),
     ],
 )
 def test_refusals_of_integers(refused, pair, options, text) -> None:

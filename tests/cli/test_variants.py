@@ -142,7 +142,7 @@ REFUSED = {
     "rank 2: the variant is window3": (
         *("denoise", "model.safetensors", "noisy.exr", "--rank", 2, "--variant", "window3"),
     ),
-    "--variant 'window3': is cut from a trained model": (
+    "--variant 'window3': is derived from a trained model": (
         *("train", "-i", "noisy.exr", "-t", "reference.exr", "--variant", "window3"),
     ),
     "--variant 'window3': it chooses what --rank does": (

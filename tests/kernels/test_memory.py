@@ -61,7 +61,5 @@ def test_a_limit_of_stacks_that_nobody_may_raise_is_rejected(monkeypatch):
 
     monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (160 << 10, 160 << 10))
     monkeypatch.setattr(memory.resource, "setrlimit", denied)
-    with pytest.raises(
-        ExecutorUnavailable, match=r"the limit of stacks is 160 KiB.* 256 KiB .*ulimit -s 8192"
-    ):
+    with pytest.raises(ExecutorUnavailable, match=r"the stack limit is 160 KiB.* 256 KiB .*ulimit -s 8192"):
         memory.widen_stacks()

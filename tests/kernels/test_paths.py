@@ -156,7 +156,7 @@ def test_source_that_does_not_compile_is_told_with_the_log(executor_named, name)
     kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
     source = kernel.source.replace("int n = 0", "int n = nonsense", 1)
     broken = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "broken"})
-    with pytest.raises(CompileError, match=r"(?s)does not build the kernel: .*nonsense"):
+    with pytest.raises(CompileError, match=r"(?s)cannot build the kernel: .*nonsense"):
         executor.trace(broken, Part(1, 1, 0, 1, 0, 1, 0))
 
 

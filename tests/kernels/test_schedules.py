@@ -323,7 +323,7 @@ def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
     executor._built.clear()
     with pytest.raises(
         CompileError,
-        match=r"has OpenGL 4\.5: schedule group:1 is a compute shader, which OpenGL 4\.6 has; use",
+        match=r"has OpenGL 4\.5: schedule group:1 is a compute shader, which needs OpenGL 4\.6 has; use",
     ):
         executor.build(artifact)
 

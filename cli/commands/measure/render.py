@@ -46,7 +46,7 @@ def render(
     ] = None,
     size: Square = 512,
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 2,
-    depth: Annotated[int, typer.Option(help="Maximum path length, camera ray included.")] = 6,
+    depth: Annotated[int, typer.Option(help="Maximum path length, including the camera ray.")] = 6,
     repeats: Repeats = 5,
 ) -> None:
     """Measure samples per second: the reference renderer, its kernels, Mitsuba 3, Embree.

@@ -48,7 +48,7 @@ def train(
 ) -> None:
     """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch.
 
-    They are interleaved with a product of two large matrices, on noise frames, minibatch sampling
+    The trainers are interleaved with a product of two large matrices, on noise frames, minibatch sampling
     included and compilation excluded. The table has the median and the range, GFLOP/s of the matrix
     products, their share of the large product's rate, and the time that all steps would take. [bold]pip
     install torch[/] adds PyTorch.

@@ -57,7 +57,7 @@ class Conductor(Material):
         """Refuse a roughness outside its range."""
         if not LEAST_ROUGHNESS <= self.roughness <= 1.0:
             rule = f"a roughness must lie in [{LEAST_ROUGHNESS:g}, 1]"
-            raise InputError(f"{path}.roughness", self.roughness, rule, "for less, use a mirror")
+            raise InputError(f"{path}.roughness", self.roughness, rule, "for smoother ones, use a mirror")
 
     @property
     def parameter(self) -> float:

@@ -103,7 +103,7 @@ def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
     from wamnet.kernels.bench.contender import told_as_missing
 
     with (
-        pytest.raises(ExecutorUnavailable, match="it does not run here: no such symbol"),
+        pytest.raises(ExecutorUnavailable, match="it cannot run here: no such symbol"),
         told_as_missing("it"),
     ):
         raise OSError("no such symbol\nand more")

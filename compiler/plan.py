@@ -255,7 +255,7 @@ def plan_program(
     """
     chosen, promised = target_named(target), profiles.profile_named(profile)
     if kernel_gather(program).whole and rank:
-        raise CompileError(f"rank {rank}: is for float networks, not for integer ones (leave it out)")
+        raise CompileError(f"rank {rank}: needs a float network, not an integer one (leave it out)")
     common = analysed(program)
     if rank and chosen.most is not None and rank > chosen.most:
         raise CompileError(

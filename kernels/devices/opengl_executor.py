@@ -160,8 +160,8 @@ class OpenGLExecutor(Executor):
         rounds = any(artifact.manifest["bound"]["output"] or ())
         if rounds and ORDER_EXTENSION not in self._context.extensions:
             raise CompileError(
-                f"{self.device} lacks {ORDER_EXTENSION}, whose `precise` the error bound needs: use profile "
-                "native, which then has no bound, or executor opencl or numpy"
+                f"{self.device} lacks {ORDER_EXTENSION}, which the error bound needs (`precise`): use "
+                "profile native, which then has no bound, or executor opencl or numpy"
             )
 
     def _check_loops(self, artifact: Denoiser) -> None:

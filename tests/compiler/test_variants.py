@@ -349,7 +349,7 @@ def test_integers_have_no_variants(text) -> None:
 
 def test_integers_have_no_rank() -> None:
     whole = vary(parse("whole8"), small()).model
-    with pytest.raises(CompileError, match="rank 2: is for float networks, not for integer ones"):
+    with pytest.raises(CompileError, match="rank 2: needs a float network, not an integer one"):
         plan_program(lower(whole), "numpy", rank=2)
 
 

@@ -383,7 +383,7 @@ def test_bounded_kernel_is_refused_without_precise(executor_named):
     value, refusal = outcome.stdout.splitlines()
     assert abs(float(value) - np.sin(1.0)) <= 1e-3  # a GPU's own sine is right to 2^-11 at least
     assert refusal.startswith("CompileError")
-    assert "lacks GL_ARB_gpu_shader5, whose `precise` the error bound needs: use profile native" in refusal
+    assert "lacks GL_ARB_gpu_shader5, which the error bound needs (`precise`): use profile native" in refusal
 
 
 def test_too_large_a_texture_is_refused(executor_named, kit):

@@ -3,7 +3,7 @@
 1. Bring in the spec from its folder, the page of the vectors' formats, and a page for each source file that a
    text names, and the live page [`on_files`]; order the pages as spec/README.md does [`on_config`].
 2. Give clauses their anchors, and execute the cells of tutorial and course [`on_page_markdown`].
-3. Set formulas, give pictures their captions, and link what is named [`on_page_content`].
+3. Set formulas, give pictures their captions, fold long parts, and link what is named [`on_page_content`].
 4. Name the theme's dialog for search [`on_post_page`].
 5. Cut the addresses of other hosts out of the theme's scripts, and refuse a site with a link that leads
    nowhere, or to another host [`on_post_build`].
@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import cells
 import chapters
 import figures
+import folds
 import formulas
 import links
 import listing_page
@@ -193,7 +194,7 @@ def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -
 
     if uri == "listing.md":
         html = listing_page.page(html)
-    html = figures.captioned(formulas.rendered(html, f"docs/{uri}"))
+    html = folds.folded(figures.captioned(formulas.rendered(html, f"docs/{uri}")), uri)
     return chapters.linked(html, config.extra["places"], config.extra["sources"], link)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import figures
+import folds
 import pytest
 
 PAGES = ("index.html", "tutorial/4-frame.html", "course/lab01-sphere.html", "spec/sampling.html")
@@ -151,3 +152,37 @@ def test_pictures_that_stand_alone_have_captions():
 def test_the_mark_is_the_place_of_the_live_page():
     assert figures.with_live(f"a\n\n{figures.MARK}\n") == f"a\n\n{figures.FRAME}\n"
     assert figures.with_live("a\n") == "a\n"
+
+
+LONG = (
+    "spec/vectors/index.html",
+    "spec/departures.html",
+    "spec/kernel_interface.html",
+    "spec/conformance.html",
+)
+"""Pages of the spec that are folded."""
+
+
+def test_no_page_of_the_spec_is_too_high(site, chromium):
+    """And a heading in a fold is visible, so that links to it lead somewhere."""
+    with chromium.tab(site / PAGES[0], viewport={"width": 1400, "height": 900}) as tab:
+        for name in LONG:
+            tab.page.goto((site / name).as_uri())
+            assert tab.page.evaluate("document.documentElement.scrollHeight") <= HIGHEST_PX, name
+            assert tab.page.locator("details:not([open])").count() > 0, name
+            assert tab.page.locator(".md-content h2").last.is_visible(), name
+
+
+def test_pages_are_folded_by_kind_and_by_chapter():
+    kinds = '<p>a</p><h2 id="x">X</h2><p>x</p><h2 id="y">Y</h2><p>y</p>'
+    assert folds.folded(kinds, "spec/vectors/README.md") == (
+        '<p>a</p><details><summary><h2 id="x">X</h2></summary><p>x</p></details>'
+        '<details><summary><h2 id="y">Y</h2></summary><p>y</p></details>'
+    )
+    rows = "".join(f'<tr><td><a href="{name}.html">1</a></td></tr>' for name in ("adam", "adam", "box"))
+    page = f"{folds.DECISIONS}></h2><table><thead></thead><tbody>{rows}</tbody></table>"
+    html = folds.folded(page, "spec/departures.md")
+    assert html.count("<details>") == html.count("<table>") == 2
+    assert "<summary>adam (2)</summary>" in html
+    assert html.count("<tr>") == 3
+    assert folds.folded(page, "spec/adam.md") == page

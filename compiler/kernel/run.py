@@ -80,9 +80,11 @@ class Runner:
         sizes = (height, width, int(result.shape[-1]))
         self.result = Memory(RESULT, np.zeros((int(np.prod(sizes)), 1), domain.dtype), FLOAT, sizes, "result")
         self.memory[RESULT] = self.result
-        self.evaluators: dict[str, Callable[[Expr], Values]] = {
-            key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")
-        }
+        self.evaluators = self._evaluators()
+
+    def _evaluators(self) -> dict[str, Callable[[Expr], Values]]:
+        """Return the methods that evaluate expressions, by operation."""
+        return {key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")}
 
     def _items(self, width: int, height: int) -> tuple[Items, dict[str, Values]]:
         """Return the work items, and names of their places; only groups reach beyond the image."""

@@ -6,28 +6,27 @@ import hashlib
 import math
 import re
 import secrets
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...refimpl.reading import read_file
+from ..kernel.interface import IMAGE, RESULT, WEIGHTS
+from ..kernel.kernel import Kernel
+from ..kernel.sizes import integer
+from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
 from ..proof.evidence import NODE, Refused, read, same
-from .builtins import BUILTINS
 from .claim import Claim
-from .field import add_up_lanes, equal, fold_lanes, literal
-from .frame import TRUE, cleaned
-from .groups import FLAGS, Group, group_lanes, tile_lanes
-from .lanes import Place, Raw, Unread, Wrong, axis_of, lanes_for
-from .languages import LANGUAGES, Language, is_read, parsed
+from .field import add_up_lanes, fold_lanes
+from .groups import Group, group_lanes, tile_lanes
+from .lanes import Unread, Wrong, lanes_for
+from .languages import TITLES, is_read
 from .limits import limited
 from .machine import Machine
-from .memory import Image, Memory, Pointer, Result
+from .memory import Image, Result
 from .spectra import Tiles
-from .tokens import Text, Type, Variable
-from .words import Stored, pointed
 
 KEYS = {
     "": "schema digest program target language entry_point profile sine passes window images output "
@@ -71,16 +70,13 @@ def check_text(path: Path, source: Path | None = None) -> dict[str, int]:
     except MEANINGLESS as error:
         raise Refused(f"manifest: a fact is of another form ({error})") from error
     text = read_file(source, "kernel", "name a text in the kernel's language") if source else own
-    read_files = text.decode(errors="replace"), held, manifest, weights
-    answers = limited(run_text, [(*read_files, k) for k in range(len(TRUE.get(manifest["target"], ((),))))])
-    return answers[0]  # type: ignore[no-any-return]
+    (answer,) = limited(run_text, [(text.decode(errors="replace"), held, manifest, weights)])
+    return answer  # type: ignore[no-any-return]
 
 
-def run_text(
-    source: str, held: Any, manifest: Any, weights: Any, compiler: int | None = None
-) -> dict[str, int]:
-    """Run a text in every lane, for each kind of compiler that it makes a difference between, or for one."""
-    language, schedule = LANGUAGES[manifest["target"]], manifest["schedule"]
+def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, int]:
+    """Parse a text, and run it in every lane."""
+    schedule = manifest["schedule"]
     pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
     seed = secrets.randbits(31)
@@ -88,23 +84,17 @@ def run_text(
         check_manifest(manifest, str(held["program"]), "spectra" in held)
         tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
         if tiles:
-            lanes = tile_lanes((pixels, rows), window, not language.within, seed)
+            lanes = tile_lanes((pixels, rows), window, seed)
         elif group:
             lanes = group_lanes((group[0], group[1]), pixels, window, seed)
         else:
             reach = max(centre, window - centre)
-            lanes = lanes_for((reach + pixels - 1, reach), pixels, not language.within, seed)
+            lanes = lanes_for((reach + pixels - 1, reach), pixels, seed)
         counts = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
         fold_lanes(counts) if tiles else add_up_lanes(np.ones(lanes.count, dtype=bool) if group else counts)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles)
         lanes.channels = max(int(manifest["output"]["channels"]), *(int(n) for _, n in claim.images))
-        texts = different(source, language, manifest)
-        for text in texts if compiler is None else texts[compiler : compiler + 1]:
-            claim.found.clear()
-            lanes.active = np.ones(lanes.count, dtype=bool)
-            run_once(text, claim, manifest, language)
-            if language.host:
-                check_host(text, language.host, manifest["entry_point"], claim)
+        run_once(parsed(source, manifest), claim, manifest)
     except Wrong as error:
         raise Refused(f"source: {error}") from error
     except RecursionError as error:
@@ -113,7 +103,7 @@ def run_text(
         raise Refused(f"source: it has no meaning to the checker ({error})") from error
     finally:
         add_up_lanes(None)
-    return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count, "compilers": len(texts)}
+    return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count}
 
 
 def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
@@ -132,7 +122,7 @@ def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
     if not right or (grouped and items[0] != int(grouped[1] or 1)):
         raise Wrong(f"its manifest has other work items than schedule {name}")
-    if not manifest["language"].startswith(LANGUAGES[manifest["target"]].title):
+    if not manifest["language"].startswith(TITLES[manifest["target"]]):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")
     if items[1] != 1 and not tiles:
         raise Wrong("its manifest gives a work item several rows")
@@ -190,147 +180,45 @@ def check_facts(manifest: Any, held: Any, kernel: bytes) -> None:
     same("manifest: layout of the weights", {name: layout.get(name) for name in stated}, stated)
 
 
-def different(source: str, language: Language, manifest: Any) -> list[Text]:
-    """Return what a text is for a language's compilers, each once."""
-    target, output = manifest["target"], manifest["output"]
-    channels = {f"image_{image['name']}": image["channels"] for image in manifest["images"]}
-    parse(source, target, {**channels, "result": output["channels"]}, any(manifest["bound"]["output"]))
-    source = cleaned(source)
-    if target == "glsl-es" and not source.startswith("#version"):
-        raise Unread("a source that does not begin with its version")
-    found: list[Text] = []
-    for true in TRUE.get(target, ((),)):
-        text = parsed(source, language, true)
-        if text not in found:
-            found.append(text)
-    return found
+def parsed(source: str, manifest: Any) -> Kernel:
+    """Return the kernel that a text is, of the images that a manifest names."""
+    output = manifest["output"]
+    channels = {f"{IMAGE}{image['name']}": image["channels"] for image in manifest["images"]}
+    bounded = any(manifest["bound"]["output"])
+    return parse(source, manifest["target"], {**channels, RESULT: output["channels"]}, bounded)
 
 
-def run_once(text: Text, claim: Claim, manifest: Any, language: Language) -> None:
-    """Run a text, parsed: `Wrong` unless it writes the claim's outputs, and nothing else."""
-    lanes, channels, size = (
-        claim.lanes,
-        int(manifest["output"]["channels"]),
-        manifest["schedule"].get("group"),
-    )
-    result, target = Result(claim, channels), Memory("result", 4, kind="float32")
-    given = arguments(claim, language.fragment, result, target)
+def run_once(kernel: Kernel, claim: Claim, manifest: Any) -> None:
+    """Run a kernel: `Wrong` unless it writes the claim's outputs, and nothing else."""
+    lanes, schedule = claim.lanes, manifest["schedule"]
+    check_interface(kernel, claim, manifest)
+    size = schedule.get("group")
     group = Group(lanes, size[0] * size[1]) if size else None
-    known: Mapping[str, Any]
-    calls: Mapping[str, Any]
-    if group:
-        known, calls = {**group.brings(), **FLAGS}, group.calls()
-    else:
-        known, calls = items(claim, language.fragment)
-    names = {v.name: sized(given[v.name], v) for v, _ in text.outside if v.name in given}
-    names |= {name: known[name] for name in language.brings if name in known}
+    extent, spans = (lanes.place(1), lanes.place(3)), claim.ranges.images(claim.text)
+    result = Result(claim, int(manifest["output"]["channels"]))
+    memory = {WEIGHTS: claim.weights, RESULT: result} | {
+        f"{IMAGE}{name}": Image(name, int(n), extent, spans.get(name)) for name, n in claim.images
+    }
     span_of = claim.ranges.of if claim.stated else None
-    machine = Machine(text, lanes, names, {**BUILTINS, **calls}, claim.added, group, span_of)
-    machine.aligned, machine.mixes = language.aligned, language.mixes
-    if group and text.group and [machine.value(n) for n in text.group][:2] != size:
-        raise Wrong(f"its groups are not of {size[0]} x {size[1]} items")
-    entry = manifest["entry_point"]
-    takes = text.functions[entry].takes
-    check_interface(text, [v.name for v in takes if v.role not in known], claim)
-    machine.call(entry, [known[v.role] if v.role in known else sized(given[v.name], v) for v in takes])
+    texels = LANGUAGES[manifest["target"]].texels
+    machine = Machine(kernel, lanes, memory, claim.added, group, span_of, texels)
+    machine.body(kernel.body)
     shared = 4 * sum(memory.size for memory in group.memories) if group else 0
-    if shared != manifest["schedule"].get("shared_bytes", 0):
+    if shared != schedule.get("shared_bytes", 0):
         raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
-    if language.fragment:
-        for channel in range(channels):
-            result.hold(0, channel, target.load(channel, 1, machine), machine.running)
-        if channels < 4 and not equal(target.load(3, 1, machine).known, literal(1.0, "float32").known):
-            raise Wrong("the fourth number of its result is not 1")
     result.complete()
 
 
-CALLED = {"w": "weights", "width": "size", "height": "size"}
-"""What a binding's names are for, where they are others."""
-
-
-def check_interface(text: Text, takes: Sequence[str], claim: Claim) -> None:
-    """Refuse a text whose bindings, or whose arguments' places, are not those that hosts fill."""
-    images = [f"image_{name}" for name, _ in claim.images]
-    wanted = {name: n for n, name in enumerate(("size", "weights", "result", *images))}
-    bound = {CALLED.get(name, name): n for name, n in text.bindings.items()}
-    if bound and bound != wanted:
-        raise Wrong("its bindings are not the size, the weights, the result and the images, from 0")
-    places = [*images, "weights", "result", "width", "height"]
-    if takes and not bound and list(takes)[: len(places)] != places:
+def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
+    """Refuse a kernel of other images, channels or work items than hosts have for it."""
+    schedule = manifest["schedule"]
+    arrays = {array.name: int(array.shape[-1]) for array in kernel.interface.arrays}
+    wanted = {f"{IMAGE}{name}": int(n) for name, n in claim.images}
+    if list(arrays.items()) != [*wanted.items(), (RESULT, int(manifest["output"]["channels"]))]:
         raise Wrong("its arguments are not the images, the weights, the result, width and height")
-
-
-def arguments(claim: Claim, fragment: bool, result: Result, target: Memory) -> dict[str, Any]:
-    """Return what a kernel is given, by name."""
-    lanes = claim.lanes
-    x, width, y, height = (lanes.place(axis) for axis in range(4))
-    spans = claim.ranges.images(claim.text)
-    images = {
-        f"image_{name}": Image(name, int(n), (width, height), spans.get(name)) for name, n in claim.images
-    }
-    weights = Pointer(claim.weights, 0)
-    size = {"width": width, "height": height}
-    given: dict[str, Any] = {
-        **size, "size": size, **dict.fromkeys(("weights", "weight_texture", "w"), weights),
-    }  # fmt: skip
-    if lanes.inside is None:
-        given |= {"x": x, "y": y, "tile_x": x, "tile_y": y}
-    if fragment:
-        return given | images | {"result": Pointer(target, 0, 4, ())}
-    return (
-        given | {name: Pointer(image, 0) for name, image in images.items()} | {"result": Pointer(result, 0)}
-    )
-
-
-def sized(value: Any, variable: Variable) -> Any:
-    """Return what a kernel is given, a buffer as one of the numbers or vectors that the text declares."""
-    if not isinstance(value, Pointer) or value.sizes != (None,):
-        return value
-    return (
-        pointed(value, variable.type)
-        if isinstance(value.memory, Stored)
-        else Pointer(value.memory, 0, variable.type.width, of=variable.type)
-    )
-
-
-def check_host(text: Text, host: str, kernel: str, claim: Claim) -> None:
-    """Refuse a host that is not two loops, over rows and columns, and a call with what it is given."""
-    machine, tree = Machine(text, claim.lanes, {}, BUILTINS, claim.added), text.functions[host].body
-    for name, end, size in (("y", "height", claim.rows), ("x", "width", claim.pixels)):
-        ((form, start, below, step, inner),) = tree[1]
-        own = ("name", name)
-        right = (form, start[:2], start[2]) == (
-            "for",
-            ("declare", Variable(name, Type("int32"))),
-            ("number", "0"),
-        )
-        right &= below == ("binary", "<", own, ("name", end))
-        by = 1 if step == ("step", "++", own) else machine.value(step[3])
-        if not right or by != size or step[1:3] not in (("++", own), ("+", own)):
-            raise Wrong(f"{host} does not call {kernel} once for each work item")
-        tree = inner
-    takes = [("name", v.name) for v in text.functions[host].takes]
-    if tree != ("block", [("do", ("call", ("name", kernel), [*takes, ("name", "x"), ("name", "y")]))]):
-        raise Wrong(f"{host} does not call {kernel} once for each work item")
-
-
-def items(claim: Claim, fragment: bool) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """Return the names, and functions, by which languages call a work item's place.
-
-    CUDA's blocks have 8 by 4 threads.
-    """
-    lanes = claim.lanes
-    x, y = lanes.place(0), lanes.place(2)
-    x = Place(lanes, x.values // claim.pixels, x.form / claim.pixels)
-    y = Place(lanes, y.values // claim.rows, y.form / claim.rows)
-    inside, block = {}, {}
-    for name, place, n in (("x", x, 8), ("y", y, 4)):
-        inside[name] = Raw(lanes.constant(place.values % n))
-        block[name] = Raw(Place(lanes, place.values // n, place.form / n))
-    pixel = {"x": Raw(x, not fragment), "y": Raw(y, not fragment)}
-    whole = ("gl_FragCoord", "gl_GlobalInvocationID", "global_invocation_id", "thread_position_in_grid")
-    names = {
-        **dict.fromkeys(whole, pixel), "threadIdx": inside, "blockIdx": block,
-        "blockDim": {"x": Raw(lanes.constant(8)), "y": Raw(lanes.constant(4))},
-    }  # fmt: skip
-    return names, {"get_global_id": lambda machine, axis: axis_of((pixel["x"], pixel["y"]), axis)}
+    group, size = schedule.get("group"), kernel.group
+    if (group and tuple(group)) != size:
+        raise Wrong(f"its groups are not of {' x '.join(map(str, group or ['no']))} items")
+    steps = tuple(integer(kernel, each) for each in kernel.step)
+    if steps != (claim.pixels, claim.rows):
+        raise Wrong(f"its work items are of {steps[0]} x {steps[1]} pixels, not what its manifest says")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .field import Number, Span, hull, part_of, stacked
-from .lanes import FAR, Lanes, Place, Raw, Unread, Wrong, axis_of, plus, words
+from .lanes import FAR, Lanes, Place, Unread, Wrong, plus, words
 from .words import apart, joined
 
 if TYPE_CHECKING:
@@ -25,15 +25,6 @@ NOBODY = -1
 
 SOME = 32
 """How many pairs of distances of a group from two borders are drawn in each run."""
-
-LOCAL_FENCE = 1
-"""What a barrier's flags must have: that it orders the memory of a group."""
-
-FLAGS = {
-    "CLK_LOCAL_MEM_FENCE": 1, "mem_flags::mem_threadgroup": 1,
-}  # fmt: skip
-"""Flags of barriers by name."""
-
 
 def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
     """Return the items of groups of all cases, `pixels` of a row to an item.
@@ -52,21 +43,12 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
     )  # fmt: skip
 
 
-def tile_lanes(steps: tuple[int, int], window: int, beyond: bool, seed: int) -> Lanes:
-    """Return work items of all cases, of so many columns and rows of pixels; `beyond` the picture too.
+def tile_lanes(steps: tuple[int, int], window: int, seed: int) -> Lanes:
+    """Return work items of all cases, of so many columns and rows of pixels.
 
     The cases are those of groups of as many pixels [`group_lanes`].
     """
     known, caps = _cases(steps, window, seed, every=True)
-    if beyond:
-        x, y = steps
-        more = [
-            (x, x, 5 * y, 9 * y),
-            (7 * x, 6 * x + 1, 0, 9),
-            (0, 9, y, y),
-            (5 * x, 9 * x, 3 * y, 2 * y + 1),
-        ]
-        known = np.concatenate([known, np.array(more).T], axis=1)
     return Lanes(known, caps, np.ones(len(known[0]), dtype=bool), steps=steps)
 
 
@@ -198,38 +180,9 @@ class Group:
         self.memories.append(Shared(name, size, kind, self.lanes, self.items))
         return self.memories[-1]
 
-    def wait(self, machine: Machine, flags: int = LOCAL_FENCE) -> None:
+    def wait(self, machine: Machine) -> None:
         """Begin another phase of the shared memories; all items must be here."""
         if machine.mask is not None or not machine.running.all():
             raise Wrong("a barrier that not all items of a group reach")
-        if not flags & LOCAL_FENCE:
-            raise Wrong("a barrier that does not order the memory of a group")
         for memory in self.memories:
             memory.wait()
-
-    def brings(self) -> dict[str, Any]:
-        """Return the names by which languages call an item's place in its group, and the group's."""
-        lanes = self.lanes
-        assert lanes.inside is not None
-        assert lanes.steps is not None
-        inside, group = {}, {}
-        for k, name in enumerate("xy"):
-            first = lanes.place(2 * k)
-            inside[name] = Raw(lanes.constant(lanes.inside[k]))
-            group[name] = Raw(Place(lanes, first.values // lanes.steps[k], first.form / lanes.steps[k]))
-        return {
-            **dict.fromkeys(("threadIdx", "gl_LocalInvocationID", "local_invocation_id"), inside),
-            **dict.fromkeys(("blockIdx", "gl_WorkGroupID", "workgroup_id"), group),
-            "thread_position_in_threadgroup": inside, "threadgroup_position_in_grid": group,
-        }  # fmt: skip
-
-    def calls(self) -> dict[str, Any]:
-        """Return the functions by which languages call both, and barriers."""
-        names = self.brings()
-        inside, group = (list(names[name].values()) for name in ("threadIdx", "blockIdx"))
-        barriers = ("barrier", "workgroupBarrier", "__syncthreads", "threadgroup_barrier")
-        return {
-            **dict.fromkeys(barriers, self.wait),
-            "get_local_id": lambda machine, axis: axis_of(inside, axis),
-            "get_group_id": lambda machine, axis: axis_of(group, axis),
-        }

@@ -10,7 +10,7 @@ integers are of 32 bits, and no larger than an index may be.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -129,21 +129,6 @@ class Place:
         return found.values
 
 
-@dataclass(frozen=True)
-class Raw:
-    """A coordinate as a language brings it, no int yet: `counts` if it may be added and multiplied so."""
-
-    place: Place
-    counts: bool = True
-
-
-def axis_of(pair: Sequence[Raw], axis: Any) -> Raw:
-    """Return the coordinate of an axis."""
-    if type(axis) is not int or axis not in (0, 1):
-        raise Wrong(f"axis {axis} of a work item")
-    return pair[axis]
-
-
 def plus(a: Any, b: Any, sign: int = 1) -> Any:
     """Return a + b or a - b of integers."""
     if isinstance(a, Place):
@@ -180,8 +165,8 @@ def words(seed: int) -> Iterator[int]:
         yield int(pcg4d(*np.array([[n], [seed], [0], [0]], dtype=np.uint32))[0][0])
 
 
-def lanes_for(caps: tuple[int, int], step: int, beyond: bool, seed: int) -> Lanes:
-    """Return lanes of all cases: x a multiple of `step`, constants up to `caps`; `beyond` the image too.
+def lanes_for(caps: tuple[int, int], step: int, seed: int) -> Lanes:
+    """Return lanes of all cases: x a multiple of `step`, constants up to `caps`.
 
     The first is far from all borders. Each case of a row meets each of a column.
     """
@@ -198,7 +183,4 @@ def lanes_for(caps: tuple[int, int], step: int, beyond: bool, seed: int) -> Lane
     cases = itertools.product(pairs(caps[0], step), pairs(caps[1], 1))
     found = [(*drawn(p, step), *drawn(q, 1)) for p, q in cases]
     found.insert(0, (*drawn((None, None), step), *drawn((None, None), 1)))
-    if beyond:  # work items right of a picture, and below it
-        found += [(step * n, step * n - k, 5, 9) for n, k in ((1, 0), (2, step), (700, 1))]
-        found += [(0, 9, 7, 7), (0, 9, 4000, 3999)]
     return Lanes(np.array(found, dtype=np.int64).T, caps, np.ones(len(found), dtype=bool))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kernel.kernel import Type
 from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
 from .lanes import Mask, Place, Unread, Wrong, plus, times
-from .tokens import Type
 
 if TYPE_CHECKING:
     from .claim import Claim
@@ -17,71 +18,28 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Every:
-    """The index of a loop whose `turns` are run at once [together.py]."""
-
-    turns: int
-
-
-OWN = Type("")
-"""The type of an address that no source declares."""
-
-
-@dataclass(slots=True)
-class Pointer:
-    """A place of `width` numbers in a memory; `sizes` of an array, (None,) of a pointer, () of a variable.
-
-    `of`: the type that it is declared with, of no kind where it has none.
-    """
+class Slice:
+    """An array of a kernel: elements of a `kind` in a memory, from a place on; `sizes` are (None,) of a view."""
 
     memory: Any
-    offset: Any
-    width: int = 1
-    sizes: tuple[int | None, ...] = (None,)
-    of: Type = OWN
+    first: Any
+    kind: Type
+    sizes: tuple[int | None, ...]
 
-    def at(self, index: Any) -> Pointer:
-        """Return the place of an element, within the array's own size where that is known."""
-        if isinstance(index, Every):
-            return Pointer(self.memory, self.offset, self.width * index.turns, (), self.of)
-        if isinstance(index, int) and self.sizes[0] is not None and not 0 <= index < self.sizes[0]:
-            raise Wrong(f"element {index} of an array of {self.sizes[0]}")
-        step = self.width
-        for size in self.sizes[1:]:
-            step *= size or 1
-        offset = plus(self.offset, times(index, step))
-        return Pointer(self.memory, offset, self.width, self.sizes[1:], self.of)
-
-    def moved(self, index: Any, machine: Machine) -> Pointer:
-        """Return the place of an element, or of the end, as a pointer; `Wrong` outside the array."""
-        offset = plus(self.offset, times(index, self.width))
-        own = self.sizes[0]
-        at, end = (offset, getattr(self.memory, "size", None)) if own is None else (index, own)
-        beyond = (at.values < 0)[machine.running].any() if isinstance(at, Place) else at < 0
-        if beyond or (isinstance(at, int) and isinstance(end, int) and at > end):
-            raise Wrong("an address outside its array")
-        return Pointer(self.memory, offset, self.width, of=self.of)
-
-    def declared(self, type_: Type) -> Pointer:
-        """Return it as a pointer, or a reference, of a type, to which nothing is converted without a cast."""
-        own = self.of
-        if own.kind and (
-            (own.kind, self.width, own.space) != (type_.kind, type_.width, type_.space)
-            or own.fixed > type_.fixed
-            or len(self.sizes) > 1
-        ):
-            raise Unread(f"an address of {own.fixed * 'const '}{own.kind} as one of {type_.kind}")
-        return replace(self, of=type_)
-
-    def load(self, machine: Machine) -> Any:
-        """Return what is there."""
-        return self.memory.load(self.offset, self.width, machine)
-
-    def store(self, value: Any, machine: Machine) -> None:
-        """Write a number, or a vector."""
-        if self.of.fixed:
-            raise Wrong("it writes what is const")
-        self.memory.store(self.offset, self.width, value, machine)
+    def place(self, index: Sequence[Any], kind: Type) -> Any:
+        """Return the place of a number, or vector, of a kind: within each size where that is known."""
+        if len(index) == len(self.sizes) and (kind.lanes == self.kind.lanes or self.kind.lanes == 1):
+            sizes, lanes = self.sizes, self.kind.lanes
+        else:
+            sizes, lanes = (None,), kind.lanes
+        if len(index) != len(sizes):
+            raise Wrong(f"{len(index)} indices of an array of {len(sizes)}")
+        at: Any = 0
+        for each, size in zip(index, sizes, strict=True):
+            if size is not None and type(each) is int and not 0 <= each < size:
+                raise Wrong(f"element {each} of an array of {size}")
+            at = plus(times(at, size or 1), each)
+        return plus(self.first, times(at, lanes))
 
 
 class Memory:
@@ -164,52 +122,36 @@ class Memory:
 class Image:
     """An image: every number of it is an unknown of the claim."""
 
-    kind = "float32"
-
     def __init__(self, name: str, channels: int, size: tuple[Place, Place], span: Span | None = None) -> None:
         self.name, self.channels, self.size, self.lanes, self.span = name, channels, size, size[0].lanes, span
 
-    def load(self, offset: Any, width: int, machine: Machine) -> Number:
-        """Return numbers of it, each within the picture."""
-        parts = [self._one(plus(offset, k), machine) for k in range(width)]
-        return parts[0] if width == 1 else stacked(parts)
+    def pixel(self, index: Sequence[Any], kind: Type, machine: Machine) -> Number:
+        """Return numbers of it: of a row, a column, and a channel or what lies behind."""
+        row, column, *behind = index
+        channel = behind[0] if behind else 0
+        if machine.texels and not (type(channel) is int and 0 <= channel <= self.channels - kind.lanes):
+            raise Wrong(f"image {self.name} has no channel {channel}")
+        at = plus(times(column, self.channels), channel)
+        width, height = self.size
+        self._within(row, height.values, 1, machine)
+        self._within(at, width.values * self.channels, kind.lanes, machine)
+        offset = plus(times(row, times(width, self.channels)), at)
+        parts = [self._one(plus(offset, k)) for k in range(kind.lanes)]
+        return parts[0] if len(parts) == 1 else stacked(parts)
 
-    def _one(self, offset: Any, machine: Machine) -> Number:
-        values = offset.values if isinstance(offset, Place) else np.full(self.lanes.count, offset)
-        count = self.size[0].values * self.size[1].values * self.channels
-        if (((values < 0) | (values >= count)) & machine.running).any():
+    def _within(self, index: Any, size: Any, lanes: int, machine: Machine) -> None:
+        """Refuse an index beyond a size."""
+        values = index.values if isinstance(index, Place) else np.full(self.lanes.count, index)
+        if (((values < 0) | (values > size - lanes)) & machine.running).any():
             raise Wrong(f"image {self.name} is read beyond its ends")
+
+    def _one(self, offset: Any) -> Number:
+        values = offset.values if isinstance(offset, Place) else np.full(self.lanes.count, offset)
         return leaf(hashed(f"image {self.name}", values), span=self.span)
-
-    def store(self, *given: Any) -> None:
-        """Refuse."""
-        raise Wrong(f"image {self.name} is written")
-
-
-@dataclass(frozen=True)
-class Texel:
-    """A pixel of a texture, whose channels are read one by one."""
-
-    image: Image
-    column: Any
-    row: Any
-
-    def component(self, c: int, machine: Machine) -> Number:
-        """Return a channel; the pixel must be within the image."""
-        if type(c) is not int or not 0 <= c < self.image.channels:
-            raise Wrong(f"image {self.image.name} has no channel {c}")
-        for at, size in zip((self.column, self.row), self.image.size, strict=True):
-            values = at.values if isinstance(at, Place) else np.full(size.lanes.count, at)
-            if (((values < 0) | (values >= size.values)) & machine.running).any():
-                raise Wrong(f"image {self.image.name} is read beyond its ends")
-        place = times(plus(times(self.row, self.image.size[0]), self.column), self.image.channels)
-        return self.image.load(plus(place, c), 1, machine)
 
 
 class Weights:
-    """The weights, as a buffer; a texture of them has rows of `TEXELS`. Of `spectra` no sums are made."""
-
-    TEXELS, kind = 1024, "float32"
+    """The weights. Of `spectra` no sums are made."""
 
     def __init__(self, numbers: Number, spectra: range = range(0)) -> None:
         self.numbers, self.spectra, self.size = numbers, spectra, int(numbers.value.shape[2])
@@ -222,15 +164,9 @@ class Weights:
         weight = offset + width <= self.spectra.start or offset >= self.spectra.stop
         return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=weight)
 
-    def store(self, *given: Any) -> None:
-        """Refuse."""
-        raise Wrong("the weights are written")
-
 
 class Result:
     """The picture that a text writes: its own pixels, with what the claim says, and all of them."""
-
-    kind = "float32"
 
     def __init__(self, claim: Claim, channels: int) -> None:
         self.claim, self.channels = claim, channels
@@ -240,10 +176,6 @@ class Result:
         """Check numbers that are written."""
         for k in range(width):
             self._one(plus(offset, k), part_of(value, k if width > 1 else None), machine)
-
-    def load(self, *given: Any) -> None:
-        """Refuse."""
-        raise Wrong("the result is read")
 
     def _one(self, offset: Any, value: Any, machine: Machine) -> None:
         lanes, stride = self.claim.lanes, self.claim.stride

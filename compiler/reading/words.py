@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cache, reduce
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,8 +30,6 @@ from ..proof.evidence import INTEGERS
 from ..proof.integer_checker import check_integers
 from .field import Number, P, Span, expression, hashed, leaf, literal, part_of, stacked, wide
 from .lanes import Unread, Wrong
-from .memory import Pointer, Weights
-from .tokens import Type
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -52,13 +50,6 @@ EXACT = 2**24
 
 ZERO, OTHER = (None, False), (None, True)
 """Bytes of a word that are 0, and that are not known."""
-
-
-def size_of(kind: str) -> int:
-    """Return the bytes of a number of a kind."""
-    if kind not in TYPES:
-        raise Unread(f"the size of {kind or 'what has no kind'}")
-    return np.dtype(TYPES[kind]).itemsize
 
 
 # ---- integers ---------------------------------------------------------------------------------------------
@@ -101,15 +92,11 @@ def within(span: Span, limits: tuple[int, int]) -> bool:
     return bool(np.min(span[0]) >= limits[0] and np.max(span[1]) <= limits[1])
 
 
-NAMES = {"+": "add", "-": "subtract", "*": "multiply"}
-"""Names of operators in programs."""
-
-
 def ends(op: str, a: Span, b: Span) -> Span:
     """Return the span of a sum, a difference or a product."""
-    if op == "+":
+    if op == "add":
         return a[0] + b[0], a[1] + b[1]
-    if op == "-":
+    if op == "subtract":
         return a[0] - b[1], a[1] - b[0]
     corners = [x * y for x in a for y in b]
     if all(isinstance(corner, int) for corner in corners):
@@ -119,7 +106,7 @@ def ends(op: str, a: Span, b: Span) -> Span:
 
 def operate(op: str, a: Number, b: Number) -> Number | None:
     """Return the sum, difference or product of two integers with spans, None of others."""
-    if a.span is None or b.span is None or op not in NAMES or "float32" in (a.kind, b.kind):
+    if a.span is None or b.span is None or op not in ("add", "subtract", "multiply") or "float32" in (a.kind, b.kind):
         return None
     kind = "uint32" if "uint32" in (a.kind, b.kind) else "int32"
     span = ends(op, a.span, b.span)
@@ -130,18 +117,18 @@ def operate(op: str, a: Number, b: Number) -> Number | None:
     factors = [known(a), known(b)]
     if factors[0] is not None and factors[1] is not None:
         return integers(span[0], kind, a.weight or b.weight)
-    if op == "*" and factors[0] is None:
+    if op == "multiply" and factors[0] is None:
         if factors[1] is None:
             return None
         a, b = b, a
-    is_sum = a.shape is None or b.shape is None or (op == "*" and a.weight)
+    is_sum = a.shape is None or b.shape is None or (op == "multiply" and a.weight)
     va, vb = (n.term if is_sum else n.value for n in (a, b))
-    if op == "*":
+    if op == "multiply":
         va, vb = a.value, vb % P
     axes = max(va.ndim, vb.ndim)
     va, vb = (v if v.ndim == axes else v[..., None] for v in (va, vb))
-    value = va * vb % P if op == "*" else va + vb if op == "+" else va % P + (P - vb % P)
-    shape = None if is_sum else expression(NAMES[op], a, b, commutes=op != "-").shape
+    value = va * vb % P if op == "multiply" else va + vb if op == "add" else va % P + (P - vb % P)
+    shape = None if is_sum else expression(op, a, b, commutes=op != "subtract").shape
     return Number(value, shape, kind, span=span)
 
 
@@ -280,11 +267,12 @@ def bytes_of(number: Number, signed: bool) -> list[Number]:
     return found
 
 
-def dots(total: Number | None, one: Number, other: Number, signed: tuple[bool, bool]) -> Number:
-    """Return a sum, if there is one, and the four products of two words' bytes."""
-    for a, b in zip(bytes_of(one, signed[0]), bytes_of(other, signed[1]), strict=True):
-        term = operate("*", a, b)
-        found = operate("+", total, term) if total is not None and term is not None else term
+def dots(one: Sequence[Number], other: Sequence[Number]) -> Number:
+    """Return the sum of the products of four integers and four others."""
+    total: Number | None = None
+    for a, b in zip(one, other, strict=True):
+        term = operate("multiply", a, b)
+        found = operate("add", total, term) if total is not None and term is not None else term
         if found is None:
             raise Unread("products of bytes of the picture")
         total = found
@@ -292,30 +280,13 @@ def dots(total: Number | None, one: Number, other: Number, signed: tuple[bool, b
     return total
 
 
-def of_words(machine: Machine, one: Number, other: Number, total: Number | None = None) -> Number:
-    """Return the products of two words of bytes with a sign, added to a sum if there is one."""
-    return dots(total, one, other, (True, True))
-
-
-def of_integers(machine: Machine, one: Number, other: Number, total: Number | None = None) -> Number:
-    """Return the same by functions that take words for bytes without a sign where the words have none."""
-    if {one.kind, other.kind} != {"int32"}:
-        raise Unread("products of words without a sign")
-    return of_words(machine, one, other, total)
-
-
-def unsigned_first(machine: Machine, total: Number, one: Number, other: Number) -> Number:
-    """Return a sum and the products of bytes without a sign and bytes with one."""
-    return dots(total, one, other, (False, True))
-
-
-def packed(machine: Machine, given: Any) -> Number:
+def packed(given: Sequence[Number]) -> Number:
     """Return a word of the low bytes of four integers."""
     parts = [parts_of(one) for one in given]
     if len(parts) != 4 or not all(parts):
         raise Unread("a word of other numbers")
     shape = hashed("word", *(one.known for one in given))
-    return word(tuple(part[0] for part in parts if part), "uint32", shape)
+    return word(tuple(part[0] for part in parts if part), "int32", shape)
 
 
 def joined(four: Number) -> Number:
@@ -357,101 +328,6 @@ class Stored:
     def store(self, *given: Any) -> None:
         """Refuse."""
         raise Wrong("the weights are written")
-
-
-def pointed(found: Pointer, type_: Type, aligned: bool = False) -> Pointer:
-    """Return a place of a memory, as one of numbers of another type; `aligned`: a vector at its multiples."""
-    kind = getattr(found.memory, "kind", "")
-    own = type_.kind == "uint8" or (
-        isinstance(found.memory, (Stored, Weights)) and found.offset % type_.width == 0
-    )
-    if aligned and type_.width > 1 and not own:
-        raise Wrong(f"a vector of {type_.width} numbers at another place than a multiple of them")
-    if isinstance(found.memory, Stored) and size_of(type_.kind) == size_of(kind):
-        return Pointer(found.memory.seen_as(type_.kind), found.offset, type_.width, of=type_)
-    if kind not in ("", type_.kind):
-        raise Unread(f"an address of {kind} as one of {type_.kind}")
-    return Pointer(found.memory, found.offset, type_.width, of=type_)
-
-
-@cache
-def component(member: str) -> int | None:
-    """Return which number of a vector a member is, None of another member."""
-    if re.fullmatch("s[0-9a-f]", member):
-        return int(member[1], 16)
-    return max("xyzw".find(member), "rgba".find(member)) if re.fullmatch("[xyzwrgba]", member) else None
-
-
-@dataclass(frozen=True)
-class Slot:
-    """A variable whose address is taken: its name in its frame, and its type."""
-
-    frame: dict[str, Any]
-    name: str
-    type: Type
-
-
-def copy(machine: Machine, to: Any, source: Any, count: int) -> None:
-    """Copy bytes of one memory to another, or to a variable."""
-    kind = getattr(source.memory, "kind", "")
-    if type(count) is not int or count < 1 or source.memory is getattr(to, "memory", None):
-        raise Wrong("it copies nothing, or a memory to itself")
-    if isinstance(to, Slot):
-        if (to.type.kind, to.type.width, kind, count) != ("int32", 1, "uint8", 4) or machine.mask is not None:
-            raise Unread("a copy of bytes to a variable of another kind")
-        to.frame[to.name] = joined(source.memory.load(source.offset, 4, machine))
-        return
-    own, memory = to.memory.kind, source.memory
-    at, rest = divmod(source.offset * size_of(kind), size_of(own))
-    if isinstance(memory, Stored):
-        memory = memory.seen_as(own)
-    elif kind != own:
-        raise Unread(f"a copy of {kind} to {own}")
-    if to.of.fixed or rest or count % size_of(own):
-        raise Wrong("it copies a part of a number, or to what is const")
-    to.memory.store(
-        to.offset, count // size_of(own), memory.load(at, count // size_of(own), machine), machine
-    )
-
-
-def sixteen(machine: Machine, source: Pointer) -> Any:
-    """Return sixteen integers of a memory."""
-    return pointed(source, Type("int32", 16)).memory.load(source.offset, 16, machine)
-
-
-def store_sixteen(machine: Machine, to: Pointer, value: Number) -> None:
-    """Write sixteen floats."""
-    if value.kind != "float32":
-        raise Unread("integers written as floats")
-    to.memory.store(to.offset, 16, value, machine)
-
-
-def seen(kind: str, otherwise: Callable[..., Number]) -> Callable[..., Number]:
-    """Return the function that takes the bits of a number for those of another kind."""
-
-    def found(machine: Machine, a: Number) -> Number:
-        numbers = known(a)
-        if kind == "float32" and numbers is not None and a.kind in ("int32", "uint32"):
-            return floats(np.asarray(numbers).astype("<i4").view("<f4"))
-        if kind != "float32" and a.kind in ("int8", "uint8") and wide(a) == 4:
-            return joined(a)
-        if kind != "float32" and a.kind in ("int32", "uint32"):
-            return machine.cast(a, kind)
-        return otherwise(machine, a)
-
-    return found
-
-
-def vector(kind: str) -> Callable[..., Any]:
-    """Return the function that makes a vector of numbers; one number is each of them."""
-
-    def made(machine: Machine, *given: Any) -> Any:
-        if len(given) == 1 and isinstance(given[0], list):
-            given = (*given[0],)
-        found = [machine.cast(n, kind) if isinstance(n, Number) else literal(n, kind) for n in given]
-        return found[0] if len(found) == 1 else found
-
-    return made
 
 
 # ---- what a claim says ------------------------------------------------------------------------------------

@@ -7,8 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .frame import Macros
-from .lanes import Unread
+from wamnet.compiler.parsing.parse import Unread
+
+Macros = dict[str, tuple[list[str] | None, str]]
+"""Macros by name: what one takes, None where it takes nothing, and what it is."""
+
+UNROLLED = "\x01"
+"""What stands for a pragma on the loop behind it: no source has this character."""
 
 Tree = tuple[Any, ...]
 """An expression: its form, then its parts."""

@@ -21,11 +21,12 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
-from .frame import UNROLLED, Macros
-from .lanes import Unread
-from .tokens import Function, Text, Type, Variable, rounds, tokens
-from .tokens import Tree as Tree
-from .tokens import constant as constant
+from wamnet.compiler.parsing.parse import Unread
+
+from .text_tokens import UNROLLED, Macros
+from .text_tokens import Function, Text, Type, Variable, rounds, tokens
+from .text_tokens import Tree as Tree
+from .text_tokens import constant as constant
 
 OUTSIDE = {
     "const", "static", "inline", "restrict", "__restrict__", "precise", "__kernel", "kernel", "__global",

@@ -30,7 +30,7 @@ from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.proof.evidence import Refused, read
 from wamnet.compiler.reading.check import run_text
 from wamnet.compiler.reading.lanes import Unread
-from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.reading.languages import TITLES
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -332,7 +332,7 @@ def small(folder: Path) -> Iterator[Path]:
     """Write kernels of a small network: plain in every language that is read, and in tiles; yield folders."""
     network = siren.init((3**2 * 6, 6, 5, 3), 1.0, 3.0, seed=5)
     model = Model(network, ("color", "normal"), Window(3, "clamp"), Normalization())
-    for target, schedule, variant in [*((target, "plain", "full") for target in LANGUAGES), *TILES]:
+    for target, schedule, variant in [*((target, "plain", "full") for target in TITLES), *TILES]:
         made = folder / f"{target}-{schedule}"
         write(compile_plan(plan_model(model, target, "ieee", schedule, variant)), made)
         yield made

@@ -159,7 +159,7 @@ def mixed(words: Words) -> Words:
     return words
 
 
-SALT: dict[str, Any] = {}
+SALT: dict[Any, Any] = {}
 """Random words of one run, by name: nobody can write a text for them."""
 
 
@@ -249,11 +249,12 @@ def difference(a: Number, b: Number) -> Number:
 def expression(name: str, *operands: Number, commutes: bool = False, kind: str | None = None) -> Number:
     """Return what an operation makes of numbers: equal where name, kinds and operands are."""
     kinds = tuple([operand.kind for operand in operands])
-    parts = alike(*[operand.known for operand in operands])
-    key = f"{name} {kinds}"
-    if key not in SALT:
-        SALT[key] = hashed(f"{name} {'/'.join(sorted(set(kinds)))}", np.arange(2, dtype=np.uint64))
-    first, second = SALT[key]
+    parts = [operand.known for operand in operands]
+    if len({part.ndim for part in parts}) > 1:
+        parts = alike(*parts)
+    if (name, kinds) not in SALT:
+        SALT[name, kinds] = hashed(f"{name} {'/'.join(sorted(set(kinds)))}", np.arange(2, dtype=np.uint64))
+    first, second = SALT[name, kinds]
     # The sum of two shapes is that of no two others, but with a probability of 2^-64.
     found = sum(parts[1:], parts[0]) if commutes else parts[0]
     for part in [] if commutes else parts[1:]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.kernel import Array, Call, Expr, For, If, Kernel, Let, Statement, Store, Type
+from ..kernel.kernel import INTEGERS, Array, Call, Expr, For, If, Kernel, Let, Statement, Store, Type
 from ..kernel.run import Runner
 from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
@@ -130,9 +130,9 @@ class Machine(Runner):
 
     def _store(self, array: str, index: Sequence[Any], kind: Type, value: Any) -> None:
         """Write a value, an integer as a number of a kind."""
-        if type(value) is int:
-            value = literal(value, kind.dtype)
         memory = self.memory[array]
+        if type(value) is int and not (isinstance(memory, Slice) and memory.is_index):
+            value = literal(value, kind.dtype)
         if isinstance(memory, Result):
             row, column, channel = index
             if type(channel) is not int or not 0 <= channel < memory.channels:
@@ -233,10 +233,20 @@ class Machine(Runner):
             return COMPARES[what](-b.against(a), 0)
         return COMPARES[what](a, b)
 
+    def _of_ints(self, what: str, a: int, b: int) -> int:
+        """Return what arithmetic makes of two integers that all lanes share."""
+        if b <= 0 or a < 0:
+            if what in ("divide", "remainder"):
+                raise Wrong("it divides a negative integer, or by one")
+        found = INTEGERS[what](a, b)
+        return found if -(2**31) <= found < 2**31 else self._whole(found)
+
     def _of_integers(self, what: str, a: Any, b: Any) -> Any:
         """Return what an operation makes of two integers."""
         if what in COMPARES:
             return self._whole_compared(what, a, b)
+        if type(a) is int and type(b) is int and what in INTEGERS:
+            return self._of_ints(what, a, b)
         if what in ("add", "subtract"):
             return self._whole(plus(a, b, 1 if what == "add" else -1))
         if what == "multiply":
@@ -245,13 +255,9 @@ class Machine(Runner):
             return clamped(a, b, -1 if what == "minimum" else 1)
         if what not in ("divide", "remainder") or type(b) is not int:
             raise Unread(f"{what} of coordinates")
-        if b <= 0 or (type(a) is int and a < 0):
-            raise Wrong("it divides a negative integer, or by one")
-        if type(a) is int:
-            return a // b if what == "divide" else a % b
         if a.form.any():
             raise Unread(f"{what} of coordinates")
-        if (a.values < 0)[self.running].any():
+        if b <= 0 or (a.values < 0)[self.running].any():
             raise Wrong("it divides a negative integer, or by one")
         return self.lanes.constant(a.values // b if what == "divide" else a.values % b)
 
@@ -259,6 +265,12 @@ class Machine(Runner):
 
     def operate(self, what: str, *args: Any) -> Any:
         """Return what an operation makes of values."""
+        if len(args) == 2:
+            kinds = type(args[0]), type(args[1])
+            if kinds == (Number, Number):
+                return self._of_two(what, *args)
+            if kinds == (int, int) and what in INTEGERS:
+                return self._of_ints(what, *args)
         if not any(isinstance(each, Number) for each in args):
             if len(args) != 2 or not all(type(each) in (int, Place) for each in args):
                 raise Unread(f"{what} of other values than integers and numbers")
@@ -275,6 +287,8 @@ class Machine(Runner):
 
     def _of_two(self, what: str, a: Number, b: Number) -> Number:
         """Return what an operation makes of two numbers."""
+        if what == "multiply" and not (a.span and b.span):
+            return product(a, b)
         shift = what.endswith("shift")
         if shift and (b.literal is None or not 0 <= b.literal < 32):
             raise Unread("a shift by anything but a constant below 32")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernel.kernel import Type
+from ..kernel.kernel import INT, Type
 from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
-from .lanes import Mask, Place, Unread, Wrong, plus, times
+from .lanes import Mask, Place, Unread, Wrong, chosen, plus, times
 
 if TYPE_CHECKING:
     from .claim import Claim
@@ -25,6 +25,11 @@ class Slice:
     first: Any
     kind: Type
     sizes: tuple[int | None, ...]
+
+    @property
+    def is_index(self) -> bool:
+        """Whether it is a variable that may hold an index."""
+        return self.sizes == () and self.kind == INT
 
     def place(self, index: Sequence[Any], kind: Type) -> Any:
         """Return the place of a number, or vector, of a kind: within each size where that is known."""
@@ -79,11 +84,14 @@ class Memory:
 
     def store(self, offset: Any, width: int, value: Any, machine: Machine) -> None:
         """Write `width` numbers, in the lanes that run."""
-        if not isinstance(value, Number):
-            raise Unread(f"anything but numbers in {self.name}")
         offset, mask = self._checked(offset, width), machine.mask
         if mask is self.mask:
             mask = None
+        if isinstance(value, (int, Place)) and self.size == 1:
+            self._store_index(value, mask, machine)
+            return
+        if not isinstance(value, Number):
+            raise Unread(f"anything but numbers in {self.name}")
         if wide(value) not in (1, width):
             raise Wrong(f"{self.name} is given {wide(value)} numbers for {width}")
         number = isinstance(value, Number)
@@ -101,6 +109,15 @@ class Memory:
                 old = self.cells.get(offset + k, (None, None))
                 new = (blended(part_of(*new), part_of(*old), mask), None)
             self.cells[offset + k] = new
+
+    def _store_index(self, value: Any, mask: Mask | None, machine: Machine) -> None:
+        """Write an integer of a variable."""
+        old, _ = self.cells.get(0, (None, None))
+        if mask is not None:
+            if isinstance(old, Number) or old is None:
+                raise Wrong(f"{self.name} is written in some lanes only")
+            value = chosen(machine.lanes, mask, value, old)
+        self.cells[0] = (value, None)
 
     def _split(self, offset: int, width: int) -> None:
         """Keep the vectors of these places as numbers."""

@@ -13,7 +13,7 @@ from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading import field
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Place, Unread, Wrong, lanes_for
-from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.reading.languages import TITLES
 from wamnet.compiler.variants import plan_model
 
 
@@ -22,7 +22,7 @@ def plain(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("plain"), "opencl"))
 
 
-@pytest.mark.parametrize("target", sorted(LANGUAGES))
+@pytest.mark.parametrize("target", sorted(TITLES))
 @pytest.mark.parametrize(("size", "border"), [(3, "zero"), (4, "clamp")])
 def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
     """TXT-1, TXT-7: every language that is read."""
@@ -124,7 +124,7 @@ def test_sums_do_not_depend_on_their_order(one_lane):
 
 
 def test_lanes_decide_what_may_be_compared():
-    lanes = lanes_for((4, 2), 1, beyond=False, seed=1)
+    lanes = lanes_for((4, 2), 1, seed=1)
     x, width, y = (lanes.place(axis) for axis in (0, 1, 2))
     assert isinstance(x, Place)
     assert (x.plus(4).against(width) < 0).any()
@@ -140,7 +140,7 @@ def test_lanes_decide_what_may_be_compared():
 
 def test_lanes_have_every_case_of_an_axis():
     """TXT-5: each distance to both borders up to the axis' cap, and beyond it, the other axis far away."""
-    lanes = lanes_for((3, 2), 1, beyond=False, seed=1)
+    lanes = lanes_for((3, 2), 1, seed=1)
     x, width, y, height = lanes.known
     for at, size, others, extent, cap in ((x, width, y, height, 3), (y, height, x, width, 2)):
         far = (others > 3) & (extent - 1 - others > 3)

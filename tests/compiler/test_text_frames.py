@@ -12,7 +12,7 @@ from wamnet.compiler.proof import checker
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_facts, check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
-from wamnet.compiler.reading.languages import LANGUAGES
+from wamnet.compiler.reading.languages import TITLES
 from wamnet.compiler.reading.limits import limited
 from wamnet.refimpl.errors import InputError
 
@@ -118,7 +118,7 @@ def test_a_manifest_of_another_form_is_rejected(tmp_path):
                 checker.check(path) and check_text(path)
 
 
-@pytest.mark.parametrize("target", sorted(LANGUAGES))
+@pytest.mark.parametrize("target", sorted(TITLES))
 def test_a_foreign_word_is_rejected_anywhere(plain, target):
     """The mirror of the classes above: no other word is before a word of a kernel."""
     source, *others = plain(target)

@@ -13,7 +13,7 @@ from wamnet.compiler.reading.syntax import Parser
 
 def test_tiles_have_every_case_of_a_row():
     """TXT-10."""
-    lanes = tile_lanes((6, 4), 3, beyond=True, seed=1)
+    lanes = tile_lanes((6, 4), 3, seed=1)
     x, width, y, height = lanes.known
     far = (y > 5) & (height - y > 8)
     cases = {(a > 0, min(b, 11)) for a, b in zip(x[far], (width - x)[far], strict=True) if b > 0}
@@ -74,7 +74,7 @@ def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, read):
 def test_loops_of_arrays_that_overlap_are_run_turn_by_turn(body, turns, monkeypatch):
     """What a turn writes is read by a later one where two names are of one memory."""
     text = Parser(f"void f() {{ {body.replace('LOOP', 'for (int i = 0; i < 3; ++i)')} }}").parse()
-    lanes, at_once, run = tile_lanes((6, 4), 3, beyond=False, seed=1), [], Machine._run_turns
+    lanes, at_once, run = tile_lanes((6, 4), 3, seed=1), [], Machine._run_turns
     monkeypatch.setattr(Machine, "_run_turns", lambda *given: (at_once.append(given[2]), run(*given)))
     try:
         field.fold_lanes(np.ones(lanes.count, dtype=bool))

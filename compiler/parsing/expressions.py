@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -39,10 +40,15 @@ class Expressions(Reader):
     def _binary(self, level: int) -> Expr:
         """Read operators of a level, from the left."""
         if level == len(BINARY):
-            return self._unary()
+            value, self.operator = self._unary(), ""
+            return value
         value = self._binary(level + 1)
         while self._now() in BINARY[level]:
-            value = self._made(BINARY[level][self._take()], value, self._binary(level + 1))
+            first, sign = self.operator, self._take()
+            value = self._made(BINARY[level][sign], value, self._binary(level + 1))
+            if self.language.lets and not binds(sign, first, self.operator):
+                raise Unread(f"an operand of {sign} without brackets")
+            self.operator = sign
         return value
 
     def _unary(self) -> Expr:
@@ -84,7 +90,7 @@ class Expressions(Reader):
         if kind in ("float", "integer"):
             self._take()
             if kind == "float":
-                return const(float(np.float32(text[:-1])))
+                return self._float(text[:-1])
             return const(int(text.removesuffix("u")), Type("uint32") if text.endswith("u") else INT)
         if self.language.number and self._has("(", "(", *self.language.number):
             self._take(")")
@@ -101,6 +107,15 @@ class Expressions(Reader):
             raise Unread(f"{text!r} is not a value")
         self._take()
         return self._call(text) if self._has("(") else self._postfix(text)
+
+    def _float(self, text: str) -> Expr:
+        """Return a constant; its digits are so many that each reader finds the same float32."""
+        exact, nearest = Fraction(text), np.float32(text)
+        if not np.isfinite(nearest):
+            raise Unread(f"{text}, which float32 does not hold")
+        if 4 * abs(exact - Fraction(float(nearest))) > Fraction(float(np.spacing(abs(nearest)))):
+            raise Unread(f"{text}, which is half-way between two float32")
+        return const(float(nearest))
 
     def _arguments(self) -> list[Expr]:
         """Read the arguments of a call, behind its parenthesis."""
@@ -280,3 +295,27 @@ class Expressions(Reader):
         if array != WEIGHTS and self.scope.arrays.get(array) != (kind, 1, True):
             raise Unread(f"{array} holds no vectors")
         return load(array, place.args[0], kind=kind)
+
+
+def binds(sign: str, first: str, second: str) -> bool:
+    """Return whether WGSL lets an operator have operands of these operators without brackets."""
+    relations, sums = ("==", "!=", "<", ">", "<=", ">="), ("+", "-", "*", "/", "%")
+    if sign in ("&&", "||"):
+        inner: tuple[str, ...] = (*relations, *sums, ">>")
+    elif sign in relations:
+        inner = (*sums, ">>")
+    else:
+        inner = sums if sign in sums else ()
+    again = (sign,) if sign in ("&&", "||", "&", "^") else ()
+    return first in (*inner, *again, "") and second in (*inner, "")
+
+
+ROUNDING = ("add", "subtract", "multiply", "divide", "minimum", "maximum", "floor")
+"""Operations whose order GLSL keeps only where their value is declared so."""
+
+
+def rounds(value: Expr) -> bool:
+    """Return whether a value is a sum, a product, or a function of numbers."""
+    if value.op in ("select", "negative", "convert"):
+        return any(map(rounds, value.args[value.op == "select" :]))
+    return value.op in ROUNDING

@@ -44,13 +44,16 @@ from ..kernel.kernel import (
 )
 from ..kernel.verify import KernelError, verify
 from .canonical import canonical
-from .expressions import Expressions
+from .expressions import Expressions, rounds
 from .frames import FRAMES, frame, lines_of, parts_of
 from .grammar import CALLS, CONSTANT, FUNCTION, LANGUAGES, PRODUCTS
 from .reader import Scope
 from .reader import Unread as Unread
 
 Space = Literal["item", "group"]
+
+LAYER = re.compile(r"v\d+")
+"""Arrays of values that a layer has made: what goes into them has been rounded before."""
 
 
 def parse(
@@ -63,6 +66,8 @@ def parse(
     """
     if re.search(r"[^\n -~]|\?\?", source):
         raise Unread("a character beyond printable ASCII, or a trigraph")
+    if language == "glsl-es" and not source.startswith("#version"):
+        raise Unread("a source that does not begin with its version")
     match = frame(language).fullmatch(lines_of(source))
     parts = match and parts_of(match)
     if parts is None:
@@ -318,11 +323,20 @@ class Parser(Expressions):
         if not sizes and self._has(";"):  # a vector of C, which a call sets
             return self._filled(key, kind)
         if sizes or self._now() == ";":
+            if sizes and not LAYER.fullmatch(key):
+                self._check_order(key, kind, qualified)
             return self._array(key, kind, sizes)
         self._take("=")
         value = self._of(self._expression(), kind, key)
+        if rounds(value):
+            self._check_order(key, kind, qualified)
         self.scope.values[key] = value.type
         return Let(key, value)
+
+    def _check_order(self, key: str, kind: Type, qualified: bool) -> None:
+        """Refuse a number of which GLSL may change the order of operations."""
+        if self.language.qualifier and kind == FLOAT and not qualified:
+            raise Unread(f"{key} is not declared {self.language.qualifier}")
 
     def _array(
         self, key: str, kind: Type, sizes: list[Expr], mixed: bool = False, space: Space = "item"

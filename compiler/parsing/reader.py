@@ -40,7 +40,7 @@ class Reader:
         self.by_calls = self.in_floats = False
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []
-        self.at = 0
+        self.at, self.operator = 0, ""
 
     def _read(self, text: str) -> None:
         """Begin to read the tokens of a text."""

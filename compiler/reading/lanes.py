@@ -112,18 +112,23 @@ class Place:
     def against(self, other: Any) -> NDArray[np.int64]:
         """Return the difference (lanes,) from another integer; `Wrong` unless lanes decide its sign."""
         found, running = self.plus(other, -1), self.lanes.running
-        form = np.broadcast_to(found.form, (4, len(running)))[:, running]
+        form, values, known = found.form, found.values, self.lanes.known
+        if not running.all():
+            form = form if form.shape[1] == 1 else form[:, running]
+            values, known = values[running], known[:, running]
         (a, b), (c, d) = form[:2], form[2:]
         one_axis = (np.abs(a) + np.abs(b) == 0) | (np.abs(c) + np.abs(d) == 0)
         plain = np.isin(form, (-1, 0, 1)).all(axis=0) & (a * b <= 0) & (c * d <= 0)
         if not (one_axis & plain).all():
             raise Wrong("it compares coordinates in a way that no lane decides")
-        rest = found.values[running] - (form * self.lanes.known[:, running]).sum(axis=0)
+        rest = values - (form * known).sum(axis=0)
         for axis, cap in enumerate(self.lanes.caps):
             own, extent = form[2 * axis : 2 * axis + 2]
-            if np.abs(rest[(own != 0) | (extent != 0)]).max(initial=0) > cap:
+            if not (own.any() or extent.any()):
+                continue
+            if (np.abs(rest) * ((own != 0) | (extent != 0))).max(initial=0) > cap:
                 raise Wrong(f"it compares a coordinate with a constant beyond {cap}")
-            alone = rest[own * extent == 0] * (own + extent)[own * extent == 0]
+            alone = rest * (own + extent) * (own * extent == 0)
             if self.lanes.steps and (alone <= -self.lanes.steps[axis]).any():
                 raise Wrong("it compares a coordinate with a constant as large as a group")
         return found.values

@@ -15,12 +15,27 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel.kernel import INTEGERS, Array, Call, Expr, For, If, Kernel, Let, Statement, Store, Type
+from ..kernel.kernel import (
+    INTEGERS,
+    Array,
+    Call,
+    Expr,
+    For,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    const,
+    name,
+    parts,
+)
 from ..kernel.run import Runner
 from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
 from . import words
-from .field import Number, Span, blended, choice, difference, expression, literal, part_of, product
+from .field import FOLDED, Number, Span, blended, choice, difference, expression, literal, part_of, product
 from .field import stacked, total
 from .groups import Group
 from .lanes import Lanes, Mask, Place, Unread, Wrong, chosen, clamped, plus, times
@@ -40,6 +55,10 @@ MOST_TURNS = 2**16
 
 MOST_NUMBERS = 2**20
 """Most numbers of all arrays: no kernel comes near, and more would not fit the stack of a thread."""
+
+
+EVERY = object()
+"""The index of a loop all of whose turns are run at once."""
 
 
 class Machine(Runner):
@@ -63,6 +82,8 @@ class Machine(Runner):
         self.memory: dict[str, Any] = dict(memory)
         self.numbers: dict[Any, Any] = {}
         self.size: dict[str, int] = {}
+        self.turns = 1
+        self.loops: dict[int, tuple[str, ...]] = {}
         x, width, y, height = (lanes.place(axis) for axis in range(4))
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
         if group and lanes.inside is not None and kernel.group:
@@ -139,6 +160,8 @@ class Machine(Runner):
                 raise Wrong("it writes a result that is not its own")
             at = times(plus(times(row, self.names["width"]), column), memory.channels)
             memory.store(self._whole(plus(at, channel)), 1, value, self)
+        elif isinstance(memory, Slice) and index and index[0] is EVERY:
+            memory.memory.store(0, kind.lanes * self.turns, value, self)
         elif isinstance(memory, Slice):
             memory.memory.store(memory.place(index, kind), kind.lanes, value, self)
         else:
@@ -149,6 +172,11 @@ class Machine(Runner):
         turn, count, step = map(self.value, (statement.start, statement.count, statement.step))
         if type(step) is not int or step < 1:
             raise Wrong(f"the loop over {statement.name} has a step that is not positive")
+        if FOLDED and self._is_elementwise(statement, count):
+            self.names[statement.name], self.turns = EVERY, count
+            self.body(statement.body)
+            self.turns = 1
+            return
         outer = self.mask
         for _ in range(MOST_TURNS):
             self.names[statement.name] = turn
@@ -167,6 +195,16 @@ class Machine(Runner):
         else:
             raise Wrong(f"a loop runs more than {MOST_TURNS} times")
         self.mask = outer
+
+    def _is_elementwise(self, loop: For, count: Any) -> bool:
+        """Return whether turn i of a loop has to do with elements i alone, of whole arrays."""
+        if id(loop) not in self.loops:
+            self.loops[id(loop)] = elementwise(loop)
+        arrays = [self.memory[name] for name in self.loops[id(loop)]]
+        whole = (isinstance(a, Slice) and a.first == 0 and len(a.sizes) == 1 for a in arrays)
+        return bool(arrays) and all(whole) and type(count) is int and all(
+            count <= (a.sizes[0] or 0) and a.kind == arrays[0].kind for a in arrays
+        )  # fmt: skip
 
     def _where(self, lanes: Any, value: Expr) -> Any:
         """Return a truth, of which only some lanes' counts."""
@@ -330,6 +368,8 @@ class Machine(Runner):
     def _load(self, array: str, index: Sequence[Any], kind: Type) -> Any:
         memory = self.memory[array]
         if isinstance(memory, Slice):
+            if index and index[0] is EVERY:
+                return memory.memory.load(0, kind.lanes * self.turns, self)
             return memory.memory.load(memory.place(index, kind), kind.lanes, self)
         if isinstance(memory, Result):
             raise Wrong("the result is read")
@@ -443,3 +483,40 @@ class Machine(Runner):
         bytes_ = value.args[1].type.lanes == 4
         given = [part_of(four, k) for k in range(4)] if bytes_ else words.bytes_of(four, signed=True)
         return words.dots(words.bytes_of(weights, signed=True), given)
+
+
+MIXING = ("call", "component", "stack", "take", "pack4", "dot4", "bits", "clamp")
+"""Operations that are not of each number of a vector by itself."""
+
+
+def elementwise(loop: For) -> tuple[str, ...]:
+    """Return the arrays of a loop whose turn i names values, and reads and writes elements i; else nothing.
+
+    Two arrays of a kernel have no element in common.
+    """
+    index, inside, arrays = (name(loop.name),), set(), list[str]()
+    if (loop.start, loop.step, loop.until) != (const(0), const(1), None):
+        return ()
+    kinds = set()
+    for statement in loop.body:
+        if not isinstance(statement, Let | Store) or (isinstance(statement, Store) and statement.add):
+            return ()
+        for part in parts(statement.value):
+            if part.op == "load" and part.args == index:
+                arrays.append(part.value)
+                kinds.add(part.type)
+            elif part.op == "name" and part != index[0] and part.value not in inside:
+                return ()
+            elif part.op in (*MIXING, "load"):
+                return ()
+        loads = sum(part == index[0] for part in parts(statement.value))
+        if loads != sum(part.op == "load" for part in parts(statement.value)):
+            return ()
+        if isinstance(statement, Let):
+            inside.add(statement.name)
+        elif statement.index != index:
+            return ()
+        else:
+            arrays.append(statement.array)
+            kinds.add(statement.value.type)
+    return tuple(dict.fromkeys(arrays)) if len(kinds) == 1 else ()

@@ -23,8 +23,7 @@ from typing import Any
 
 from wamnet.compiler.parsing.parse import Unread
 
-from .text_tokens import UNROLLED, Macros
-from .text_tokens import Function, Text, Type, Variable, rounds, tokens
+from .text_tokens import UNROLLED, Function, Macros, Text, Type, Variable, rounds, tokens
 from .text_tokens import Tree as Tree
 from .text_tokens import constant as constant
 

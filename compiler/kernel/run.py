@@ -84,7 +84,9 @@ class Runner:
 
     def _evaluators(self) -> dict[str, Callable[[Expr], Values]]:
         """Return the methods that evaluate expressions, by operation."""
-        return {key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")}
+        return {
+            key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")
+        }
 
     def _items(self, width: int, height: int) -> tuple[Items, dict[str, Values]]:
         """Return the work items, and names of their places; only groups reach beyond the image."""

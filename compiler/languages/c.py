@@ -14,27 +14,11 @@ import re
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.instructions import C_TILE, FUSED, REFUSED, RESTRICT, STRAIGHT, UNFUSED, VECTORS, gnu_vectors
 from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from ..kernel.kernel import Kernel
 from .dialect import Dialect, Parts
-from .instructions import C_TILE
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
-
-PRAGMAS = """\
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
-#else
-#pragma STDC FP_CONTRACT OFF
-#endif"""
-"""The lines that forbid fusing."""
-
-UNFUSED = f"""\
-/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
-   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
-   others may ignore both. */
-{PRAGMAS}"""
-"""The same with an explanation."""
 
 POPPED = """\
 }
@@ -44,12 +28,6 @@ POPPED = """\
 #endif
 #endif"""
 """The last lines of a header."""
-
-RESTRICT = """\
-#if defined(__cplusplus)
-#define restrict __restrict /* what compilers of C++ call it */
-#endif"""
-"""The lines that make the header C++."""
 
 DEFINED = re.compile(r"^ *# *define (?!WAMNET_)(\w+)", re.MULTILINE)
 """Macros of a text, but the guard and other names that nobody else has."""
@@ -77,137 +55,6 @@ RESTORED = """\
 #pragma GCC diagnostic pop
 #endif"""
 """What ends [`IGNORED`]."""
-
-FUSED = """\
-/* A product may be fused with a sum: the bound holds either way. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC push_options
-#pragma GCC optimize("fp-contract=fast")
-#else
-#pragma STDC FP_CONTRACT ON
-#endif"""
-"""The lines that allow fusing."""
-
-STRAIGHT = """\
-#if defined(__clang__)
-#define WAMNET_UNROLL _Pragma("unroll")
-#elif defined(__GNUC__) && __GNUC__ >= 8
-/* GCC makes no vector instructions of floorf() while it has to raise the standard's exceptions, on which no
-   number depends. Nor may it carry inputs over from one step to the next, in the registers of the sums. */
-#pragma GCC optimize("no-trapping-math", "no-associative-math", "no-predictive-commoning")
-#define WAMNET_UNROLL _Pragma("GCC unroll 16")
-#define WAMNET_ROLLED _Pragma("GCC unroll 1")
-#endif
-#if !defined(WAMNET_UNROLL)
-#define WAMNET_UNROLL
-#endif
-#if !defined(WAMNET_ROLLED)
-#define WAMNET_ROLLED
-#endif"""
-"""What makes straight code of loops over pixels, so that sums are registers, and vectors of other loops.
-
-GCC would make straight code of the loops over lanes too, instead of vectors."""
-
-OPERATORS = """\
-static inline void wamnet_clear(wamnet_vector *to)
-{
-    *to = (wamnet_vector){0};
-}
-
-static inline void wamnet_load(wamnet_vector *to, const float *from)
-{
-    *to = *(const wamnet_vector *)from;
-}
-
-static inline void wamnet_store(float *to, const wamnet_vector *from)
-{
-    *(wamnet_vector *)to = *from;
-}
-
-static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
-{
-    *sum += *term;
-}
-
-static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
-{
-    *sum += *weight * value;
-}
-"""
-"""What is done with vectors of GCC's type."""
-
-LOOPS = """\
-typedef struct {
-    float lane[LANES];
-} wamnet_vector;
-
-static inline void wamnet_clear(wamnet_vector *to)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = 0.0f;
-    }
-}
-
-static inline void wamnet_load(wamnet_vector *to, const float *from)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = from[i];
-    }
-}
-
-static inline void wamnet_store(float *to, const wamnet_vector *from)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to[i] = from->lane[i];
-    }
-}
-
-static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += term->lane[i];
-    }
-}
-
-static inline void wamnet_add_product(
-    wamnet_vector *restrict sum,
-    const wamnet_vector *restrict weight,
-    float value)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += weight->lane[i] * value;
-    }
-}
-"""
-"""The type of vectors of other compilers, and what is done with it."""
-
-
-def gnu_vectors(lanes: str) -> str:
-    """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
-    kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
-    return f"typedef float wamnet_vector {kind};\n\n{OPERATORS}"
-
-
-VECTORS = f"""\
-/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
-    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
-{gnu_vectors("LANES")}#else
-{LOOPS}#endif
-"""
-"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
-
-
-REFUSED = """\
-#if !defined(__GNUC__)
-#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
-#endif"""
-"""What other compilers say: C99 has no vector type with operators."""
 
 STACK = "stack: {stack} bytes at most, without optimisation too"
 """What a denoiser's text says of the thread that calls it."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import CUDA_SINE
+from ..kernel.instructions import CUDA_GROUP, CUDA_VECTOR
 from ..kernel.interface import DENOISE, ENCODE, PATH, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .dialect import Dialect, Parts
-from .instructions import CUDA_GROUP
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
 CLAMP = """\
@@ -26,27 +26,6 @@ static __device__ inline int wamnet_clamp(int value, int low, int high)
 #endif
 """
 """Limits an index; the language has no such function."""
-
-CUDA_VECTOR = """\
-#ifndef WAMNET_VECTOR
-#define WAMNET_VECTOR
-struct __align__(16) wamnet_vector { float x, y, z, w; };
-static __device__ inline wamnet_vector wamnet_made(float x, float y, float z, float w)
-{
-    wamnet_vector made = {x, y, z, w};
-    return made;
-}
-static __device__ inline wamnet_vector operator*(wamnet_vector a, float b)
-{
-    return wamnet_made(a.x * b, a.y * b, a.z * b, a.w * b);
-}
-static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
-{
-    a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
-}
-#endif
-"""
-"""Vectors of four, with the two operations that sums need: CUDA's own have none."""
 
 GROUPED = (
     "Start ceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group} items;\n"

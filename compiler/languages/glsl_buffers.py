@@ -10,13 +10,13 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from ..core.profiles import SineContract
+from ..kernel.instructions import PORTABLE, VULKAN_EXTENSION, VULKAN_GROUP
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, SCENE_NUMBERS, WEIGHTS, WRITE, Array, Interface
 from ..kernel.kernel import Kernel
 from .c import C
 from .cuda import GROUPED
 from .dialect import Parts
 from .glsl import GLSL
-from .instructions import PORTABLE, VULKAN_EXTENSION, VULKAN_GROUP
 from .openings import Buffers
 
 LEAST_SHARED = 2**14

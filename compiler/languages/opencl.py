@@ -9,30 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.profiles import OPENCL_SINE
+from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_TILE
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
-from .instructions import OPENCL_GROUP, OPENCL_TILE
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
-
-BUILTINS = """\
-#ifdef __has_builtin
-#if __has_builtin(__builtin_elementwise_floor)
-#define FLOOR(a) __builtin_elementwise_floor(a)
-#endif
-#if __has_builtin(__builtin_convertvector)
-#define CONVERT(a, kind) __builtin_convertvector(a, kind)
-#endif
-#endif
-#ifndef FLOOR
-#define FLOOR(a) floor(a)
-#endif
-#ifndef CONVERT
-#define CONVERT(a, kind) convert_##kind(a)
-#endif"""
-"""Operations on vectors that no operator means. PoCL's library may be compiled for another processor than the
-kernel: LLVM then inlines none of its functions, and each call saves all vector registers. clang has names for
-the instructions; other compilers get the functions."""
 
 
 class OpenCL(Arguments):

@@ -13,8 +13,9 @@ A tap beyond the picture reads the nearest pixel of it.
 
 from __future__ import annotations
 
+from ..kernel.instructions import PRAGMAS
 from ..kernel.interface import FOLLOW, GUIDE, SMOOTH, WRITE, Array, Interface
-from .c import ALL_PIXELS, POPPED, PRAGMAS, C, includes, loops
+from .c import ALL_PIXELS, POPPED, C, includes, loops
 from .dialect import Parts
 from .glsl import GLSL
 from .opencl import OpenCL

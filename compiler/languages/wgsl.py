@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
+from ..kernel.instructions import WGSL_GROUP
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 from .dialect import Dialect, Parts
 from .glsl_buffers import GROUP, SAID, Declared
-from .instructions import WGSL_GROUP
 
 ASSUMES = (
     "the compiler keeps the order of the operations of an expression, fused or not, and rounds to nearest. "

@@ -11,18 +11,24 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from ..languages.c import FUSED, REFUSED, RESTRICT, STRAIGHT, UNFUSED, VECTORS, gnu_vectors
-from ..languages.cuda import CUDA_VECTOR
-from ..languages.instructions import (
+from ..kernel.instructions import (
+    BUILTINS,
     C_TILE,
     CUDA_GROUP,
+    CUDA_VECTOR,
+    FUSED,
     OPENCL_GROUP,
     OPENCL_TILE,
+    REFUSED,
+    RESTRICT,
+    STRAIGHT,
+    UNFUSED,
+    VECTORS,
     VULKAN_EXTENSION,
     VULKAN_GROUP,
     WGSL_GROUP,
+    gnu_vectors,
 )
-from ..languages.opencl import BUILTINS
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
 """What becomes a blank."""

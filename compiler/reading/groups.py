@@ -26,6 +26,7 @@ NOBODY = -1
 SOME = 32
 """How many pairs of distances of a group from two borders are drawn in each run."""
 
+
 def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
     """Return the items of groups of all cases, `pixels` of a row to an item.
 

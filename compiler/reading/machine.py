@@ -35,8 +35,20 @@ from ..kernel.run import Runner
 from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
 from . import words
-from .field import FOLDED, Number, Span, blended, choice, difference, expression, literal, part_of, product
-from .field import stacked, total
+from .field import (
+    FOLDED,
+    Number,
+    Span,
+    blended,
+    choice,
+    difference,
+    expression,
+    literal,
+    part_of,
+    product,
+    stacked,
+    total,
+)
 from .groups import Group
 from .lanes import Lanes, Mask, Place, Unread, Wrong, chosen, clamped, plus, times
 from .memory import Image, Memory, Result, Slice
@@ -62,8 +74,11 @@ EVERY = object()
 
 
 class Machine(Runner):
-    """One run of a kernel: `memory` has its images, weights and result; `texels`: channels are none's but a
-    pixel's own; `added` is what a sum of the kernel is to its claim."""
+    """One run of a kernel.
+
+    `memory` has its images, weights and result; `added` says what a sum of the kernel is to its claim;
+    `texels`: a channel beyond a pixel's own is not that of the next pixel, but wrong.
+    """
 
     def __init__(
         self,
@@ -145,7 +160,9 @@ class Machine(Runner):
             away = value.op == "negative"
             number = self.value(value.args[0] if away else value)
             read = self._load(statement.array, index, kind)
-            self._store(statement.array, index, kind, self.operate("subtract" if away else "add", read, number))
+            self._store(
+                statement.array, index, kind, self.operate("subtract" if away else "add", read, number)
+            )
         else:
             self._store(statement.array, index, kind, self.value(value))
 
@@ -273,9 +290,8 @@ class Machine(Runner):
 
     def _of_ints(self, what: str, a: int, b: int) -> int:
         """Return what arithmetic makes of two integers that all lanes share."""
-        if b <= 0 or a < 0:
-            if what in ("divide", "remainder"):
-                raise Wrong("it divides a negative integer, or by one")
+        if (b <= 0 or a < 0) and what in ("divide", "remainder"):
+            raise Wrong("it divides a negative integer, or by one")
         found = INTEGERS[what](a, b)
         return found if -(2**31) <= found < 2**31 else self._whole(found)
 
@@ -394,9 +410,9 @@ class Machine(Runner):
     def _value_clamp(self, value: Expr) -> Any:
         """Return a value within two others; of integers the first is not above the second."""
         given, low, high = map(self.value, value.args)
-        if not isinstance(low, Number) and not isinstance(high, Number):
-            if not np.all(self._whole_compared("less_equal", low, high) | ~self.running):
-                raise Wrong("a value between two others in no order")
+        whole = not isinstance(low, Number) and not isinstance(high, Number)
+        if whole and not np.all(self._whole_compared("less_equal", low, high) | ~self.running):
+            raise Wrong("a value between two others in no order")
         return self.operate("minimum", self.operate("maximum", given, low), high)
 
     def _value_select(self, value: Expr) -> Any:
@@ -494,27 +510,25 @@ def elementwise(loop: For) -> tuple[str, ...]:
 
     Two arrays of a kernel have no element in common.
     """
-    index, inside, arrays = (name(loop.name),), set(), list[str]()
+    index, inside, arrays = name(loop.name), set[str](), list[str]()
     if (loop.start, loop.step, loop.until) != (const(0), const(1), None):
         return ()
     kinds = set()
     for statement in loop.body:
         if not isinstance(statement, Let | Store) or (isinstance(statement, Store) and statement.add):
             return ()
-        for part in parts(statement.value):
-            if part.op == "load" and part.args == index:
-                arrays.append(part.value)
-                kinds.add(part.type)
-            elif part.op == "name" and part != index[0] and part.value not in inside:
-                return ()
-            elif part.op in (*MIXING, "load"):
-                return ()
-        loads = sum(part == index[0] for part in parts(statement.value))
-        if loads != sum(part.op == "load" for part in parts(statement.value)):
+        all_parts = parts(statement.value)
+        loads = [part for part in all_parts if part.op == "load" and part.args == (index,)]
+        names = [part for part in all_parts if part.op == "name" and part != index]
+        others = {part.op for part in all_parts if part not in loads}
+        own = all(part.value in inside for part in names) and not others & {*MIXING, "load"}
+        if not own or sum(part == index for part in all_parts) != len(loads):
             return ()
+        arrays += [part.value for part in loads]
+        kinds |= {part.type for part in loads}
         if isinstance(statement, Let):
             inside.add(statement.name)
-        elif statement.index != index:
+        elif statement.index != (index,):
             return ()
         else:
             arrays.append(statement.array)

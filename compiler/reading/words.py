@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS
 from ..proof.integer_checker import check_integers
-from .field import Number, P, Span, expression, hashed, leaf, literal, part_of, stacked, wide
+from .field import Number, P, Span, expression, hashed, leaf, literal, part_of, stacked
 from .lanes import Unread, Wrong
 
 if TYPE_CHECKING:
@@ -106,7 +106,12 @@ def ends(op: str, a: Span, b: Span) -> Span:
 
 def operate(op: str, a: Number, b: Number) -> Number | None:
     """Return the sum, difference or product of two integers with spans, None of others."""
-    if a.span is None or b.span is None or op not in ("add", "subtract", "multiply") or "float32" in (a.kind, b.kind):
+    if (
+        a.span is None
+        or b.span is None
+        or op not in ("add", "subtract", "multiply")
+        or "float32" in (a.kind, b.kind)
+    ):
         return None
     kind = "uint32" if "uint32" in (a.kind, b.kind) else "int32"
     span = ends(op, a.span, b.span)

@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...compiler.languages.instructions import PORTABLE
+from ...compiler.kernel.instructions import PORTABLE
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .spirv_names import named, unsourced
 

@@ -10,7 +10,7 @@ import pytest
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.languages.instructions import PORTABLE
+from wamnet.compiler.kernel.instructions import PORTABLE
 from wamnet.kernels import open_executor
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.host_runner import CUDARunner

@@ -211,3 +211,195 @@ vec4 wamnet_numbers(ivec4 bits)
 }}
 """
 """Words of bytes in GLSL for Vulkan."""
+
+PRAGMAS = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
+#endif"""
+"""The lines that forbid fusing."""
+
+UNFUSED = f"""\
+/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
+{PRAGMAS}"""
+"""The same with an explanation."""
+
+RESTRICT = """\
+#if defined(__cplusplus)
+#define restrict __restrict /* what compilers of C++ call it */
+#endif"""
+"""The lines that make the header C++."""
+
+FUSED = """\
+/* A product may be fused with a sum: the bound holds either way. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=fast")
+#else
+#pragma STDC FP_CONTRACT ON
+#endif"""
+"""The lines that allow fusing."""
+
+STRAIGHT = """\
+#if defined(__clang__)
+#define WAMNET_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+/* GCC makes no vector instructions of floorf() while it has to raise the standard's exceptions, on which no
+   number depends. Nor may it carry inputs over from one step to the next, in the registers of the sums. */
+#pragma GCC optimize("no-trapping-math", "no-associative-math", "no-predictive-commoning")
+#define WAMNET_UNROLL _Pragma("GCC unroll 16")
+#define WAMNET_ROLLED _Pragma("GCC unroll 1")
+#endif
+#if !defined(WAMNET_UNROLL)
+#define WAMNET_UNROLL
+#endif
+#if !defined(WAMNET_ROLLED)
+#define WAMNET_ROLLED
+#endif"""
+"""What makes straight code of loops over pixels, so that sums are registers, and vectors of other loops.
+
+GCC would make straight code of the loops over lanes too, instead of vectors."""
+
+OPERATORS = """\
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    *to = (wamnet_vector){0};
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    *to = *(const wamnet_vector *)from;
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    *(wamnet_vector *)to = *from;
+}
+
+static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
+{
+    *sum += *term;
+}
+
+static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
+{
+    *sum += *weight * value;
+}
+"""
+"""What is done with vectors of GCC's type."""
+
+LOOPS = """\
+typedef struct {
+    float lane[LANES];
+} wamnet_vector;
+
+static inline void wamnet_clear(wamnet_vector *to)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = 0.0f;
+    }
+}
+
+static inline void wamnet_load(wamnet_vector *to, const float *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to->lane[i] = from[i];
+    }
+}
+
+static inline void wamnet_store(float *to, const wamnet_vector *from)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        to[i] = from->lane[i];
+    }
+}
+
+static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += term->lane[i];
+    }
+}
+
+static inline void wamnet_add_product(
+    wamnet_vector *restrict sum,
+    const wamnet_vector *restrict weight,
+    float value)
+{
+    WAMNET_ROLLED
+    for (int i = 0; i < LANES; ++i) {
+        sum->lane[i] += weight->lane[i] * value;
+    }
+}
+"""
+"""The type of vectors of other compilers, and what is done with it."""
+
+
+def gnu_vectors(lanes: str) -> str:
+    """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
+    kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
+    return f"typedef float wamnet_vector {kind};\n\n{OPERATORS}"
+
+
+VECTORS = f"""\
+/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
+#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
+    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+{gnu_vectors("LANES")}#else
+{LOOPS}#endif
+"""
+"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
+
+REFUSED = """\
+#if !defined(__GNUC__)
+#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
+#endif"""
+"""What other compilers say: C99 has no vector type with operators."""
+
+CUDA_VECTOR = """\
+#ifndef WAMNET_VECTOR
+#define WAMNET_VECTOR
+struct __align__(16) wamnet_vector { float x, y, z, w; };
+static __device__ inline wamnet_vector wamnet_made(float x, float y, float z, float w)
+{
+    wamnet_vector made = {x, y, z, w};
+    return made;
+}
+static __device__ inline wamnet_vector operator*(wamnet_vector a, float b)
+{
+    return wamnet_made(a.x * b, a.y * b, a.z * b, a.w * b);
+}
+static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
+{
+    a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
+}
+#endif
+"""
+"""Vectors of four, with the two operations that sums need: CUDA's own have none."""
+
+BUILTINS = """\
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif"""
+"""Operations on vectors that no operator means. PoCL's library may be compiled for another processor than the
+kernel: LLVM then inlines none of its functions, and each call saves all vector registers. clang has names for
+the instructions; other compilers get the functions."""

@@ -58,19 +58,21 @@ def certify(
     """Check the proof of a kernel's error bound, and that its source computes the certified program.
 
     The checker derives every value again from the weights and the program, and prints each layer's
-    contribution. The source checker then executes the source symbolically, for pixels of images of any
-    size, and compares every sum and every operation with the program's. Neither shares code with the
-    compiler. They assume that compiler and device keep to the language's standard and to IEEE 754's
-    float32, rounded to nearest, and that the host calls the kernel as the manifest states, with finite
-    values in the stated ranges. Exit status 0: the proof holds, and the source computes the program; 1:
-    a step fails, and is named; 2: the file is not a certificate; 3: the source was not checked, and the
-    reason is printed.
+    contribution. The source checker then parses the source to the kernel that it is, executes that
+    symbolically, for pixels of images of any size, and compares every sum and every operation with the
+    program's. They share with the compiler the definition of kernels and of operations, and the texts of
+    instructions, nothing else; how many lines they have is printed. They assume that compiler and device
+    keep to the language's standard and to IEEE 754's float32, rounded to nearest, and that the host calls
+    the kernel as the manifest states, with finite values in the stated ranges. Exit status 0: the proof
+    holds, and the source computes the program; 1: a step fails, and is named; 2: the file is not a
+    certificate; 3: the source was not checked, and the reason is printed.
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import check
     from ...compiler.proof.evidence import Refused
     from ...compiler.reading.check import check_text
     from ...compiler.reading.lanes import Unread
+    from ...compiler.reading.trusted import trusted_lines
 
     inside = [file / CERTIFICATE_NAME, file / "denoise" / CERTIFICATE_NAME] if file.is_dir() else [file]
     path = next(filter(Path.is_file, inside), inside[0])
@@ -88,6 +90,7 @@ def certify(
             with progress("checking the source", None):
                 done = check_text(path, source)
             say(f"source: computes the certified program: {done['sums']} sums, at {done['lanes']} positions")
+            say(f"trusted: {trusted_lines()} lines of Python, which import nothing of what writes kernels")
             say(ASSUMED)
     except Refused as step:
         say(f"rejected: {step}")

@@ -1,4 +1,4 @@
-"""Products of bytes in each language: instructions that a kernel uses as `dot4`, `pack4` and `bits`.
+"""The texts of instructions: products of bytes (`dot4`, `pack4`, `bits`), C's vectors, and what fuses.
 
 For groups kernels call functions: `wamnet_packed` makes four floats the bytes of a word, the first one the
 lowest; `wamnet_dots(sums, weights, word)` adds to each of four sums the products of one word of weights with

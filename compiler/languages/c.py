@@ -14,7 +14,17 @@ import re
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.instructions import C_TILE, FUSED, REFUSED, RESTRICT, STRAIGHT, UNFUSED, VECTORS, gnu_vectors
+from ..kernel.instructions import (
+    C_TILE,
+    FUSED,
+    PRAGMAS,
+    REFUSED,
+    RESTRICT,
+    STRAIGHT,
+    UNFUSED,
+    VECTORS,
+    gnu_vectors,
+)
 from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from ..kernel.kernel import Kernel
 from .dialect import Dialect, Parts

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Slice:
-    """An array of a kernel: elements of a `kind` in a memory from a place on; `sizes` are (None,) of a view."""
+    """An array of a kernel: elements of a `kind` in a memory, from a place on; a view has sizes (None,)."""
 
     memory: Any
     first: Any

@@ -1,5 +1,6 @@
 """Reading kernels' texts: the compiler's own are accepted in each language, faults are not (spec/text.md)."""
 
+import ast
 import json
 import re
 
@@ -14,6 +15,7 @@ from wamnet.compiler.reading import field
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Place, Unread, Wrong, lanes_for
 from wamnet.compiler.reading.languages import TITLES
+from wamnet.compiler.reading.trusted import trusted_files, trusted_lines
 from wamnet.compiler.variants import plan_model
 
 
@@ -198,3 +200,15 @@ def test_arguments_in_another_order_are_refused(plain):
     turned = source.replace("image_color,", "image_x,", 1).replace("image_normal,", "image_color,", 1)
     with pytest.raises(Refused, match="arguments"):
         run_text(turned.replace("image_x,", "image_normal,", 1), *others)
+
+
+def test_what_is_trusted_imports_nothing_that_writes_kernels():
+    """TXT-8: operations, kernels and checkers stand for themselves."""
+    writers = {"artifact", "compile", "languages", "plan", "schedules", "targets", "training", "variants"}
+    files = trusted_files()
+    assert len(files) > 30
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level == 2:
+                assert str(node.module).partition(".")[0] not in writers, f"{path.name}: {node.module}"
+    assert trusted_lines() == sum(len(path.read_text().splitlines()) for path in files)

@@ -35,26 +35,26 @@ def test_numbers_that_differ_in_a_lane_are_folded_to_others():
         field.add_up_lanes(None)
 
 
-I, N = name("i"), const(4)
+INDEX, N = name("i"), const(4)
 
 
-def element(array, index=I):
+def element(array, index=INDEX):
     return load(array, index)
 
 
 @pytest.mark.parametrize(
     ("body", "arrays"),
     [
-        ([Let("a", element("x") * 2.0), Store("y", (I,), name("a", FLOAT))], ("x", "y")),
-        ([Store("y", (I,), apply("minimum", element("y"), element("x")))], ("y", "x")),
-        ([Store("y", (I,), element("x", I + 1))], ()),
-        ([Store("y", (I,), element("x", const(0)))], ()),
-        ([Store("y", (I,), apply("convert", I, value="float32"))], ()),
-        ([Store("y", (I,), element("x"), add=True)], ()),
-        ([Store("y", (I,), call("f", [element("x")], FLOAT))], ()),
-        ([Store("y", (I,), name("b", FLOAT))], ()),
-        ([Store("y", (I,), load("x", I, kind=FLOAT.of(4)).lane(0))], ()),
-        ([Let("a", element("x")), Block((Store("y", (I,), name("a", FLOAT)),))], ()),
+        ([Let("a", element("x") * 2.0), Store("y", (INDEX,), name("a", FLOAT))], ("x", "y")),
+        ([Store("y", (INDEX,), apply("minimum", element("y"), element("x")))], ("y", "x")),
+        ([Store("y", (INDEX,), element("x", INDEX + 1))], ()),
+        ([Store("y", (INDEX,), element("x", const(0)))], ()),
+        ([Store("y", (INDEX,), apply("convert", INDEX, value="float32"))], ()),
+        ([Store("y", (INDEX,), element("x"), add=True)], ()),
+        ([Store("y", (INDEX,), call("f", [element("x")], FLOAT))], ()),
+        ([Store("y", (INDEX,), name("b", FLOAT))], ()),
+        ([Store("y", (INDEX,), load("x", INDEX, kind=FLOAT.of(4)).lane(0))], ()),
+        ([Let("a", element("x")), Block((Store("y", (INDEX,), name("a", FLOAT)),))], ()),
     ],
 )
 def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, arrays):
@@ -63,4 +63,4 @@ def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, arrays):
 
 @pytest.mark.parametrize("start", [const(1), name("first")])
 def test_loops_from_elsewhere_are_run_turn_by_turn(start):
-    assert elementwise(For("i", N, (Store("y", (I,), element("x")),), start=start)) == ()
+    assert elementwise(For("i", N, (Store("y", (INDEX,), element("x")),), start=start)) == ()

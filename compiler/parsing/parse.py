@@ -75,6 +75,7 @@ def parse(
     if bounded and "@bounded@" in FRAMES[language] and "bounded" not in parts:
         raise Unread("a source that does not refuse compilers which void its bound")
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
+    parser.bounded = bounded
     try:
         kernel = canonical(parser.kernel())
         verify(kernel)
@@ -335,7 +336,7 @@ class Parser(Expressions):
 
     def _check_order(self, key: str, kind: Type, qualified: bool) -> None:
         """Refuse a number of which GLSL may change the order of operations."""
-        if self.language.qualifier and kind == FLOAT and not qualified:
+        if self.bounded and self.language.qualifier and kind == FLOAT and not qualified:
             raise Unread(f"{key} is not declared {self.language.qualifier}")
 
     def _array(

@@ -27,7 +27,7 @@ class Reader:
     """The tokens of a part of a source, and the scope at one of them.
 
     `vector`: the type of the weights. C has vectors in arrays of floats (`in_floats`), and functions in
-    place of operators (`by_calls`).
+    place of operators (`by_calls`). `bounded`: what an error bound rests on must be there.
     """
 
     def __init__(self, language: Language, parts: Mapping[str, str], channels: dict[str, int]) -> None:
@@ -37,7 +37,7 @@ class Reader:
         grouped = ("local_x", "local_y", "item") if "shared" in parts else ()
         self.scope = Scope(dict.fromkeys((*places, *grouped, "width", "height"), INT))
         self.place = places
-        self.by_calls = self.in_floats = False
+        self.by_calls = self.in_floats = self.bounded = False
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []
         self.at, self.operator = 0, ""

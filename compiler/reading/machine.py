@@ -96,7 +96,7 @@ class Machine(Runner):
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
         self.memory: dict[str, Any] = dict(memory)
         self.numbers: dict[Any, Any] = {}
-        self.size: dict[str, int] = {}
+        self.size: dict[int, int] = {}
         self.turns = 1
         self.loops: dict[int, tuple[str, ...]] = {}
         x, width, y, height = (lanes.place(axis) for axis in range(4))
@@ -138,7 +138,7 @@ class Machine(Runner):
         name, kind = statement.name, statement.type
         sizes = tuple(integer(self.kernel, each) for each in statement.sizes)
         count = int(np.prod(sizes)) * kind.lanes
-        self.size[name] = max(self.size.get(name, 0), count)
+        self.size[id(statement)] = count
         if not 0 < count <= MOST_NUMBERS or sum(self.size.values()) > MOST_NUMBERS:
             raise Wrong(f"{name} is an array of {count} numbers: at most {MOST_NUMBERS} in all")
         if statement.space == "item":

@@ -43,6 +43,7 @@ from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.parsing.canonical import canonical
+from wamnet.compiler.parsing.expressions import binds
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.plan import plan_program
@@ -289,6 +290,11 @@ REFUSED = {
         "'clamp' is not a name of a value",
     ),
     "an undeclared name": ("v1[j] += part1[j]", "v1[j] += part2[j]", "part2 is not declared"),
+    "a constant half-way between two": (
+        "part1[j] = 0.0f",
+        "part1[j] = 0.50000002980232238769531250000001f",
+        "half-way between two",
+    ),
     "a double": ("part1[j] = 0.0f", "part1[j] = 0.0", "begins with no token"),
     "a decrement": ("part1[j] = 0.0f", "part1[j] = --v1[j]", "'--' is not a value"),
     "a hexadecimal number": ("part1[j] = 0.0f", "part1[j] = 0x0", "begins with no token"),
@@ -347,3 +353,28 @@ def test_a_step_of_another_language_is_refused(tiny):
     assert "j++) {" in source
     with pytest.raises(Unread, match="no 'j'"):
         parse(source.replace("j++) {", "++j) {", 1), "wgsl", {"image_a": 1})
+
+
+@pytest.mark.parametrize(
+    ("sign", "first", "second", "right"),
+    [
+        ("+", "*", "-", True), ("&&", "<", "&&", False), ("&&", "&&", "<", True), (">>", "+", "", False),
+        ("&", "", ">>", False), ("^", "^", "", True), ("<", ">>", "+", True), ("+", "", "&", False),
+    ],
+)  # fmt: skip
+def test_operators_that_need_brackets_in_wgsl(sign, first, second, right):
+    assert binds(sign, first, second) == right
+
+
+def test_sums_are_declared_precise(tiny):
+    """PRO-6: GLSL may change the order of other sums."""
+    kernel = plain(tiny)
+    source = rendered(kernel, "opengl", pack(tiny))
+    arrays = [array for array in kernel.interface.arrays if array.is_image or array.name == RESULT]
+    channels = {array.name: int(array.shape[-1]) for array in arrays}
+    assert parse(source, "opengl", channels, bounded=True)
+    loose = source.replace("PRECISE float part1", "float part1", 1)
+    assert loose != source
+    assert parse(loose, "opengl", channels)
+    with pytest.raises(Unread, match="part1 is not declared PRECISE"):
+        parse(loose, "opengl", channels, bounded=True)

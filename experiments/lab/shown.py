@@ -436,7 +436,8 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
 """Figures in sentences that are computed from several values."""
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
-    "course", "gpu-pipeline", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults", "whole",
+    "course", "gpu-pipeline", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults",
+    "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
 SHOWN_BY_MODULE = ("blender", "domain", "gpu", "house3")

@@ -118,9 +118,9 @@ def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
     items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
     if own != found or len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
         raise Wrong("its manifest has other images, another window or other work items than its program")
-    name, grouped = schedule["name"], re.fullmatch(r"group(\d*)", schedule["name"])
+    name, (family, _, pixels) = schedule["name"], schedule["name"].partition(":")
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
-    if not right or (grouped and items[0] != int(grouped[1] or 1)):
+    if not right or (family == "group" and str(items[0]) != pixels):
         raise Wrong(f"its manifest has other work items than schedule {name}")
     if not manifest["language"].startswith(TITLES[manifest["target"]]):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")

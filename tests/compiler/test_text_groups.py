@@ -36,6 +36,14 @@ def test_groups_compute_what_is_certified(target, schedule, border, activation, 
     assert check_text(path)["sums"] == pixels * (2 * size + 3)
 
 
+@pytest.mark.parametrize("name", ["group:2", "group:1", "plain"])
+def test_a_manifest_whose_schedule_has_other_pixels_is_refused(four, name):
+    source, held, manifest, weights = four
+    other = {**manifest, "schedule": {**manifest["schedule"], "name": name}}
+    with pytest.raises(Refused, match=f"other work items than schedule {name}"):
+        run_text(source, held, other, weights)
+
+
 def lost(source, n):
     """Return a text without its barrier n."""
     wait = next(w for w in ("workgroupBarrier();", "barrier(CLK_LOCAL_MEM_FENCE);") if w in source)

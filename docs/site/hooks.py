@@ -55,7 +55,7 @@ START = ("index.md", "guide/install.md", "first-kernel.md", "support.md", "limit
 RESULTS = ("quality.md", "hard-light.md", "paper.md")
 """Pages of results/, in their order."""
 
-SPEED = ("frames.md", "path-tracer.md", "rows.md")
+SPEED = ("gpu.md", "frames.md", "path-tracer.md", "rows.md")
 """Pages of speed/, in their order."""
 
 LEAVING = re.compile(r"\]\(((?:\.\./)+(?:spec|docs|examples)/[\w./-]+)")

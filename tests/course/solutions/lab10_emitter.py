@@ -12,7 +12,6 @@ OPERATORS = {
     "negative": "-{0}",
     "less": "{0} < {1}",
     "greater": "{0} > {1}",
-    "logical_and": "{0} && {1}",
     "select": "{0} ? {1} : {2}",
 }
 

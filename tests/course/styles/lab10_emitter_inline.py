@@ -8,7 +8,6 @@ from wamnet.compiler.kernel import kernel as ir
 
 Y, X = ir.name("y"), ir.name("x")
 SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "less": "<", "greater": ">"}
-SIGNS |= {"logical_and": "&&"}
 SUFFIX = {"c": "f", "cuda": "f", "opencl": "", "wgsl": ""}
 LEAST = {"cuda": "f{}f", "opencl": "f{}", "wgsl": "{}"}
 LANGUAGES = {name: {} for name in SUFFIX}

@@ -12,6 +12,10 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import weights
 from wamnet.compiler.kernel.interface import WEIGHTS
 from wamnet.compiler.kernel.kernel import load, rewritten
+from wamnet.compiler.parsing.canonical import canonical
+from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
+from wamnet.compiler.parsing.parse import parse
+from wamnet.compiler.plan import plan_program
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.schedules import Plain
 
@@ -56,3 +60,18 @@ def test_a_builder_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, exe
     assert kit.excess(executor, program, images, made["backwards"]) <= 1
     found = {name: executor.run(kernel, images) for name, kernel in made.items()}
     assert np.array_equal(found["plain"], found["backwards"])
+
+
+@pytest.mark.parametrize("target", GRAMMARS)
+def test_it_is_in_every_language_at_once(kit, target):
+    """Each language's source of it is read back to its kernel, which is not the plain one."""
+    dialect = targets.target_named(target).dialect
+    network = kit.network([54, 6, 3], (3.0, 3.0))
+    program = kit.denoiser(network, {"color": 3, "normal": 3}, 3, "clamp")
+    program = plan_program(program, target).emitted
+    schedule = Backwards(dialect)
+    source = schedule.emit(program, ["a schedule of nobody's own"], True)
+    channels = {"image_color": 3, "image_normal": 3, "result": 3}
+    found = parse(source, target, channels)
+    assert found == canonical(schedule.kernel(program))
+    assert found != canonical(Plain(dialect).kernel(program))

@@ -34,6 +34,7 @@ class Expressions(Reader):
         if self.language.lets or not self._has("?"):
             return condition
         chosen = self._expression()
+        self._check_vectors("?", chosen)
         self._take(":")
         return self._made("select", condition, chosen, self._expression())
 
@@ -45,7 +46,10 @@ class Expressions(Reader):
         value = self._binary(level + 1)
         while self._now() in BINARY[level]:
             first, sign = self.operator, self._take()
-            value = self._made(BINARY[level][sign], value, self._binary(level + 1))
+            other = self._binary(level + 1)
+            product = sign == "*" and value.type.lanes > 1 and other.type == FLOAT and not self.by_calls
+            self._check_vectors(sign, *(() if product else (value, other)))
+            value = self._made(BINARY[level][sign], value, other)
             if self.language.lets and not binds(sign, first, self.operator):
                 raise Unread(f"an operand of {sign} without brackets")
             self.operator = sign
@@ -54,7 +58,9 @@ class Expressions(Reader):
     def _unary(self) -> Expr:
         """Read an operator of one operand, a conversion, or a value."""
         if self._has("-"):
-            return self._made("negative", self._unary())
+            value = self._unary()
+            self._check_vectors("-", value)
+            return self._made("negative", value)
         if self._has("!"):
             return self._made("logical_not", self._unary())
         if self.in_floats and self._has("*", "("):
@@ -70,6 +76,8 @@ class Expressions(Reader):
             if kind.lanes > 1 and self.in_floats:
                 self._take("{", "0", "}")
                 return Expr("splat", (const(0.0),), kind)
+            if kind.lanes > 1 and self.language.makers:
+                raise Unread("several values behind a cast, which is a comma here")
             if kind.lanes > 1:
                 self._take("(")
                 return self._filled_lanes(kind, self._arguments())
@@ -149,7 +157,17 @@ class Expressions(Reader):
         operation = language.calls[word]
         if operation in ("pack4", "bits"):
             return Expr(operation, tuple(values), INT if operation == "pack4" else FLOAT.of(4))
+        if operation != "convert":
+            self._check_vectors(word, *values)
+        if word.startswith("f") and any(value.type.dtype != "float32" for value in values):
+            raise Unread(f"{word} of integers")
         return self._made(operation, *values, value="float32" if operation == "convert" else None)
+
+    def _check_vectors(self, word: str, *values: Expr) -> None:
+        """Refuse vectors where the language has only functions for them, or operators of few."""
+        bare = self.by_calls or not self.language.operators
+        if bare and any(value.type.lanes > 1 for value in values):
+            raise Unread(f"{word} of vectors, which have none")
 
     def _converted(self, word: str) -> Expr:
         """Read OpenCL's conversions of vectors, and integers' bits as floats: of words, or magnitudes."""

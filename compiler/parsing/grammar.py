@@ -62,7 +62,7 @@ class Language:
     """The words of a language: types, functions, a barrier; `qualifier`: one that changes no value.
 
     `makers`: what makes a vector of values; `function`: the words before a function's type; `number`: those
-    before a vector's address as that of its components.
+    before a vector's address as that of its components; `operators`: vectors have those of numbers.
     """
 
     types: Mapping[str, Type]
@@ -75,6 +75,7 @@ class Language:
     makers: Mapping[str, Type] = field(default_factory=dict)
     function: tuple[str, ...] = ()
     number: tuple[str, ...] = ()
+    operators: bool = True
 
 
 COMPARED = {
@@ -124,6 +125,7 @@ LANGUAGES: Mapping[str, Language] = {
         makers={"wamnet_made": FLOAT.of(4), "make_int4": INT.of(4)},
         function=("static", "__device__", "inline"),
         number=("float", "*"),
+        operators=False,
     ),
     "metal": Language(
         {**C_TYPES, "uint": Type("uint32"), "float4": FLOAT.of(4)},

@@ -423,6 +423,8 @@ class Parser(Expressions):
         if target.type == BYTE and value.op == "const":
             value = const(value.value, BYTE)
         value = self._of(value, target.type, target.value)
+        if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
+            self._check_vectors(sign, value)
         value = self._made("negative", value) if sign == "-=" else value
         return Store(target.value, target.args, value, sign != "=")
 

@@ -52,6 +52,9 @@ from .reader import Unread as Unread
 
 Space = Literal["item", "group"]
 
+PATCH = "patch_"
+"""What the names of arrays begin with that hold pixels: no sum goes into them [`Parser._assignment`]."""
+
 LAYER = re.compile(r"v\d+")
 """Arrays of values that a layer has made: what goes into them has been rounded before."""
 
@@ -68,7 +71,10 @@ def parse(
         raise Unread("a character beyond printable ASCII, or a trigraph")
     if language == "glsl-es" and not source.startswith("#version"):
         raise Unread("a source that does not begin with its version")
-    match = frame(language).fullmatch(lines_of(source))
+    lines = lines_of(source)
+    if lines.count("weight_texture") == 1:
+        raise Unread("a texture of weights that is declared and not read, or read and not declared")
+    match = frame(language).fullmatch(lines)
     parts = match and parts_of(match)
     if parts is None:
         raise Unread(f"what surrounds the statements is not a frame of {language}")
@@ -324,7 +330,7 @@ class Parser(Expressions):
         if not sizes and self._has(";"):  # a vector of C, which a call sets
             return self._filled(key, kind)
         if sizes or self._now() == ";":
-            if sizes and not LAYER.fullmatch(key):
+            if sizes and not LAYER.fullmatch(key) and not key.startswith(PATCH):
                 self._check_order(key, kind, qualified)
             return self._array(key, kind, sizes)
         self._take("=")
@@ -423,6 +429,8 @@ class Parser(Expressions):
         if target.type == BYTE and value.op == "const":
             value = const(value.value, BYTE)
         value = self._of(value, target.type, target.value)
+        if target.value.startswith(PATCH) and (sign != "=" or rounds(value)):
+            self._check_order(target.value, target.type, qualified=False)
         if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
             self._check_vectors(sign, value)
         value = self._made("negative", value) if sign == "-=" else value

@@ -12,6 +12,7 @@ TITLES: Mapping[str, str] = {
 """What a language's name in manifests begins with."""
 
 GROUPS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group",))
+"""Languages of which work groups are read, with floats and with integers."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
     **GROUPS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"),

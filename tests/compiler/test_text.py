@@ -183,6 +183,7 @@ def test_constants_of_type_double_are_not_read(plain):
             "not a frame of",
         ),
         ("glsl-es", "ivec2(column, row), 0)", "ivec2(column, row), 1)", "no '0'"),
+        ("opengl", "uniform sampler2D weight_texture;\n", "", "read and not declared"),
         ("wgsl", "@binding(3)", "@binding(5)", "other numbers"),
         ("glsl-vulkan", "binding = 3)", "binding = 5)", "other numbers"),
         ("metal", "[[buffer(3)]]", "[[buffer(5)]]", "other numbers"),

@@ -259,7 +259,8 @@ class Machine(Runner):
     def _run_call(self, statement: Call) -> None:
         """Run a function on views."""
         function = self.functions[statement.function]
-        names, memory = {}, {}
+        names: dict[str, Any] = {}
+        memory: dict[str, Any] = {}
         for (array, kind), view, step in zip(function.takes, statement.views, STEPS, strict=False):
             names[step] = self.value(view.step)
             whole = self.memory[view.array]
@@ -335,8 +336,9 @@ class Machine(Runner):
         given = [literal(each, kind) if type(each) is int else each for each in args]
         if len(given) == 1:
             (number,) = given
-            known = what == "negative" and number.literal is not None
-            return literal(-number.literal, number.kind) if known else expression(what, number)
+            if what == "negative" and number.literal is not None:
+                return literal(-number.literal, number.kind)
+            return expression(what, number)
         return self._of_two(what, *given)
 
     def _of_two(self, what: str, a: Number, b: Number) -> Number:

@@ -33,7 +33,7 @@ THIS = "tests/meta/test_words.py"
 """The list of words contains them."""
 
 KEPT = {
-    "compiler/languages/c.py": ("unless it is told -ffp",),  # a comment of kernels
+    "compiler/kernel/instructions.py": ("unless it is told -ffp",),  # a comment of kernels
     "refimpl/network/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
     "spec/conformance/kinds/files.py": (  # notes of vectors
         "a header that is no JSON",

@@ -401,29 +401,13 @@ def answer(language: str, name: str, names: Sequence[str], given: argparse.Names
 def by_torch(name: str, given: argparse.Namespace) -> None:
     """Time the network as convolutions of PyTorch: the baseline on the same device, with the same images."""
     import torch
+    from peers import peer_torch
 
     if not torch.cuda.is_available():
         raise ExecutorUnavailable("torch.cuda finds no device")
     model, _ = network(name)
     images, odd = images_for(name, (given.size, given.size)), images_for(name, ODD)
-    size, network_ = model.window.size, model.siren
-    first, *others = (torch.from_numpy(w.astype(np.float32)).cuda() for w in network_.weights)
-    kernels = [first.reshape(len(first), size, size, -1).permute(0, 3, 1, 2)]
-    kernels += [weight[:, :, None, None] for weight in others]
-    kernels = [kernel.to(memory_format=torch.channels_last) for kernel in kernels]
-    biases = [torch.from_numpy(bias.astype(np.float32)).cuda() for bias in network_.biases]
-    omegas = (network_.omega_0_first, *[network_.omega_0_hidden] * len(others))
-    margins = (model.window.before, model.window.after) * 2
-    mode = {"clamp": "replicate", "zero": "constant"}[model.window.border]
-    activate = {"sine": torch.sin, "relu": torch.relu}[network_.activation]
-
-    def forward(x: Any) -> Any:
-        x = torch.nn.functional.pad(x, margins, mode=mode)
-        for number, (kernel, bias) in enumerate(zip(kernels, biases, strict=True)):
-            x = torch.nn.functional.conv2d(x, kernel, bias)
-            if number < len(others):
-                x = activate(omegas[number] * x)
-        return x.clamp(0.0, 1.0)
+    forward = peer_torch.network(model, "cuda")
 
     def on_device(given_images: Mapping[str, Picture]) -> Any:
         joined = np.concatenate(list(given_images.values()), axis=-1)

@@ -62,24 +62,27 @@ def _spectra(model: Model) -> Callable[[Any], Any]:
     return products
 
 
-def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
-    """Return the network, compiled or not; with `spectra` its first layer is computed by them."""
+def network(model: Model, device: str = "cpu", spectra: bool = False) -> Callable[[Any], Any]:
+    """Return the network as a function of the images side by side (1, C, H, W), in channels-last order.
+
+    With `spectra` the first layer is computed by them.
+    """
     import torch
 
     size = model.window.size
-    first, *others = (torch.from_numpy(weight.astype(np.float32)) for weight in model.siren.weights)
+    first, *others = (torch.from_numpy(w.astype(np.float32)).to(device) for w in model.siren.weights)
     kernels = [first.reshape(len(first), size, size, -1).permute(0, 3, 1, 2).contiguous()]
     kernels += [weight[:, :, None, None] for weight in others]
     kernels = [kernel.to(memory_format=torch.channels_last) for kernel in kernels]
-    biases = [torch.from_numpy(bias.astype(np.float32)) for bias in model.siren.biases]
+    biases = [torch.from_numpy(bias.astype(np.float32)).to(device) for bias in model.siren.biases]
     omegas = (model.siren.omega_0_first, *[model.siren.omega_0_hidden] * len(others))
     activate = activation_in("PyTorch", {SINE: torch.sin, RELU: torch.relu}, model)
     margins, mode = (model.window.before, model.window.after) * 2, MODES[model.window.border]
     # The compiler makes no code of complex numbers: they are computed eagerly, by FFTs of a library.
     products = torch.compiler.disable(_spectra(model)) if spectra else None
 
-    def network(images: Sequence[Any]) -> Any:
-        x = torch.nn.functional.pad(torch.cat(images, dim=1), margins, mode=mode)
+    def computed(x: Any) -> Any:
+        x = torch.nn.functional.pad(x, margins, mode=mode)
         for number, (kernel, bias) in enumerate(zip(kernels, biases, strict=True)):
             if products and number == 0:
                 x = products(x) + bias[:, None, None]
@@ -89,7 +92,19 @@ def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
                 x = activate(omegas[number] * x)
         return x.clamp(0.0, 1.0)
 
-    function = torch.compile(network) if compiled else network
+    return computed
+
+
+def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
+    """Return the network, compiled or not; with `spectra` its first layer is computed by them."""
+    import torch
+
+    computed = network(model, spectra=spectra)
+
+    def of_images(images: Sequence[Any]) -> Any:
+        return computed(torch.cat(images, dim=1))
+
+    function = torch.compile(of_images) if compiled else of_images
 
     def run(given: Given) -> NDArray[np.float32]:
         with torch.inference_mode():

@@ -44,7 +44,7 @@ TILES = (
 """Targets, schedules and variants of small kernels, in addition to the plain ones."""
 
 ROOM = re.compile(
-    r" *(?:PRECISE )?(?:float|vector|union|var|wamnet_vector|uchar|uint8_t|sums|wamnet_sums)"
+    r" *(?:PRECISE )?(?:float\d*|vector|union|var|wamnet_vector|uchar|uint8_t|sums|wamnet_sums)"
     r"\b[^=]*[\[<][^=]*;"
 )
 """A line that declares an array without a value."""
@@ -325,7 +325,13 @@ def numbers(text: str) -> Iterator[tuple[str, str]]:
 def spare(source: str, fault: Fault) -> bool:
     """Return whether a fault gives an array more room, which changes nothing."""
     line = source[source.rfind("\n", 0, fault.start) + 1 : source.find("\n", fault.start)]
-    return ROOM.match(line) is not None and fault.kind in ("an integer one more", "another operator")
+    before = line[: fault.start - source.rfind("\n", 0, fault.start) - 1]
+    size = (
+        fault.kind == "a foreign word" and fault.new.endswith("+ ") and before.rfind("[") > before.rfind("]")
+    )
+    return ROOM.match(line) is not None and (
+        size or fault.kind in ("an integer one more", "another operator")
+    )
 
 
 def small(folder: Path) -> Iterator[Path]:

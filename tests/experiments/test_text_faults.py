@@ -25,13 +25,16 @@ def test_faults_are_kept_apart(tmp_path, capsys):
     assert {f.kind for f in found} >= {"an integer one more", "another operator", "a statement lost"}
     (room,) = (f for f in found if f.kind == "an integer one more" and f.new == "5")
     assert text_faults.spare(source, room)
+    larger = text_faults.Fault(source.index("4"), source.index("4"), "1 + ", "a foreign word")
+    shared = text_faults.Fault(source.index("float"), source.index("float"), "1 + ", "a foreign word")
+    assert [text_faults.spare(source, fault) for fault in (larger, shared)] == [True, False]
     (sign,) = (f for f in found if f.new == "-")
     assert not text_faults.spare(source, sign)
 
 
 def test_what_is_accepted_ends_with_status_1(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(text_faults, "TILES", ())
-    monkeypatch.setattr(text_faults, "LANGUAGES", ("opencl",))
+    monkeypatch.setattr(text_faults, "TITLES", ("opencl",))
     assert text_faults.main(["--count", "3"]) == 0
     assert "| opencl | plain |" in capsys.readouterr().out
     monkeypatch.setattr(text_faults, "run_text", lambda *given: {"sums": 1})

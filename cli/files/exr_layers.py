@@ -114,7 +114,7 @@ def select(path: Path, parts: Sequence[Part], chosen: str = "") -> Selection:
     )
     for index, name, pieces in _chosen(parts, views, view, chosen):
         *prefix, component = pieces
-        alias = prefix[-1].lower() if prefix else _part_alias(parts, index, views, chosen, component)
+        alias = prefix[-1].lower() if prefix else _part_alias(parts, index, views, chosen, name)
         groups[alias][index, ".".join(prefix)][component.lower()].append(Plane(index, name, alias))
     if chosen and not groups:
         names = sorted(name for part in parts for name in part.channels)
@@ -161,14 +161,14 @@ def _names(parts: Sequence[Part]) -> list[str]:
     return [part.text("name") for part in parts if not part.deep]
 
 
-def _part_alias(parts: Sequence[Part], index: int, views: Sequence[str], chosen: str, component: str) -> str:
+def _part_alias(parts: Sequence[Part], index: int, views: Sequence[str], chosen: str, channel: str) -> str:
     """Return the alias of a channel without a layer: its part's, or "" for colour and depth."""
     name = parts[index].text("name")
     last = next((piece.lower() for piece in reversed(name.split(".")) if piece not in views), "")
     if any(last in aliases for aliases in ALIASES.values()):
         # Depth may be in the part of the colour; X, Y, Z are a vector.
-        depth = component.lower() == "z" and last in ALIASES["color"]
-        return "" if depth and not {"X", "x"} & parts[index].channels.keys() else last
+        vector = {f"{channel[:-1]}X", f"{channel[:-1]}x"} & parts[index].channels.keys()
+        return "" if channel[-1:] in "Zz" and last in ALIASES["color"] and not vector else last
     return "" if chosen == name or len(_names(parts)) == 1 else OTHER_PART
 
 

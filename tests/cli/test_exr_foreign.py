@@ -54,6 +54,7 @@ def view(name: str) -> bytes:
         ([RawPart(planes(7, names="Z"), name="z"), RawPart(planes(1))], "", {"depth": 7, "color": 1}),
         ([RawPart(planes(1), name="ViewLayer")], "", {"color": 1}),
         ([RawPart(planes(1, "Image."))], "", {"color": 1}),
+        ([RawPart(planes(1) | planes(5, "r.", "XYZ"), view("r"), "rgba")], "", {"color": 1}),
     ],
 )  # fmt: skip
 def test_views_and_parts(tmp_path: Path, parts: list[RawPart], chosen: str, layers: dict[str, int]) -> None:

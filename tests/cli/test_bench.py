@@ -151,7 +151,7 @@ def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> Non
         "bench", "model.safetensors", "--only", "numpy:plain", "--repeats", 1, "--size", 8, "-o", "speed"
     )
     assert outcome.status == 130
-    assert "wamnet: what was measured until then is in speed" in outcome.err
+    assert "wamnet: speed: has the results so far" in outcome.err
     data = json.loads((here / "speed/bench.json").read_text())
     assert data["interrupted"] is True
     assert len(data["contenders"][0]["ms"]["rounds"]) == 1

@@ -167,7 +167,7 @@ def test_layers_of_another_program_are_told_once(tmp_path, monkeypatch) -> None:
     assert said == []
     monkeypatch.setattr("wamnet.cli.files.exr._attribute_notes", lambda *_: ["color is taken from a, b, c"])
     pairs = files.read_pairs(tmp_path, tell=said.append)
-    assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} pictures: color is taken from a, b, c"]
+    assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} images: color is taken from a, b, c"]
 
 
 def test_other_bytes_are_told(tmp_path, whole) -> None:
@@ -290,7 +290,7 @@ def test_a_folder_with_a_picture_s_name_is_refused_before_anything_is_made(tmp_p
     path.mkdir()
     (path / "mine").write_text("kept")
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(InputError, match=r"picture '.*noisy\.exr': is a folder \(move it, or"):
+    with pytest.raises(InputError, match=r"image '.*noisy\.exr': is a folder \(move it, or"):
         make(tmp_path / "a")
     assert sorted(tmp_path.rglob("*")) == before
 

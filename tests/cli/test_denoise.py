@@ -143,7 +143,7 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     outcome = wamnet("compile", "minicubes", "--time", 1.5, *options, "-o", "a")
     *files, why = outcome.out.splitlines()
     assert (outcome.status, " ".join(files).split()) == (0, [f"a/{source}", "a/manifest.json"])
-    assert why.startswith("no certificate: a scene's kernel has none")
+    assert why.startswith("no certificate: path kernels have none")
     programs = lower_scene(canonical("minicubes", time=1.5), Settings(max_depth=2))
     executor = {"opencl": "opencl", "glsl": "opengl"}[target]
     kernel = compile_path(programs, executor, "ieee", 16 if lanes else 1)

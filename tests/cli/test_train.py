@@ -168,7 +168,7 @@ def test_resuming_has_its_own_recipe(wamnet, refused, pair) -> None:
     text = "--preset 'paper': cannot be combined with --resume"
     assert text in refused("train", *pair[:4], "--resume", "--preset", "paper")
     outcome = wamnet("train", *pair[:4], "--resume", "--steps", 3)
-    assert "became one of 3: another model than with 3 from the start" in outcome.out
+    assert "the model differs from one of a 3-step run" in outcome.out
 
 
 def test_no_features_are_refused(refused, pair) -> None:

@@ -31,7 +31,7 @@ def test_tuning_is_kept_shown_and_used(wamnet, executor_named, here) -> None:
     assert "12x12, 96-8-3, color + normal, window 4 (clamp)" in outcome.out
     for word in ("plain", "vector:16", "tile:16", "tile:8", "tile:4", "group:1", "group:4", "s to compile"):
         assert word in outcome.out
-    assert "for 1 picture: " in outcome.out
+    assert "for 1 image: " in outcome.out
     assert "for 1000 images: " in outcome.out
     assert "--force measures again" not in outcome.out
     (entry,) = (here / "mine").iterdir()
@@ -76,4 +76,4 @@ def test_without_a_model_the_network_is_the_paper_s(wamnet, here) -> None:
     outcome = wamnet("tune", "--executor", "numpy", "--size", 4)
     assert outcome.status == 0
     assert "4x4, 864-32-32-32-32-3, color + normal, window 12 (clamp)" in outcome.out
-    assert "for 1 picture: plain; the only one" in outcome.out
+    assert "for 1 image: plain; the only one" in outcome.out

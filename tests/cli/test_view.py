@@ -102,7 +102,7 @@ def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
     outcome = wamnet("view", "model.safetensors")
     found["thread"].join()
     assert outcome.status == 0
-    assert outcome.out == f"{found['address']} (Ctrl-C to stop)\nended\n"
+    assert outcome.out == f"{found['address']} (Ctrl-C to stop)\nstopped\n"
     assert found["address"].startswith("http://127.0.0.1:")
     assert found["page"] == "<!DOCTYPE html>"
 

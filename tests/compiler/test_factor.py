@@ -153,7 +153,7 @@ TWICE = np.linspace(-0.1, 0.1, 48 * 48, dtype=np.float32).reshape(48, 48)
 UNFIT = {
     r"%1 \(affine\), %2 \(add\) reads the window: only a first layer": lambda x: x @ TWICE.T + x,
     r"%1 \(sin\) reads the window: only a first layer": lambda x: np.sin(x) @ TWICE.T,
-    "applied to another layer too": lambda x: np.sin(x @ TWICE.T) @ TWICE.T,
+    "another layer shares": lambda x: np.sin(x @ TWICE.T) @ TWICE.T,
 }
 """What is said of functions that have no first layer."""
 

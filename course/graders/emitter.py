@@ -305,10 +305,9 @@ def _language(language: str) -> Callable[[Any], None]:
 
 def literals(student: Any) -> None:
     """Constants are read back as the same float32, and are floats."""
-    for value in CONSTANTS:
+    for value in map(float, np.float32(CONSTANTS)):
         found = student.literal(value)
         hold("KER-26", "the result of literal", isinstance(found, str), "a string", type(found).__name__)
-        value = float(np.float32(value))
         kernel = kernel_of((Store("result", (Y, X, const(0)), const(value)),))
         likely = "nine digits bring every float32 back: %.9g, or repr(float(np.float32(value)))"
         bare = found.strip("()").lstrip("-")

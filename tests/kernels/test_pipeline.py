@@ -494,7 +494,7 @@ def test_refusals(executor, model_of):
             pipeline.draw(seed=-1)
         pipeline.draw()
     for use in (pipeline.draw, pipeline.picture, lambda: pipeline.image("color")):
-        with pytest.raises(InputError, match=r"pipeline: closed \(make another"):
+        with pytest.raises(InputError, match=r"pipeline: closed \(open a new one"):
             use()
     pipeline.close()
     with pytest.raises(InputError, match="width 0: must be an integer"):

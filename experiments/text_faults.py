@@ -223,6 +223,16 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
         ("opencl", "cl_khr_fp64"), ("opencl", "vec_step"), ("opencl", "cles_khr_int64"), ("opengl", "packed"),
         ("opengl", "row_major"), ("opengl", "GL_core_profile"), ("glsl-vulkan", "samplerShadow"),
         ("glsl-vulkan", "isubpassInput"))),
+    *((f"a constant that is {what}", C_LIKE, CENTRE, CENTRE.replace("1", text)) for what, text in (
+        ("two in parentheses", "(2) - (1)"), ("a negative quotient", "((0 - 1) / 2 + 2)"),
+        ("a negative remainder", "((0 - 1) % 3 - 1)"),
+        ("beyond 32 bits on the way", "(65536 * 65536 / 65536 - 65535)"))),
+    ("a comment to the end of a line in a product", C_LIKE, TAP, f"{TAP}12 //**/ 2\n - 6 + "),
+    ("a comment that a joined line ends", C_LIKE, TAP, f"/* x *\\\n/ int n = 0; /* */ {TAP}"),
+    ("a loop that moves its end", C_LIKE, TAP, f"int k = 3; for (int i = 0; i < k; ++i) {{ k = 1; }} {TAP}"),
+    ("a loop that nothing unrolls", C_LIKE, TAP, f"WAMNET_UNROLL\nfor (int i = 0; i < 3; ++i) {{ }} {TAP}"),
+    ("an end of another name", ("c",), "#undef restrict", "#undef NULL\n#undef restrict"),
+    ("blocks deep in each other", (*C_LIKE, "wgsl"), "/* output color */", f"{'{' * 150}{'}' * 150}"),
     ("a second pragma of fused products", ("c",), CENTRE, f"""#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=fast")

@@ -38,7 +38,7 @@ OPEN: Mapping[str, str] = {
     "constants": r"(?P<constants>(?:#define [A-Z_]+ [^\n]*\n)*)",
     "wgsl_constants": r"(?P<constants>(?:const [A-Z_]+: i32 = [^\n]*;\n)*)",
     "functions": r"(?P<functions>(?:[^\n]*\n)*?)",
-    "undefined": r"(?:#undef [A-Z_]+\n)*",
+    "undefined": r"(?P<undefined>(?:#undef [A-Z_]+\n)*)",
     "images": r"(?P=images)",
     "given": r"(?P<given>(?:image_\w+, )+)",
     "first": r"(?P<first>image_\w+)", "same_first": r"(?P=first)",

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -42,10 +43,11 @@ from ..kernel.kernel import (
     load,
     name,
 )
+from ..kernel.kernel import parts as inner_parts
 from ..kernel.verify import KernelError, verify
 from .canonical import canonical
 from .expressions import Expressions, rounds
-from .frames import FRAMES, frame, lines_of, parts_of
+from .frames import COMMENT, FRAMES, frame, lines_of, parts_of
 from .grammar import CALLS, CONSTANT, FUNCTION, LANGUAGES, PRODUCTS
 from .reader import Scope
 from .reader import Unread as Unread
@@ -57,6 +59,19 @@ PATCH = "patch_"
 
 LAYER = re.compile(r"v\d+")
 """Arrays of values that a layer has made: what goes into them has been rounded before."""
+
+
+STRANGE = re.compile(r"//|\\(?!\n *[^\s/])")
+"""A comment up to the end of a line, and a backslash that no line follows."""
+
+DEEPEST = 60
+"""Most blocks in each other: WGSL's compilers take 127."""
+
+WORD = re.compile(r"\b(?:wamnet_\w+|DOT|FLOOR|CONVERT|WAMNET_\w+)\b")
+"""What the frame of a source defines, where its statements use it."""
+
+NESTED = re.compile(r"(?<=.)/\*|\\", re.S)
+"""What makes another comment of a comment."""
 
 
 def parse(
@@ -71,6 +86,8 @@ def parse(
         raise Unread("a character beyond printable ASCII, or a trigraph")
     if language == "glsl-es" and not source.startswith("#version"):
         raise Unread("a source that does not begin with its version")
+    if found := STRANGE.search(source) or next(filter(NESTED.search, COMMENT.findall(source)), None):
+        raise Unread(f"{found if isinstance(found, str) else found[0]!r}, which languages read differently")
     lines = lines_of(source)
     if lines.count("weight_texture") == 1:
         raise Unread("a texture of weights that is declared and not read, or read and not declared")
@@ -80,6 +97,15 @@ def parse(
         raise Unread(f"what surrounds the statements is not a frame of {language}")
     if bounded and "@bounded@" in FRAMES[language] and "bounded" not in parts:
         raise Unread("a source that does not refuse compilers which void its bound")
+    own = parts.get("functions", "") + (parts.get("body") or "")
+    if undefined := set(WORD.findall(own)) - made(own, lines, parts):
+        raise Unread(f"{undefined.pop()}, which nothing defines")
+    if (
+        re.search(r"(?m)^.+#pragma|#pragma (?!unroll$)", own)
+        or (language != "opencl" and "#pragma" in own)
+        or (language != "opengl" and "imageStore" in own)
+    ):
+        raise Unread(f"a word that {language} does not have")
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
     parser.bounded = bounded
     try:
@@ -88,6 +114,15 @@ def parse(
     except (KernelError, RecursionError) as error:
         raise Unread(str(error)) from error
     return kernel
+
+
+def made(own: str, lines: str, parts: Mapping[str, str]) -> set[str]:
+    """Return the words of a frame that a source has, apart from its functions and statements `own`."""
+    around = lines
+    for each in ("functions", "body"):
+        around = around.replace(parts.get(each) or "\0", "")
+    functions = set(re.findall(r"\b(wamnet_\w+)\([^;{}]*\)\s*\{", own))
+    return set(WORD.findall(around)) | functions
 
 
 class Parser(Expressions):
@@ -101,6 +136,8 @@ class Parser(Expressions):
         images = self._images(parts["images"])
         constants = tuple(map(self._constant, parts.get("constants", "").splitlines()))
         known = {each.name: each.value for each in constants}
+        if set(re.findall(r"#undef (\w+)", parts.get("undefined", ""))) - {*known}:
+            raise Unread("an #undef of what is not a constant of this source")
         self._vectors(known.get("LANES"))
         self._read(parts.get("functions", ""))
         while self._now():
@@ -182,6 +219,9 @@ class Parser(Expressions):
         if kind:
             self._take("return")
             result = self._of(self._expression(), kind, key)
+            rounded = {each.op for each in inner_parts(result)} & {"add", "subtract", "multiply", "divide"}
+            if self.bounded and self.language.qualifier and rounded and kind.dtype == "float32":
+                raise Unread(f"a result of {key} that is not {self.language.qualifier}")
             self._take(";")
         self._take("}")
         self.scope = outer
@@ -226,7 +266,11 @@ class Parser(Expressions):
         key = match and (match[1] or match[3])
         if match is None or not CONSTANT.fullmatch(str(key)) or key in self.scope.values:
             raise Unread(f"{line!r} is not a constant, or its second value")
-        self._read(match[2] or match[4])
+        text = match[2] or match[4]
+        depths = list(accumulate((c == "(") - (c == ")") for c in text))
+        if text[0] == "(" and 0 in depths[:-1]:
+            raise Unread(f"{text}, which is not in parentheses")
+        self._read(text)
         value = self._expression()
         self._end()
         self.scope.values[str(key)] = INT
@@ -238,12 +282,16 @@ class Parser(Expressions):
         """Read statements up to a brace, or to the end; their names end there."""
         outer = self.scope
         self.scope = Scope(dict(outer.values), dict(outer.arrays))
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise Unread(f"more than {DEEPEST} blocks in each other")
         statements: list[Statement] = []
         while self._now() != end:
             statements.append(self._statement())
         if end:
             self._take(end)
         self.scope = outer
+        self.depth -= 1
         return tuple(statements)
 
     def _statement(self) -> Statement:

@@ -40,7 +40,7 @@ class Reader:
         self.by_calls = self.in_floats = self.bounded = False
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []
-        self.at, self.operator = 0, ""
+        self.at, self.depth, self.operator = 0, 0, ""
 
     def _read(self, text: str) -> None:
         """Begin to read the tokens of a text."""

@@ -30,6 +30,7 @@ from ..kernel.kernel import (
     const,
     name,
     parts,
+    walk,
 )
 from ..kernel.run import Runner
 from ..kernel.sizes import integer
@@ -99,6 +100,7 @@ class Machine(Runner):
         self.size: dict[int, int] = {}
         self.turns = 1
         self.loops: dict[int, tuple[str, ...]] = {}
+        self.fixed: dict[int, bool] = {}
         x, width, y, height = (lanes.place(axis) for axis in range(4))
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
         if group and lanes.inside is not None and kernel.group:
@@ -194,6 +196,10 @@ class Machine(Runner):
             self.body(statement.body)
             self.turns = 1
             return
+        if id(statement) not in self.fixed:
+            self.fixed[id(statement)] = not changes_its_end(statement)
+        if not self.fixed[id(statement)]:
+            raise Unread(f"a loop over {statement.name} that changes its own end")
         outer = self.mask
         for _ in range(MOST_TURNS):
             self.names[statement.name] = turn
@@ -505,6 +511,18 @@ class Machine(Runner):
 
 MIXING = ("call", "component", "stack", "take", "pack4", "dot4", "bits", "clamp")
 """Operations that are not of each number of a vector by itself."""
+
+
+def changes_its_end(loop: For) -> bool:
+    """Return whether a loop's body names or writes what its count or its step reads in every turn."""
+    read = {
+        part.value for end in (loop.count, loop.step) for part in parts(end) if part.op in ("name", "load")
+    }
+    written: set[Any] = {loop.name}
+    for statement in walk(loop.body):
+        written.add(getattr(statement, "name", getattr(statement, "array", None)))
+        written |= {view.array for view in getattr(statement, "views", ())}
+    return bool(read & written)
 
 
 def elementwise(loop: For) -> tuple[str, ...]:

@@ -185,7 +185,9 @@ def test_unknown_group_of_planes():
 
 def test_more_planes_than_a_fragment_writes():
     """PTK-8."""
-    with pytest.raises(CompileError, match=r"adds up \d+ planes: GLSL 3.30, .* writes at most 32; request fewer"):
+    with pytest.raises(
+        CompileError, match=r"adds up \d+ planes: GLSL 3.30, .* writes at most 32; request fewer"
+    ):
         kernel(target="opengl", lanes=1, groups=ALL_GROUPS)
     assert len(kernel(lanes=1, groups=ALL_GROUPS).planes) > 32
 

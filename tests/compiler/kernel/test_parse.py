@@ -165,6 +165,9 @@ def test_statements(target):
     kernel = STATEMENTS
     if target == "opengl":  # textures have no positions of rows
         kernel = replace(kernel, body=tuple(s for s in kernel.body if getattr(s, "name", "") != "row"))
+    if target == "c":  # WAMNET_UNROLL is defined beside vectors
+        loops = (replace(s, how="loop") if isinstance(s, For) else s for s in kernel.body)
+        kernel = replace(kernel, body=tuple(loops))
     assert read(rendered(kernel, target, np.zeros(4, np.float32)), target, kernel) == canonical(kernel)
 
 
@@ -276,9 +279,10 @@ REFUSED = {
     "a macro that replaces a name": ("#define PIXELS 3", "#define v1 3", "begins with no token"),
     "a macro without parentheses": ("#define PIXELS 3", "#define PIXELS 1 + 2", "is not a constant"),
     "a constant twice": ("#define PIXELS 3", "#define PIXELS 3\n#define PIXELS 3", "its second value"),
+    "a macro of two in parentheses": ("#define PIXELS 3", "#define PIXELS (1) + (2)", "not in parentheses"),
     "an octal number": ("j < 2;", "j < 02;", "begins with no token"),
-    "a comment of C++": ("float v1[2];", "float v1[2]; // all", "/ is not declared"),
-    "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "begins with no token"),
+    "a comment of C++": ("float v1[2];", "float v1[2]; // all", "which languages read differently"),
+    "a line that goes on": ("float v1[2];", "float v1[2]; \\\n", "which languages read differently"),
     "another letter": (
         "float v1[2];",
         "float v1[2]; /* \N{GREEK SMALL LETTER ALPHA} */",
@@ -301,7 +305,7 @@ REFUSED = {
     "an integer that is too large": (
         "float v1[2];",
         "float v1[2]; int q = 4294967297;",
-        "4294967297 is not a constant of type int32",
+        "4294967297, which int32 does not hold",
     ),
     "a sum of kinds": ("part1[j] = 0.0f", "part1[j] = 0.0f + j", "part1 of type .* has a value of type"),
     "an assignment to a value": ("v1[j] += part1[j];", "v1[j] += part1[j]; j = 0;", "j is not an array"),

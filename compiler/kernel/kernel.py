@@ -260,27 +260,19 @@ LOGICAL = ("logical_and", "logical_or", "logical_not")
 """Operations on truth."""
 
 
-def has_quotient(a: int, b: int) -> bool:
-    """Return whether a / b is the same in every language: rounded down is rounded to 0."""
-    return a >= 0 and b > 0
-
-
-def refuse(what: str) -> int:
-    """Refuse arithmetic that languages do differently."""
-    raise ArithmeticError(what)
-
-
-def fits(value: int) -> bool:
-    """Return whether int32 holds an integer."""
-    return -(2**31) <= value < 2**31
+def _quotient(a: int, b: int) -> tuple[int, int]:
+    """Return quotient and remainder where rounding down is rounding to 0, as it is in every language."""
+    if a < 0 or b <= 0:
+        raise ArithmeticError(f"{a} / {b}: of a negative integer, or by 0")
+    return divmod(a, b)
 
 
 INTEGERS: Mapping[str, Callable[[int, int], int]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": lambda a, b: a * b,
-    "divide": lambda a, b: a // b if has_quotient(a, b) else refuse(f"{a} / {b}"),
-    "remainder": lambda a, b: a % b if has_quotient(a, b) else refuse(f"{a} % {b}"),
+    "divide": lambda a, b: _quotient(a, b)[0],
+    "remainder": lambda a, b: _quotient(a, b)[1],
     "minimum": min,
     "maximum": max,
 }
@@ -342,10 +334,10 @@ def _folded(what: str, a: Expr, b: Expr) -> Expr | None:
     """Return what is known of an operation on integers, if anything is."""
     one, other = (each.value if each.op == "const" else None for each in (a, b))
     if one is not None and other is not None and what in INTEGERS:
-        if what in ("divide", "remainder") and not has_quotient(one, other):
+        if what in ("divide", "remainder") and (one < 0 or other <= 0):
             return None
         found = INTEGERS[what](one, other)
-        return const(found) if fits(found) else None
+        return const(found) if -(2**31) <= found < 2**31 else None
     if (what == "add" and one == 0) or (what == "multiply" and one == 1):
         return b
     if (what in ("add", "subtract") and other == 0) or (what in ("multiply", "divide") and other == 1):

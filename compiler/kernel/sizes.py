@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .kernel import INTEGERS, Array, Expr, Kernel, fits, refuse, walk
+from .kernel import INTEGERS, Array, Expr, Kernel, walk
 
 BYTES = {"float32": 4, "int32": 4, "uint32": 4, "bool": 4, "uint8": 1, "int8": 1}
 """Bytes of a value of each kind."""
@@ -17,7 +17,9 @@ def integer(kernel: Kernel, value: Expr | int) -> int:
     if value.op == "name":
         return integer(kernel, next(each.value for each in kernel.constants if each.name == value.value))
     found = INTEGERS[value.op](*(integer(kernel, each) for each in value.args))
-    return found if fits(found) else refuse(f"{found}, which int32 does not hold")
+    if not -(2**31) <= found < 2**31:
+        raise ArithmeticError(f"{found}, which int32 does not hold")
+    return found
 
 
 def bytes_of(kernel: Kernel, array: Array) -> int:

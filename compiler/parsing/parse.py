@@ -98,7 +98,7 @@ def parse(
     if bounded and "@bounded@" in FRAMES[language] and "bounded" not in parts:
         raise Unread("a source that does not refuse compilers which void its bound")
     own = parts.get("functions", "") + (parts.get("body") or "")
-    if undefined := set(WORD.findall(own)) - made(own, lines, parts):
+    if undefined := set(WORD.findall(own)) - _made(own, lines, parts):
         raise Unread(f"{undefined.pop()}, which nothing defines")
     if (
         re.search(r"(?m)^.+#pragma|#pragma (?!unroll$)", own)
@@ -116,7 +116,7 @@ def parse(
     return kernel
 
 
-def made(own: str, lines: str, parts: Mapping[str, str]) -> set[str]:
+def _made(own: str, lines: str, parts: Mapping[str, str]) -> set[str]:
     """Return the words of a frame that a source has, apart from its functions and statements `own`."""
     around = lines
     for each in ("functions", "body"):

@@ -160,9 +160,10 @@ def mixed(words: Words) -> Words:
 
 
 MOST = 2**64 - 1
+"""The largest word."""
 
 
-def mixed_one(word: int) -> int:
+def _mixed_one(word: int) -> int:
     """Return the same of one word: numbers of all lanes folded into one take half of a check's time."""
     word ^= word >> 30
     word = word * 0xBF58476D1CE4E5B9 & MOST
@@ -272,8 +273,8 @@ def expression(name: str, *operands: Number, commutes: bool = False, kind: str |
     if max([part.size for part in parts]) == 1:
         one, *others = [part.item() for part in parts]
         for other in others:
-            one = (one if commutes else mixed_one(one + whole[0] & MOST)) + other & MOST
-        words = np.array([mixed_one(one ^ whole[1])], dtype=np.uint64)
+            one = (one if commutes else _mixed_one(one + whole[0] & MOST)) + other & MOST
+        words = np.array([_mixed_one(one ^ whole[1])], dtype=np.uint64)
         return leaf(words if parts[0].ndim == 1 else words[:, None], kind or operands[-1].kind)
     found = sum(parts[1:], parts[0]) if commutes else parts[0]
     for part in [] if commutes else parts[1:]:

@@ -197,7 +197,7 @@ class Machine(Runner):
             self.turns = 1
             return
         if id(statement) not in self.fixed:
-            self.fixed[id(statement)] = not changes_its_end(statement)
+            self.fixed[id(statement)] = not _changes_its_end(statement)
         if not self.fixed[id(statement)]:
             raise Unread(f"a loop over {statement.name} that changes its own end")
         outer = self.mask
@@ -513,7 +513,7 @@ MIXING = ("call", "component", "stack", "take", "pack4", "dot4", "bits", "clamp"
 """Operations that are not of each number of a vector by itself."""
 
 
-def changes_its_end(loop: For) -> bool:
+def _changes_its_end(loop: For) -> bool:
     """Return whether a loop's body names or writes what its count or its step reads in every turn."""
     read = {
         part.value for end in (loop.count, loop.step) for part in parts(end) if part.op in ("name", "load")

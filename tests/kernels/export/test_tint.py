@@ -81,7 +81,7 @@ def test_a_missing_package_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(tint_runner, "_environment", lambda: {"HOME": str(tmp_path)})
     monkeypatch.chdir(tmp_path)
     with pytest.raises(
-        ExecutorUnavailable, match=r"no device of vulkan .*webgpu.*npm install --global webgpu"
+        ExecutorUnavailable, match=r"no vulkan device .*webgpu.*npm install --global webgpu"
     ):
         TintRunner()
 

@@ -169,7 +169,7 @@ def test_programs_are_built_where_they_run(tmp_path, monkeypatch) -> None:
     with folders.temporary("test", programs=True) as folder:
         assert folder.parent != tmp_path
     monkeypatch.setattr(folders, "runs_programs", lambda path: False)
-    with pytest.raises(ExecutorUnavailable, match=r"TMPDIR is .*noexec.*set it to a folder of another"):
+    with pytest.raises(ExecutorUnavailable, match=r"TMPDIR is .*noexec.*set it to a folder on another"):
         folders.new_temporary("test", programs=True)
 
 

@@ -217,6 +217,6 @@ def test_schlick_by_hand():
 @pytest.mark.parametrize("roughness", [0.0, 9e-4, 1.1, float("nan")])
 def test_refuses_a_roughness(roughness):
     with pytest.raises(
-        InputError, match=r"a.roughness .*: a roughness must lie in \[0.001, 1\] \(for less, use"
+        InputError, match=r"a.roughness .*: a roughness must lie in \[0.001, 1\] \(for smoother ones, use"
     ):
         Conductor(roughness).check("a")

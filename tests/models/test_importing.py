@@ -216,7 +216,9 @@ def test_operators(case, tmp_path):
 
 def test_without_margins_a_border_is_chosen(tmp_path):
     path = graph(tmp_path / "graph.onnx", [("Conv", "xw", "y")], {"w": W[:3]})
-    with pytest.raises(InputError, match=r"sizes of output and input image '-2 rows and -2 columns': .* --border"):
+    with pytest.raises(
+        InputError, match=r"sizes of output and input image '-2 rows and -2 columns': .* --border"
+    ):
         import_network(path, {})
     found = import_network(path, {}, "clamp")
     image = np.random.default_rng(7).uniform(0.0, 1.0, (7, 6, 2))

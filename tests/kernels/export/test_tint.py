@@ -80,9 +80,7 @@ def test_a_missing_package_is_told(monkeypatch, tmp_path):
         pytest.skip("no node; in Debian: apt-get install nodejs npm")
     monkeypatch.setattr(tint_runner, "_environment", lambda: {"HOME": str(tmp_path)})
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(
-        ExecutorUnavailable, match=r"no vulkan device .*webgpu.*npm install --global webgpu"
-    ):
+    with pytest.raises(ExecutorUnavailable, match=r"no vulkan device .*webgpu.*npm install --global webgpu"):
         TintRunner()
 
 

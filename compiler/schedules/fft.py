@@ -60,7 +60,7 @@ PARTS = 2
 POINTS, OUT, TILES, PAIRS, INPUTS, NEURONS, STRIDE = map(
     name, ("POINTS", "OUT", "TILES", "PAIRS", "INPUTS", "NEURONS", "STRIDE")
 )
-OF_BLOCK = name("BLOCK")
+OF_BLOCK, PIXEL_BLOCK = name("BLOCK"), name("b")
 """Pairs of channels whose products are added up by themselves."""
 
 TILE, TILE_X, TILE_Y, K, F, G, Q, T, APART, LINE = map(
@@ -416,13 +416,13 @@ class Spectral(Tiled):
         source = View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
         rows = loop("tile", TILES * NEURONS, self.transform("backward", source, View("sums", (at,), NEURONS)))
         lines: list[Statement] = [
-            Let("x", TILE_X + BLOCK * PIXELS),
+            Let("x", TILE_X + PIXEL_BLOCK * PIXELS),
             Let("last", apply("minimum", TILE_X + TILES * OUT, WIDTH)),
         ]
         for group in self.groups:
             lines += self.of_group(group)
         lines += self.outputs()
-        body = (rows, Let("y", TILE_Y + LINE), loop("block", blocks, *lines))
+        body = (rows, Let("y", TILE_Y + LINE), loop("b", blocks, *lines))
         return [*found, For("line", OUT, body, until=TILE_Y + LINE < HEIGHT)]
 
     def affine(self, index: int, node: Node) -> list[Statement]:
@@ -432,7 +432,7 @@ class Spectral(Tiled):
         bias, total = node.get("bias"), self.total(index)
         lines = []
         for j in range(total):
-            value = load("sums", (BLOCK * PIXELS + P) * NEURONS * 2 + j, kind=self.vector)
+            value = load("sums", (PIXEL_BLOCK * PIXELS + P) * NEURONS * 2 + j, kind=self.vector)
             if bias:
                 value = apply("add", value, weight(self.offset(bias) // self.lanes + j, self.vector))
             lines.append(Store(f"v{index}", (P * total + j,), value))

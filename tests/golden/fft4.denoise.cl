@@ -230,15 +230,15 @@ __kernel void wamnet_denoise(
             backward(back + (tile * OUT + line) * STRIDE, 1, sums + (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2, NEURONS);
         }
         int y = tile_y + line;
-        for (int block = 0; block < 2; ++block) {
-            int x = tile_x + block * PIXELS;
+        for (int b = 0; b < 2; ++b) {
+            int x = tile_x + b * PIXELS;
             int last = min(tile_x + TILES * OUT, width);
 
             /* %1: the sums, and their bias */
             float4 v1[PIXELS * 2];
             for (int p = 0; p < PIXELS; ++p) {
-                v1[p * 2] = sums[(block * PIXELS + p) * NEURONS * 2];
-                v1[p * 2 + 1] = sums[(block * PIXELS + p) * NEURONS * 2 + 1];
+                v1[p * 2] = sums[(b * PIXELS + p) * NEURONS * 2];
+                v1[p * 2 + 1] = sums[(b * PIXELS + p) * NEURONS * 2 + 1];
             }
 
             /* %2: elementwise on 5 numbers */

@@ -310,15 +310,15 @@ static inline void wamnet_pixel(
             wamnet_backward(back + (tile * OUT + line) * STRIDE, 1, sums + (tile / NEURONS * OUT * NEURONS + tile % NEURONS) * 2, NEURONS);
         }
         int y = tile_y + line;
-        for (int block = 0; block < 2; ++block) {
-            int x = tile_x + block * PIXELS;
+        for (int b = 0; b < 2; ++b) {
+            int x = tile_x + b * PIXELS;
             int last = width < tile_x + TILES * OUT ? width : tile_x + TILES * OUT;
 
             /* %1: the sums, and their bias */
             float v1[PIXELS * 2 * LANES];
             for (int p = 0; p < PIXELS; ++p) {
-                *(wamnet_vector *)(v1 + (p * 2) * LANES) = sums[(block * PIXELS + p) * NEURONS * 2];
-                *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = sums[(block * PIXELS + p) * NEURONS * 2 + 1];
+                *(wamnet_vector *)(v1 + (p * 2) * LANES) = sums[(b * PIXELS + p) * NEURONS * 2];
+                *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = sums[(b * PIXELS + p) * NEURONS * 2 + 1];
             }
 
             /* %2: elementwise on 5 numbers */

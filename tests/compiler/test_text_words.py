@@ -76,7 +76,7 @@ def test_faults_of_bytes_are_named(dot16, old, new, why):
 def test_faults_of_words_are_noticed(grouped, old, new):
     """A word has each byte at its own place, and nothing of another's sign."""
     pair = [t.replace("uint", "unsigned int") if "__dp4a" in grouped[0] else t for t in (old, new)]
-    with pytest.raises((Refused, Unread), match="begins with no token|which nothing defines"):
+    with pytest.raises((Refused, Unread), match=r"begins with no token|which nothing defines"):
         run_text(*changed(grouped, *pair))
 
 

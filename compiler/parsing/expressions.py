@@ -99,10 +99,10 @@ class Expressions(Reader):
             self._take()
             if kind == "float":
                 return self._float(text[:-1])
-            whole, kind = int(text.removesuffix("u")), Type("uint32") if text.endswith("u") else INT
-            if whole >= 2 ** (32 if kind != INT else 31):
-                raise Unread(f"{text}, which {kind.dtype} does not hold")
-            return const(whole, kind)
+            whole, of = int(text.removesuffix("u")), Type("uint32") if text.endswith("u") else INT
+            if whole >= 2 ** (32 if of != INT else 31):
+                raise Unread(f"{text}, which {of.dtype} does not hold")
+            return const(whole, of)
         if self.language.number and self._has("(", "(", *self.language.number):
             self._take(")")
             array = self._word()

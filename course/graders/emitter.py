@@ -305,7 +305,7 @@ def _language(language: str) -> Callable[[Any], None]:
 
 def literals(student: Any) -> None:
     """Constants are read back as the same float32, and are floats."""
-    for value in map(float, np.float32(CONSTANTS)):
+    for value in np.array(CONSTANTS, np.float32).tolist():
         found = student.literal(value)
         hold("KER-26", "the result of literal", isinstance(found, str), "a string", type(found).__name__)
         kernel = kernel_of((Store("result", (Y, X, const(0)), const(value)),))

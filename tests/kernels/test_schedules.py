@@ -187,7 +187,7 @@ FOURIER_FAULTS = {
     "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
     "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
     "mirror": ("columns[apart]", "columns[0]"),
-    "block": ("int x = tile_x + block * PIXELS;", "int x = tile_x + (block ^ 1) * PIXELS;"),
+    "block": ("int x = tile_x + b * PIXELS;", "int x = tile_x + (b ^ 1) * PIXELS;"),
     "weights": {
         "opencl": (" * 8 + 3];", " * 8 + 2];"),
         "c": (" * 8 + 3) * LANES", " * 8 + 2) * LANES"),
@@ -323,7 +323,7 @@ def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
     executor._built.clear()
     with pytest.raises(
         CompileError,
-        match=r"has OpenGL 4\.5: schedule group:1 is a compute shader, which needs OpenGL 4\.6 has; use",
+        match=r"has OpenGL 4\.5: schedule group:1 is a compute shader, which needs OpenGL 4\.6; use",
     ):
         executor.build(artifact)
 

@@ -184,7 +184,7 @@ def bench(
     All programs are interleaved, so that drift of the machine affects them alike.
 
     The bundled mini-cubes model is measured on unseen frames of its scene; another model on its training
-    scene or a data set. Installed baselines take part: PyTorch, ONNX Runtime, OpenVINO, Halide,
+    scene or a data set. Installed baselines are included: PyTorch, ONNX Runtime, OpenVINO, Halide,
     tinygrad, and Open Image Denoise: [bold]pip install torch onnxruntime openvino halide tinygrad
     pyoidn[/]. Errors are measured against float64, PSNR against the references. Predicted times follow from
     measured rates.

@@ -73,15 +73,14 @@ def compare(
 ) -> None:
     """Compare an image with its reference, or a kernel's paths with the reference path tracer's.
 
-    MSE, PSNR and SSIM compare what is seen (sRGB-encoded, clipped to white); relMSE and SMAPE compare
+    MSE, PSNR and SSIM compare displayed colours (sRGB-encoded, clipped to white); relMSE and SMAPE compare
     linear radiance.
 
     With --paths every step of every path has a rounding-error bound; a larger difference is
     [bold]unexplained[/]. A step whose decision is within the bound of its threshold is
-    [bold]undecided[/], and [bold]different[/] if it went the other way than the reference. Of the
-    reference's paths, [bold]parted[/] have diverged so far; the vertices of the others have
-    [bold]moved[/]. Welch's test compares the images. The exit status is 1 if a difference is unexplained or
-    the test fails.
+    [bold]undecided[/], and [bold]different[/] if the reference decides otherwise. [bold]parted[/] counts
+    paths that left the reference's; [bold]moved[/] is the largest change of the others' vertices. Welch's
+    test compares the images. The exit status is 1 if a difference is unexplained or the test fails.
     """
     if paths is None:
         options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")

@@ -70,7 +70,7 @@ def compile_model(
             show_default=False,
         ),
     ],
-    target: Annotated[Target, typer.Option(help="Target language.", show_default=False)],
+    target: Annotated[Target, typer.Option(help="Target language (export has more).", show_default=False)],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.", show_default="TARGET"),

@@ -74,8 +74,8 @@ SceneOrNone = Annotated[
 Outside = Annotated[
     int,
     typer.Option(
-        help="Test frames outside the training range: in the arc, 10 degrees beyond --yaw, beyond "
-        "--saturation."
+        help="Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
+        "--yaw, or beyond --saturation."
     ),
 ]
 TestSpp = Annotated[

@@ -48,7 +48,7 @@ TARGETS = (
 """Targets by name, for help texts: those of the registry in kernels, and the page."""
 
 HOSTS = (
-    "c, cpp, opencl, vulkan, webgpu, three, babylon, playcanvas, godot, "
+    "c, cpp, blender, opencl, vulkan, webgpu, three, babylon, playcanvas, godot, "
     "onnxruntime-web, onnxruntime, openvino"
 )
 """Hosts by name, for help texts: those of the registry in kernels."""
@@ -114,7 +114,7 @@ SceneToo = Annotated[
 TargetName = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME", help=f"Target language or host format: {TARGETS}.", show_default="the host's target"
+        metavar="NAME", help=f"Target language or format: {TARGETS}.", show_default="the host's target"
     ),
 ]
 HostName = Annotated[

@@ -69,7 +69,7 @@ Schedules = Annotated[
     str,
     typer.Option(
         metavar="NAME",
-        help="Schedules: [bold]picked[/] by each backend, [bold]all[/] of its target, or one by name.",
+        help="Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
     ),
 ]
 KeptKernel = Annotated[
@@ -98,7 +98,7 @@ def triage(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="FOLDER", help="Output folder of the reproducer, if a kernel deviates."
+            "-o", "--output", metavar="FOLDER", help="Output folder for the reproducer, if a kernel deviates."
         ),
     ] = Path("triage"),
 ) -> None:

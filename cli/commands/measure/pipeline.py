@@ -73,8 +73,8 @@ def pipeline(
     [bold]ours, moving[/] is one pipeline on a device in which every frame has a different time; the table
     has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
     [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
-    own (package bpy). All are interleaved. The first frame includes the compilation of its kernel; with
-    empty caches, in a separate process, that of all kernels. The network has random weights.
+    own (package bpy). All are interleaved. The first frame includes compiling its path kernel; with empty
+    caches, in a separate process, all kernels. The network has random weights.
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import measure_pipeline as measuring

@@ -53,7 +53,7 @@ def render(
 
     Each renders its first frame with empty compiler caches, then all are interleaved. The table has the
     median and the range, samples (paths) per second, and the ratio to the last row's. A second table
-    has the difference of each mean colour from the first one's, in standard errors. [bold]pip install
+    compares each mean colour with that of the first renderer, in standard errors. [bold]pip install
     mitsuba[/] adds Mitsuba, which also needs libLLVM; Embree needs a C compiler and libembree-dev.
     """
     from ....kernels.bench import measure_render as measuring

@@ -44,7 +44,7 @@ from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
 from .hosts import scratch
 from .hosts.picture import beside
-from .hosts.table import host_named
+from .hosts.table import HOSTS, host_named
 from .motion import ROWS_NAME, Motion
 from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
 
@@ -116,7 +116,9 @@ class Export:
 def export(request: Request) -> Export:
     """Return the export of a model, or say which limit of the target it exceeds."""
     if request.target not in NAMES:
-        raise InputError("--target", request.target, "unknown", choice(request.target, [*NAMES, "html"]))
+        fix = choice(request.target, [*NAMES, "html"])
+        fix = f"a host's name: use --host {request.target}" if request.target in HOSTS else fix
+        raise InputError("--target", request.target, "unknown", fix)
     request = _hosted(request)
     if request.model.is_imported:
         _check_imported(request)

@@ -297,9 +297,9 @@ ROWS: tuple[Row, ...] = (
         "header",
         '#include "{file}"\n'
         + _arguments_code("wamnet_image({arguments});")
-        + "\n/* wamnet_pixel does {columns} pixels of a row, for your own loops. Use -O3 -march=native:\n"
-        "   tile:8 wants registers of 8 floats (AVX2); for those of 4 (SSE, NEON) export --schedule tile:4.\n"
-        "   GCC and clang take the schedules of spectra too, which are faster where windows are large. */",
+        + "\n/* wamnet_pixel computes {columns} pixels of a row, for your own loops. Use -O3 -march=native.\n"
+        "   Other schedules: tile:8 needs registers of 8 floats (AVX2), tile:4 those of 4 (SSE, NEON).\n"
+        "   GCC and clang also compile fft:16, fft:8 and fft:4, which are faster for large windows. */",
     ),
     Row(
         "cuda",

@@ -378,6 +378,7 @@ def test_a_variant_of_low_rank_is_two_kernels(target):
     ("request_", "told"),
     [
         (Request(model(), "abacus"), r"--target 'abacus': unknown \(choose one of opencl, .*, html"),
+        (Request(model(), "webgpu"), r"--target 'webgpu': unknown \(a host's name: use --host webgpu"),
         (
             Request(model(), "wgsl", weights="texture"),
             "--weights 'texture': is not available for target wgsl",

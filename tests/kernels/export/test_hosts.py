@@ -481,6 +481,14 @@ def test_the_program_in_python_is_right(host, tmp_path):
     run(written(made(host), tmp_path), sys.executable, "check.py", env=environment)
 
 
+@pytest.mark.parametrize("host", ["onnxruntime", "openvino"])
+def test_the_program_in_python_names_a_missing_package(host):
+    source = (FILES / host / "check.py.txt").read_text()
+    bare = [sys.executable, "-I", "-S", "-c", source]  # without installed packages
+    done = subprocess.run(bare, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, f"numpy is not installed: pip install numpy {host}\n")
+
+
 @pytest.mark.slow
 @pytest.mark.needs("devices")
 def test_openvino_in_bfloat16_is_found_wrong(tmp_path):

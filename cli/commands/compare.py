@@ -78,9 +78,9 @@ def compare(
 
     With --paths every step of every path has a rounding-error bound; a larger difference is
     [bold]unexplained[/]. A step whose decision is within the bound of its threshold is
-    [bold]undecided[/], and [bold]different[/] if the reference decides otherwise. [bold]parted[/] counts
-    paths that left the reference's; [bold]moved[/] is the largest change of the others' vertices. Welch's
-    test compares the images. The exit status is 1 if a difference is unexplained or the test fails.
+    [bold]undecided[/], and [bold]different[/] if the reference decides otherwise. [bold]parted[/] counts the
+    paths that have diverged; [bold]moved[/] is the largest change of the others' vertices. Welch's test
+    compares the images. The exit status is 1 if a difference is unexplained or the test fails.
     """
     if paths is None:
         options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")

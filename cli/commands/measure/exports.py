@@ -51,8 +51,8 @@ def exports(
     """Export for every target, compile, run, check against the bound, and print the verdicts.
 
     Each target is compiled by its own tools and run by the closest available runtime, and its image is
-    compared with the reference. A missing tool is reported in the table. The exit status is 1 if a
-    target that ran is wrong.
+    compared with the reference. A missing tool is reported in the table. The exit status is 1 if the image of
+    a target is wrong.
     """
     from ....kernels.export.check import HEAD
     from ....kernels.export.shelf import random_model

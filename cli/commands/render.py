@@ -83,7 +83,7 @@ def render(
     """Path-trace a scene: colour, albedo, normal, depth, position and ray direction.
 
     The same scene, size, samples and seed give the same frame, whatever the number of workers. Compiled
-    backends (OpenCL, OpenGL, C) give the same frame up to rounding, and much faster.
+    backends (OpenCL, OpenGL, C) give the same frame up to rounding, and are much faster.
     """
     from ...kernels.run.render_frame import render_frame
     from ...refimpl.light.render import Job

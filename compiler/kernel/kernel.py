@@ -115,7 +115,7 @@ class Let:
 
 @dataclass(frozen=True)
 class Array:
-    """Memory of an item, or of its group; without `sizes` it is one variable, with its first value.
+    """Memory of an item, of its group, or of all; without `sizes` it is one variable, with its first value.
 
     `register`: all of its indices are known once its loops are unrolled, so that compilers keep it in
     registers.
@@ -124,7 +124,7 @@ class Array:
     name: str
     type: Type
     sizes: tuple[int | Expr, ...] = ()
-    space: Literal["item", "group"] = "item"
+    space: Literal["item", "group", "device"] = "item"
     kept: bool = False
     value: Expr | None = None
     register: bool = False
@@ -187,6 +187,18 @@ class Barrier:
 
 
 @dataclass(frozen=True)
+class Launch:
+    """A grid of items of its own, which start when those of the launch before have ended.
+
+    `place`: names of an item's column and row; `counts`: how many columns and rows there are.
+    """
+
+    place: tuple[str, str]
+    counts: tuple[Expr, Expr]
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
 class View:
     """Part of an array as a function's argument: from `index` on, in steps of `step` elements."""
 
@@ -203,7 +215,7 @@ class Call:
     views: tuple[View, ...]
 
 
-Statement = Comment | Let | Array | Store | Write | For | If | Block | Barrier | Call
+Statement = Comment | Let | Array | Store | Write | For | If | Block | Barrier | Launch | Call
 Body = tuple[Statement, ...]
 
 
@@ -232,7 +244,8 @@ class Kernel:
 
     `step`: columns and rows of pixels of an item; `group`: the items (x, y) of a work group, which share
     memory, or none; `place`: names of an item's first column and row; `weights`: the type of an element of
-    the weights.
+    the weights. `batch`: tiles of a picture, where launches may compute some after others: the names
+    `first_tile` and `tile_count` say which.
     """
 
     interface: Interface
@@ -244,6 +257,12 @@ class Kernel:
     place: tuple[str, str] = ("x", "y")
     weights: Type = FLOAT
     tables: tuple[tuple[str, Any], ...] = ()
+    batch: Expr | None = None
+
+    @property
+    def launches(self) -> tuple[Launch, ...]:
+        """Return the launches, of a kernel that is several of them."""
+        return tuple(s for s in self.body if isinstance(s, Launch))
 
     @property
     def shared(self) -> tuple[Array, ...]:
@@ -255,6 +274,9 @@ class Kernel:
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
 """Operations on numbers that give truth."""
+
+BATCH = ("first_tile", "tile_count")
+"""The first tile that launches compute, and how many of them."""
 
 LOGICAL = ("logical_and", "logical_or", "logical_not")
 """Operations on truth."""
@@ -350,7 +372,7 @@ def _folded(what: str, a: Expr, b: Expr) -> Expr | None:
 
 def inside(statement: Statement) -> tuple[Body, ...]:
     """Return the bodies of a statement."""
-    if isinstance(statement, For | Block):
+    if isinstance(statement, For | Block | Launch):
         return (statement.body,)
     return (statement.body, statement.otherwise) if isinstance(statement, If) else ()
 
@@ -385,6 +407,8 @@ def values(statement: Statement) -> list[Expr]:
         ]
     if isinstance(statement, If):
         return [statement.condition]
+    if isinstance(statement, Launch):
+        return list(statement.counts)
     if isinstance(statement, Call):
         return [each for view in statement.views for each in (*view.index, view.step)]
     return []
@@ -425,6 +449,9 @@ def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
             return replace(statement, condition=change(statement.condition), **bodies)
         if isinstance(statement, Block):
             return Block(rewritten(statement.body, change))
+        if isinstance(statement, Launch):
+            across, down = map(change, statement.counts)
+            return replace(statement, counts=(across, down), body=rewritten(statement.body, change))
         if isinstance(statement, Call):
             views = (
                 replace(v, index=tuple(map(change, v.index)), step=change(v.step)) for v in statement.views

@@ -58,7 +58,7 @@ class Items:
 
 
 class Memory:
-    """One array; `space`: `item`, `group`, `read` (weights, images) or `result`.
+    """One array; `space`: `item`, `group`, `device`, `read` (weights, images) or `result`.
 
     `words`: the same bits as integers, where weights are read as both.
     """
@@ -67,7 +67,7 @@ class Memory:
         self.name, self.data, self.kind, self.sizes, self.space = name, data, kind, sizes, space
         self.words: NDArray[np.int32] | None = None
         self.written = None if space == "read" else np.zeros(data.shape, np.bool_)
-        if space in ("group", "result"):
+        if space in ("group", "device", "result"):
             self.writer = np.full(data.shape, NOBODY, np.int64)
             self.reader = np.full(data.shape, NOBODY, np.int64)
 
@@ -109,7 +109,7 @@ class Memory:
         """Return what is there: (items,), (lanes, items), or one number that all items read."""
         count, columns = kind.lanes, self.columns(items)
         data = self.words if self.words is not None and kind.dtype == "int32" else self.data
-        if self.space == "group":
+        if self.space in ("group", "device"):
             self._reads(items, place, count)
         if isinstance(place, int):
             rows = slice(place, place + count)
@@ -137,7 +137,7 @@ class Memory:
             np.copyto(self.data[rows], value, where=items.mask, casting="unsafe")
             self.written[rows] |= items.mask
             return
-        if self.space in ("group", "result"):
+        if self.space in ("group", "device", "result"):
             self._writes(items, place, count)
         active = np.flatnonzero(items.mask)
         each = np.broadcast_to(place + np.arange(count)[:, None], (count, items.count))[:, active]
@@ -189,7 +189,7 @@ class Memory:
 
     def settle(self, groups: NDArray[np.bool_]) -> None:
         """Forget who has used what: the items of these groups have waited for each other."""
-        if self.space == "group":
+        if self.space in ("group", "device"):
             self.writer[:, groups] = NOBODY
             self.reader[:, groups] = NOBODY
 

@@ -21,6 +21,7 @@ from ..core.ops import OPS
 from .domain import STORED, Domain, computed
 from .interface import IMAGE, RESULT, WEIGHTS
 from .kernel import (
+    BATCH,
     FLOAT,
     INTEGERS,
     Array,
@@ -31,6 +32,7 @@ from .kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Statement,
     Store,
@@ -81,6 +83,8 @@ class Runner:
         self.result = Memory(RESULT, np.zeros((int(np.prod(sizes)), 1), domain.dtype), FLOAT, sizes, "result")
         self.memory[RESULT] = self.result
         self.evaluators = self._evaluators()
+        if kernel.batch is not None:
+            self.names |= dict(zip(BATCH, (0, self.value(kernel.batch)), strict=True))
 
     def _evaluators(self) -> dict[str, Callable[[Expr], Values]]:
         """Return the methods that evaluate expressions, by operation."""
@@ -138,9 +142,9 @@ class Runner:
 
     def _run_array(self, statement: Array) -> None:
         """Make new memory, of which nothing is written."""
-        shared, kind = statement.space == "group", statement.type
-        columns = self.items.groups if shared else self.items.count
-        sizes = tuple(integer(self.kernel, each) for each in statement.sizes)
+        kind = statement.type
+        columns = {"item": self.items.count, "group": self.items.groups, "device": 1}[statement.space]
+        sizes = tuple(each if isinstance(each, int) else self.value(each) for each in statement.sizes)
         dtype = self.domain.dtype if kind.dtype == "float32" else STORED[kind.dtype]
         data = np.zeros((int(np.prod(sizes)) * kind.lanes, columns), dtype)
         self.names.pop(statement.name, None)
@@ -213,6 +217,17 @@ class Runner:
             )
         for memory in self.memory.values():
             memory.settle(active > 0)
+
+    def _run_launch(self, statement: Launch) -> None:
+        """Run a grid of items; for memory of the device they are one group, and the end is a barrier."""
+        outer, (across, down) = self.items, map(self.value, statement.counts)
+        row, column = (each.ravel() for each in np.mgrid[:down, :across])
+        self.items = Items(column, row, np.zeros(len(row), np.int64))
+        self.names |= dict(zip(statement.place, (column, row), strict=True))
+        self.body(statement.body)
+        for memory in self.memory.values():
+            memory.settle(np.ones(1, np.bool_))
+        self.items = outer
 
     def _run_call(self, statement: Call) -> None:
         """Run a function on views."""

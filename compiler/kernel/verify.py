@@ -16,6 +16,7 @@ from ..core import ir
 from ..core.ops import OPS, TypeRuleError
 from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .kernel import (
+    BATCH,
     BOOL,
     BYTE,
     FLOAT,
@@ -30,6 +31,7 @@ from .kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Statement,
     Store,
@@ -103,6 +105,7 @@ class Verifier:
         integers = dict.fromkeys((*kernel.place, "width", "height", *kernel.interface.integers), INT)
         integers |= {each: Type("uint32") for each in kernel.interface.integers if each in UNSIGNED}
         integers |= dict.fromkeys(("local_x", "local_y", "item"), INT) if kernel.group else {}
+        integers |= dict.fromkeys(BATCH, INT) if kernel.batch is not None else {}
         for each, kind in integers.items():
             self.declare(each, Declared(kind))
         for array in kernel.interface.arrays:
@@ -208,14 +211,34 @@ class Verifier:
     def _check_array(self, statement: Array, depth: int) -> None:
         """Check the sizes, or the first value of a variable."""
         name, kind, value = statement.name, statement.type, statement.value
-        sizes = tuple(self.positive(size, f"a size of {name}") for size in statement.sizes)
+        sizes = tuple(self.size(statement, each) for each in statement.sizes)
         if statement.space == "group" and (depth or not self.kernel.group or not sizes or value is not None):
             raise KernelError(f"{name} is memory of a group, which a kernel with groups declares at its top")
+        if statement.space == "device" and (depth or not sizes or value is not None):
+            raise KernelError(f"{name} is memory of the device, which a kernel declares at its top")
         if value is not None:
             if sizes:
                 raise KernelError(f"{name} is an array with a first value")
             self.check(value, kind, f"the first value of {name}")
         self.declare(name, Declared(kind, sizes, variable=not sizes))
+
+    def size(self, array: Array, size: int | Expr) -> int | None:
+        """Return a size of an array; that of the device's memory may depend on the picture."""
+        if array.space == "device" and isinstance(size, Expr) and self.constant(size) is None:
+            self.check(size, INT, f"a size of {array.name}")
+            return None
+        return self.positive(size, f"a size of {array.name}")
+
+    def _check_launch(self, statement: Launch, depth: int) -> None:
+        """Check a grid of items, whose names end with it."""
+        if depth:
+            raise KernelError("a launch inside another statement")
+        self.scopes.append({})
+        for each, count in zip(statement.place, statement.counts, strict=True):
+            self.check(count, INT, "the items of a launch")
+            self.declare(each, Declared(INT))
+        self.body(statement.body)
+        self.scopes.pop()
 
     def _check_store(self, statement: Store, depth: int) -> None:
         """Check the element, and the type of the value."""

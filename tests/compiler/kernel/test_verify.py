@@ -20,6 +20,7 @@ from wamnet.compiler.kernel.kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Store,
     Type,
@@ -143,6 +144,28 @@ WRONG = {
     "a size of nothing": (small(Array("v", FLOAT, (0,))), "a size of v is 0"),
     "a size that varies": (small(Array("v", FLOAT, (X,))), "a size of v is not determined by constants"),
     "an array with a value": (small(Array("v", FLOAT, (2,), value=ZERO)), "v is an array with a first value"),
+    "memory of the device in a loop": (
+        small(looped(Array("v", FLOAT, (2,), "device"))),
+        "v is memory of the device, which a kernel declares at its top",
+    ),
+    "memory of the device of a float's size": (
+        small(Array("v", FLOAT, (ZERO,), "device")),
+        "a size of v has type",
+    ),
+    "a launch in a branch": (
+        small(If(const(True), (Launch(("p", "q"), (X, Y), ()),))),
+        "a launch inside another",
+    ),
+    "a launch of a float's items": (
+        small(Launch(("p", "q"), (ZERO, Y), ())),
+        "the items of a launch has type",
+    ),
+    "a name of an earlier launch": (
+        small(
+            Launch(("p", "q"), (name("width"), const(1)), ()), Store(RESULT, (name("p"), X, const(0)), ZERO)
+        ),
+        "p is used before it is declared",
+    ),
     "memory of no group": (small(Array("v", FLOAT, (2,), "group")), "v is memory of a group"),
     "memory of a group in a loop": (
         small(looped(Array("v", FLOAT, (2,), "group")), group=(2, 2)),

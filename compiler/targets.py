@@ -26,6 +26,7 @@ from .languages.metal import Metal
 from .languages.opencl import OpenCL
 from .languages.wgsl import WGSL
 from .schedules.names import parse
+from .schedules.passes import FourierPasses
 from .schedules.schedules import (
     Dot,
     Fourier,
@@ -86,6 +87,11 @@ TILES = {
 
 FFT_IDEA = "the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {}"
 """What an FFT schedule says of itself."""
+
+PASSES_IDEA = (
+    "the sums over the window by FFT, in passes: an item is a line, a frequency or a pixel of a tile"
+)
+"""What the FFT schedule in passes says of itself."""
 
 
 def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
@@ -198,7 +204,12 @@ TARGETS: Mapping[str, Target] = {
             forms=Forms(trees=True),
         ),
         replace(
-            _dialect_target(GLSL(), Inline(GLSL()), *groups(GLSLCompute())),
+            _dialect_target(
+                GLSL(),
+                Inline(GLSL()),
+                FourierPasses("fftpasses:32", PASSES_IDEA, GLSLCompute(), 32),
+                *groups(GLSLCompute()),
+            ),
             planes={1: planes.GLSLPlanes()},
             forms=MESA,
         ),

@@ -289,6 +289,10 @@ class Dialect:
             found.append(self.shared_array.format(kind=kind, name=array.name, count=count))
         return found
 
+    def launched(self, place: tuple[str, str], counts: Sequence[str]) -> list[str]:
+        """Return the first lines of a launch, of a grid of so many columns and rows of items."""
+        raise NotImplementedError
+
     def item_place(self) -> list[str]:
         """Return the declarations of where an item is in its group, and of its first pixel."""
         inside = [self.cast("int32", text) for text in self.local_place]

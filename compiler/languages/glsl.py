@@ -8,6 +8,8 @@ planes a buffer, or one buffer for each image of an encoding.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..core.profiles import SineContract
 from ..kernel.interface import (
     BLOCK,
@@ -21,7 +23,7 @@ from ..kernel.interface import (
     WRITE,
     Interface,
 )
-from ..kernel.kernel import Kernel, values, walk
+from ..kernel.kernel import BATCH, Array, Kernel, values, walk
 from ..kernel.kernel import parts as inside
 from .dialect import Dialect, Parts
 
@@ -299,22 +301,55 @@ class GLSLCompute(GLSL):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
-        first = kernel.images[0].name
+        assert parts.kernel is not None, "compute shaders are kernels as data"
+        staged = bool(parts.kernel.launches)
+        across, down = ("ITEMS", 1) if staged else ("GROUP_WIDTH", "GROUP_HEIGHT")
+        device = [s for s in parts.kernel.body if isinstance(s, Array) and s.space == "device"]
+        lines = [
+            f"#version {SHADER_VERSION} core",
+            "#define PRECISE precise",
+            parts.top,
+            f"layout(local_size_x = {across}, local_size_y = {down}) in;",
+            *self.images(kernel),
+            "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
+            "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
+        ]
+        for number, array in enumerate(device):
+            block = f"{{ vec{array.type.lanes} {array.name}[]; }}"
+            lines.append(
+                f"layout(std430, binding = {number + 1}) restrict buffer {array.name}_buffer {block};"
+            )
+        if staged:
+            return "\n".join([*lines, *(f"uniform int {each};" for each in BATCH), ""])
         return "\n".join(
-            [
-                f"#version {SHADER_VERSION} core",
-                "#define PRECISE precise",
-                parts.top,
-                "layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;",
-                *self.images(kernel),
-                "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
-                "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
-                *(self.group_memory(parts.kernel) if parts.kernel else []),
-                "",
-                "void main()",
-                "{",
-                f"    int width = textureSize({first}, 0).x;",
-                f"    int height = textureSize({first}, 0).y;",
-                *self.item_place(),
-            ]
+            [*lines, *self.group_memory(parts.kernel), "", *self.opened(kernel), *self.item_place()]
         )
+
+    def called(self, kernel: Kernel) -> str:
+        """Return how a denoiser is called."""
+        if not kernel.launches:
+            return super().called(kernel)
+        said, _, _ = self.said[DENOISE].partition("Dispatch")
+        return (
+            f"{said.rstrip()}\n"
+            "Compile the text once for each pass, STAGE defined as its number and ITEMS as the items of a\n"
+            "group. Storage buffers 1 and on are the `memory` of the manifest: so many numbers a tile.\n"
+            "Tiles of {columns} x {rows} pixels lie in rows from the top; a batch is tile_count of them\n"
+            "from first_tile on, a multiple of ITEMS times the most `tiles` of an item. For each batch\n"
+            "dispatch tile_count / (tiles * ITEMS) x lines groups of each of the `launches`, in order and\n"
+            "with barriers between"
+        )
+
+    def opened(self, kernel: Interface | None = None) -> list[str]:
+        """Return the first lines of the function."""
+        size = f"textureSize({kernel.images[0].name}, 0)" if kernel else "imageSize(result)"
+        return ["void main()", "{", f"    int width = {size}.x;", f"    int height = {size}.y;"]
+
+    def launched(self, place: tuple[str, str], counts: Sequence[str]) -> list[str]:
+        """Return the first lines of a launch; no item is beyond the grid, and none needs a branch."""
+        column, row = place
+        return [
+            *self.opened(),
+            f"    int {column} = int(gl_GlobalInvocationID.x);",
+            f"    int {row} = int(gl_WorkGroupID.y);",
+        ]

@@ -35,6 +35,7 @@ from ..kernel.kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Statement,
     Store,
@@ -125,11 +126,14 @@ class Renderer(Lines):
         for function in kernel.functions:
             self.function(function)
         functions, self.lines = self.lines, []
+        if kernel.launches:
+            self.depth = 0
         self.body(kernel.body)
         top = [*map(self.constant, kernel.constants), *self.tables(), *functions]
         begin = dialect.begin(kernel.interface, Parts("\n".join(top), self.bounded, kernel=kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-        lines = [*dialect.first, *comment, begin, *self.lines, dialect.ends[kernel.interface.role]]
+        end = "#endif" if kernel.launches else dialect.ends[kernel.interface.role]
+        lines = [*dialect.first, *comment, begin, *self.lines, end]
         return dialect.finished("\n".join(lines)) + "\n"
 
     def constant(self, constant: Constant) -> str:
@@ -323,7 +327,7 @@ class Renderer(Lines):
 
     def _write_array(self, statement: Array) -> None:
         """Write a declaration of memory."""
-        if statement.space == "group":
+        if statement.space != "item":
             return  # declared where the language wants it [dialects' `shared_array`]
         kind = self.variable(statement.type, statement.kept)
         sizes = [self.text(size) if isinstance(size, Expr) else str(size) for size in statement.sizes]
@@ -474,6 +478,19 @@ class Renderer(Lines):
     def _write_barrier(self, statement: Barrier) -> None:
         """Write that all items of a group wait."""
         self._line(self.dialect.wait)
+
+    def _write_launch(self, statement: Launch) -> None:
+        """Write a launch as a program of its own, which is compiled where STAGE is its number."""
+        number = self.kernel.launches.index(statement)
+        counts = [self.text(each) for each in statement.counts]
+        self.lines += [
+            f"#{'elif' if number else 'if'} STAGE == {number}",
+            *self.dialect.launched(statement.place, counts),
+        ]
+        self.depth = 1
+        self.body(statement.body)
+        self.depth = 0
+        self.lines.append("}")
 
     def _write_call(self, statement: Call) -> None:
         """Write a call of a function on views."""

@@ -18,7 +18,7 @@ transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,7 +147,7 @@ class Traced:
         wanted = {each.value for each in outputs}
         for number in kept[::-1]:
             value, own = self.made[number], f"t{number}"
-            if value.op != "load":
+            if value.op not in ("load", "component"):
                 value = apply(value.op, *(known.get(str(arg.value), arg) for arg in value.args))
             if value.op == "multiply" and readers[own] == 1 and own not in wanted:
                 known[own] = value
@@ -174,19 +174,26 @@ class Number:
         return self.traced.add(apply("multiply", self.value, wide))
 
 
+def line(inputs: Sequence[tuple[Expr, Expr]], kept: int, sign: int) -> tuple[list[Let], list[list[Expr]]]:
+    """Return the statements that transform complex values, and the first `kept` of what they give."""
+    traced = Traced()
+    found = fourier.transform([tuple(map(traced.add, each)) for each in inputs], sign)[:kept]  # type: ignore[misc]
+    outputs = [[part.value for part in number] for number in found]
+    return traced.needed([part for number in outputs for part in number]), outputs
+
+
 def codelet(title: str, points: int, kept: int, sign: int, kind: Type) -> Function:
     """Return the function that transforms `points` complex values and keeps the first `kept`."""
-    traced = Traced()
     places = [(STEP * (PARTS * k), STEP * (PARTS * k) + 1) for k in range(points)]
-    inputs = [tuple(traced.add(load("from", at, kind=kind)) for at in pair) for pair in places]
-    found = fourier.transform(inputs, sign)[:kept]  # type: ignore[arg-type]
-    outputs = [part.value for number in found for part in number]
+    lets, found = line(
+        [(load("from", a, kind=kind), load("from", b, kind=kind)) for a, b in places], kept, sign
+    )
     stores = [
-        Store("to", (LEAP * (PARTS * k) + i,), part.value)
+        Store("to", (LEAP * (PARTS * k) + i,), part)
         for k, number in enumerate(found)
         for i, part in enumerate(number)
     ]
-    return Function(title, (("from", kind), ("to", kind)), (*traced.needed(outputs), *stores))
+    return Function(title, (("from", kind), ("to", kind)), (*lets, *stores))
 
 
 # ---- statements ------------------------------------------------------------------------------------------

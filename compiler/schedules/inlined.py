@@ -69,13 +69,17 @@ class Inlined(Straight):
         matrix, bias = self.program.parameters[str(node["weight"])], node.get("bias")
         found: list[Statement] = [self.mapped(index, node)]
         for j in range(self.vectors(index)):
-            start = numbers(self.program.parameters[str(bias)], j) if bias else ZERO
+            start = self.start(str(bias), j) if bias else ZERO
             found.append(Array(self.variable(index, 0, j), VECTOR, value=start))
         if self.program.nodes[node.args[0]].op == "input":
             return [*found, *self.of_window(index, matrix)]
         for i, column in enumerate(matrix.T):
             found += self.added(f"v{index}", column, self.at(node.args[0], 0, i // 4).lane(i % 4))
         return found
+
+    def start(self, bias: str, vector: int) -> Expr:
+        """Return four values of a bias, with which sums start."""
+        return numbers(self.program.parameters[bias], vector)
 
     def added(self, sums: str, column: NDArray[np.float32], value: Expr) -> list[Statement]:
         """Return the additions of a column of weights (D_out,) times a value to all vectors."""

@@ -1,7 +1,7 @@
 """Names of schedules: a family, or a family and its parameter, as `tile:8`.
 
-The parameter is the number of components of a vector (`vector`, `tile`, `fft`, `dot`), or of pixels of a
-work item (`group`, `groupdot`).
+The parameter is the number of components of a vector (`vector`, `tile`, `fft`, `dot`), of pixels of a work
+item (`group`, `groupdot`), or of points of a transform (`fftpasses`).
 """
 
 from __future__ import annotations

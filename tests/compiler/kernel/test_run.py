@@ -31,6 +31,7 @@ from wamnet.compiler.kernel.kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Store,
     Type,
@@ -52,6 +53,8 @@ from wamnet.compiler.schedules.fft import fft, spectra_stored
 from wamnet.compiler.schedules.group import LARGEST_NUMBERS, group
 from wamnet.compiler.schedules.inlined import inlined
 from wamnet.compiler.schedules.packed import packed, packed_weights
+from wamnet.compiler.schedules.passes import passes
+from wamnet.compiler.schedules.passes import stored as passes_stored
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.tile import all_stored, tile
 from wamnet.kernels.devices import c_executor
@@ -143,6 +146,7 @@ SCHEDULES = {
     "inlined": lambda p: (inlined(p), np.zeros(0, np.float32)),
     "packed": lambda p: (packed(p), flat(packed_weights(p))),
     "fft": lambda p: (fft(p, 4, 2, 4, 2, True), flat(spectra_stored(p, 4, 4, 2))),
+    "fft in passes": lambda p: (passes(p, 4), flat(passes_stored(p, 4))),
 }
 
 
@@ -152,7 +156,7 @@ def test_other_schedules_are_near_the_reference(kit, schedule, border):
     program = kit.denoiser(kit.network([36, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 3, border)
     plan, images = plan_program(program, "opencl"), pictures({"a": 3, "b": 1}, (3, 5))
     expected, (kernel, weights) = plan.expected(images), SCHEDULES[schedule](plan.emitted)
-    far = 4 if schedule == "fft" else 1  # another order of sums, whose own bound is larger
+    far = 4 if schedule.startswith("fft") else 1  # another order of sums, whose own bound is larger
     assert (np.abs(run(kernel, images, weights) - expected.value) <= far * expected.bound).all()
 
 
@@ -200,6 +204,38 @@ def test_bits_are_those_of_c_without_contraction(executor_named, kit, tmp_path, 
     ).stdout.split()
     bits = np.array([float.fromhex(line) for line in lines], np.float32).view(np.uint32)
     assert np.array_equal(np.ravel(result).view(np.uint32), bits)
+
+
+@pytest.mark.parametrize(("widths", "size"), [((48, 35, 3), (30, 47)), ((48, 5, 4, 2), (1, 1))])
+def test_passes_have_the_bits_of_the_fft_schedule(kit, widths, size):
+    """Both add the same numbers in the same order: with several tiles, groups of neurons, for one pixel."""
+    program = kit.denoiser(kit.network(list(widths), (3.0, 5.0)), {"a": 3}, 4, "zero")
+    plan, images = plan_program(program, "opencl"), pictures({"a": 3}, size)
+    one, many = fft(plan.emitted, 16, 2, 16, 1, True), passes(plan.emitted, 16)
+    found = run(many, images, flat(passes_stored(plan.emitted, 16)))
+    assert np.array_equal(found, run(one, images, flat(spectra_stored(plan.emitted, 16, 16, 1))))
+
+
+def launched(*bodies):
+    """Return a kernel of launches of width x height items, which share two numbers an item."""
+    grids = [Launch(("column", "line"), (name("width"), name("height")), body) for body in bodies]
+    return small(Array("shared", FLOAT, (name("width") * name("height"),), "device"), *grids)
+
+
+PLACE = name("line") * name("width") + name("column")
+NEXT = apply("minimum", PLACE + 1, name("width") * name("height") - 1)
+PUT = Store("shared", (PLACE,), apply("convert", PLACE, value="float32"))
+
+
+def test_launches_see_what_the_one_before_has_written():
+    take = Store(RESULT, (name("line"), name("column"), const(0)), load("shared", NEXT))
+    assert np.array_equal(ran(launched((PUT,), (take,))), [[1, 2, 3], [4, 5, 5]])
+    with pytest.raises(KernelError, match="an item reads shared where another wrote"):
+        ran(launched((PUT, take)))
+    with pytest.raises(KernelError, match="two items write one element of shared"):
+        ran(launched((Store("shared", (const(0),), const(1.0)),), (take,)))
+    with pytest.raises(KernelError, match="shared is read before it is written"):
+        ran(launched((take,)))
 
 
 # ---- statements that no schedule of a program has together ------------------------------------------------

@@ -1,0 +1,388 @@
+"""The FFT schedule in passes: lines, frequencies and pixels as launches of their own.
+
+    images -> rows -> columns -> products at each frequency -> columns back -> rows back -> layers -> result
+
+1. An item computes one line, one frequency or one pixel of a tile; neighbours compute the same of the tiles
+   beside it, so that they read and write neighbours in memory of the device. No function takes an array and
+   no item holds a tile: languages need no pointers, devices no large stacks, and programs are short.
+2. What is computed, and in which order, is as in the FFT schedule [fft.py] with vectors of `HALF` neurons:
+   neurons j and j + HALF share a complex image. The bits are the same, and the bound is that of fourier.py.
+3. Frequencies in the columns that are their own mirror images, 0 and POINTS / 2, are computed once for both.
+4. Weights of the layers after the first are constants of the source [inlined.py]; its spectra are in memory.
+5. Tiles are computed in batches: a launch sees `tile_count` of them, from `first_tile` on. Those behind the
+   last one are computed like others, and write no pixel: no item needs a branch around its work, which costs
+   llvmpipe a check for each item and access.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.ir import Program
+from ..core.weights import Slot, weights
+from ..kernel.kernel import (
+    BATCH,
+    FLOAT,
+    Array,
+    Block,
+    Comment,
+    Constant,
+    Expr,
+    If,
+    Kernel,
+    Launch,
+    Let,
+    Statement,
+    Store,
+    apply,
+    const,
+    expr,
+    load,
+    name,
+    splat,
+    stack,
+    substituted,
+)
+from ..kernel.sizes import integer
+from ..languages.dialect import Dialect
+from . import fourier
+from .common import HEIGHT, WIDTH, clamp, loop, weight
+from .fft import OUT, PAIRS, POINTS, PRODUCTS, TILE, line, sizes_of, spectra_stored
+from .inlined import LARGEST_WEIGHTS, Inlined
+from .schedules import Fourier
+from .straight import VECTOR, ZERO, variables
+from .tile import placed, readers_of_window
+
+HALF = 16
+"""Neurons that share complex images with as many others."""
+
+TILES, IMAGES = 4, 8
+"""Tiles, and complex images of two neurons each, whose products an item computes: 32 sums of four numbers."""
+
+COMPLEX = FLOAT.of(2)
+"""A complex number in memory of the device."""
+
+FIRST_TILE, TILE_COUNT = map(name, BATCH)
+ACROSS, ITEM, PAIR, K, F, G = map(name, ("across", "line", "pair", "k", "f", "g"))
+FREQUENCIES, MIRRORED, BLOCK = map(name, ("FREQUENCIES", "MIRRORED", "BLOCK"))
+
+
+def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
+    """Return what is in memory: the first layer's spectra and bias, as the FFT schedule has them."""
+    (layer,) = readers_of_window(program)
+    own = [str(layer[key]) for key in ("weight", "bias") if layer.get(key)]
+    found = spectra_stored(program, HALF, points, 1)
+    return {key: found[key] for key in own}
+
+
+def passes(program: Program, points: int) -> Kernel:
+    """Return the kernel of a program whose neurons are in order."""
+    return Passes(program, placed(stored(program, points)), points).built()
+
+
+class Passes(Inlined):
+    """Builds the launches."""
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], points: int) -> None:
+        super().__init__(program, slots, 4)
+        self.points = points
+        self.sizes = sizes_of(program, HALF, points, 1)
+        self.centres = fourier.arrangement(program, HALF).centres
+
+    def constants(self) -> list[Constant]:
+        """Return the sizes of tiles and transforms."""
+        s = self.sizes
+        return [
+            *self.window(),
+            Constant("POINTS", const(self.points), "rows and columns of a tile with what its windows reach"),
+            Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            Constant("PAIRS", const(s.pairs), "of channels"),
+            Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
+            Constant("IMAGES", const(s.neurons * HALF), "complex ones, of two neurons each"),
+            Constant(
+                "FREQUENCIES", (POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"
+            ),
+            Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
+        ]
+
+    def built(self) -> Kernel:
+        """Return the kernel."""
+        constants, images = self.constants(), name("IMAGES")
+        spectrum, back = PAIRS * POINTS * POINTS, images * POINTS * POINTS
+        arrays = [
+            ("rows", spectrum), ("columns", spectrum), ("products", back),
+            ("back", images * OUT * POINTS), ("sums", images * OUT * OUT),
+        ]  # fmt: skip
+        body: list[Statement] = [
+            *(Array(key, COMPLEX, (TILE_COUNT * count,), "device") for key, count in arrays),
+            Comment("rows of the images around the tiles, transformed"),
+            self.launch(POINTS, *self.forward_rows()),
+            Comment("columns, transformed"),
+            self.launch(PAIRS * POINTS, *self.forward_columns()),
+            Comment("products with the weights' spectra, at each frequency and at its mirror image"),
+            Launch(
+                ("tile", "line"),
+                (TILE_COUNT // TILES, (FREQUENCIES + 2 * MIRRORED) * (self.sizes.neurons * HALF // IMAGES)),
+                tuple(self.products()),
+            ),
+            Comment("columns, transformed back"),
+            self.launch(images * POINTS, *self.backward("products", "back", POINTS, POINTS, OUT)),
+            Comment("rows, transformed back"),
+            self.launch(images * OUT, *self.backward("back", "sums", OUT, const(1), OUT)),
+            Comment("the other layers, pixel by pixel"),
+            self.launch(OUT * OUT, *self.layers()),
+        ]
+        across, down = ((size + OUT - 1) // OUT for size in (WIDTH, HEIGHT))
+        tiles = (across * down + (TILES - 1)) // TILES * TILES
+        functions = tuple(self.functions())
+        return self.kernel(body, constants, functions=functions, step=(OUT, OUT), weights=VECTOR, batch=tiles)
+
+    def launch(self, count: Expr, *body: Statement) -> Launch:
+        """Return a launch of so many items for each tile."""
+        return Launch(("tile", "line"), (TILE_COUNT, count), body)
+
+    def corner(self) -> list[Statement]:
+        """Return the first pixel of a tile."""
+        return [
+            Let("number", FIRST_TILE + TILE),
+            Let("across", (WIDTH + OUT - 1) // OUT),
+            Let("tile_x", name("number") % ACROSS * OUT),
+            Let("tile_y", name("number") // ACROSS * OUT),
+        ]
+
+    def complex(self, array: str, places: Sequence[Expr]) -> tuple[list[Statement], list[tuple[Expr, Expr]]]:
+        """Return the statements that read complex numbers, and their parts."""
+        reads: list[Statement] = []
+        parts = []
+        for n, place in enumerate(places):
+            reads.append(Let(f"z{n}", load(array, place * TILE_COUNT + TILE, kind=COMPLEX)))
+            parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
+        return reads, parts
+
+    def put(self, array: str, place: Expr, parts: Sequence[Expr]) -> Store:
+        """Return the statement that writes a complex number."""
+        return Store(array, (place * TILE_COUNT + TILE,), stack(list(parts)))
+
+    # ---- transforms --------------------------------------------------------------------------------------
+
+    def forward_rows(self) -> list[Statement]:
+        """Return the gathering of a row of all channels, and its transformation pair by pair."""
+        column, row = name("column"), name("row")
+        lines: list[Statement] = [
+            Let("left", name("tile_x") + name("dx") - self.column),
+            Let("column", clamp(name("left"), WIDTH)),
+        ]
+        if self.gather.window.border == "zero":
+            same = apply("equal", row, name("top")) & apply("equal", column, name("left"))
+            lines.append(Let("inside", same))
+        values = [self.pixel(image, c) for image in self.gather.images for c in range(image.channels)]
+        for channel in range(2 * self.sizes.pairs):
+            part, pair = divmod(channel, self.sizes.pairs)
+            value = values[channel] if channel < len(values) else const(0.0)
+            if channel < len(values) and (centre := self.centres[channel]):
+                value = apply("subtract", value, const(centre))
+            lines.append(Store("gathered", ((pair * POINTS + name("dx")) * 2 + part,), value))
+        inputs = [
+            tuple(load("gathered", (PAIR * POINTS + dx) * 2 + part) for part in (0, 1))
+            for dx in range(self.points)
+        ]
+        lets, found = line(inputs, self.points, -1)  # type: ignore[arg-type]
+        puts = [self.put("rows", (PAIR * POINTS + ITEM) * POINTS + k, parts) for k, parts in enumerate(found)]
+        return [
+            *self.corner(),
+            Let("top", name("tile_y") + ITEM - self.row),
+            Let("row", clamp(name("top"), HEIGHT)),
+            Array("gathered", FLOAT, (PAIRS * POINTS * 2,)),
+            loop("dx", POINTS, *lines),
+            loop("pair", PAIRS, *lets, *puts),
+        ]
+
+    def forward_columns(self) -> list[Statement]:
+        """Return the transformation of a column."""
+        first = Let("first", ITEM // POINTS * (POINTS * POINTS) + ITEM % POINTS)
+        places = [name("first") + POINTS * n for n in range(self.points)]
+        reads, parts = self.complex("rows", places)
+        lets, found = line(parts, self.points, -1)
+        return [
+            first,
+            *reads,
+            *lets,
+            *(self.put("columns", p, z) for p, z in zip(places, found, strict=True)),
+        ]
+
+    def backward(self, source: str, target: str, of_image: Expr, step: Expr, kept: Expr) -> list[Statement]:
+        """Return the inverse transformation of a column or a row, of which OUT are kept."""
+        image, own = ITEM // of_image, ITEM % of_image
+        columns = source == "products"
+        start = image * (POINTS * POINTS) + own if columns else ITEM * POINTS
+        reads, parts = self.complex(source, [name("first") + step * n for n in range(self.points)])
+        lets, found = line(parts, self.sizes.out, 1)
+        of_target = POINTS if columns else name("IMAGES")
+        to = image * (OUT * POINTS) + own if columns else own * OUT * name("IMAGES") + image
+        puts = [self.put(target, name("to") + of_target * n, z) for n, z in enumerate(found)]
+        return [Let("first", start), Let("to", to), *reads, *lets, *puts]
+
+    # ---- products ----------------------------------------------------------------------------------------
+
+    def products(self) -> list[Statement]:
+        """Return the products of one frequency, and of its mirror image: some neurons of some tiles.
+
+        A weight is read once for all tiles, a number of a spectrum once for all neurons.
+        """
+        number, of = name("number"), self.sizes.neurons * HALF // IMAGES
+        own = apply("less", number, FREQUENCIES)
+        found: list[Statement] = [
+            Let("number", ITEM // of),
+            Let("group", ITEM % of),
+            Let("rest", apply("maximum", number - FREQUENCIES, const(0))),
+            Let("k", apply("select", own, number // POINTS + 1, name("rest") // MIRRORED * (POINTS // 2))),
+            Let("f", apply("select", own, number % POINTS, name("rest") % MIRRORED)),
+            Let("here", F * POINTS + K),
+            Let("there", (POINTS - F) % POINTS * POINTS + (POINTS - K) % POINTS),
+        ]
+        split = self.sizes.block < self.sizes.pairs
+        sums = [f"{part}_{t}_{v}" for part in PRODUCTS for t in range(TILES) for v in range(IMAGES // 2)]
+        zero = variables(sums, ZERO)
+        lines: list[Statement] = [
+            Let("own", BLOCK * name("block") + PAIR if split else PAIR),
+            *self.spectra(),
+        ]
+        lines += [Block(tuple(self.weighted(v))) for v in range(IMAGES // 2)]
+        if not split:
+            found += [*zero, loop("pair", PAIRS, *lines)]
+            whole = ""
+        else:
+            whole = "whole_"
+            adds = [Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
+            found += variables([f"whole_{each}" for each in sums], ZERO)
+            found.append(loop("block", PAIRS // BLOCK, *zero, loop("pair", BLOCK, *lines), *adds))
+        for t, n in product(range(TILES), range(IMAGES)):
+            (a, c), (b, d) = (
+                [name(f"{whole}{part}_{t}_{v}", VECTOR).lane(n % 4) for v in (n // 4, (n + IMAGES) // 4)]
+                for part in PRODUCTS
+            )
+            image = (name("group") * IMAGES + n) * (POINTS * POINTS)
+            both = {
+                "here": (apply("subtract", a, d), apply("add", b, c)),
+                "there": (apply("add", a, d), apply("subtract", c, b)),
+            }
+            for place, parts in both.items():
+                at = (image + name(place)) * TILE_COUNT + self.tile(t)
+                found.append(Store("products", (at,), stack(list(parts))))
+        return found
+
+    def tile(self, t: int) -> Expr:
+        """Return the tile with this number of an item's: those of neighbouring items are neighbours."""
+        return TILE + TILE_COUNT // TILES * t
+
+    def spectra(self) -> list[Statement]:
+        """Return the spectra of both channels of a pair, of all tiles."""
+        found: list[Statement] = []
+        for t in range(TILES):
+            z = []
+            for place in ("here", "there"):
+                at = (name("own") * (POINTS * POINTS) + name(place)) * TILE_COUNT + self.tile(t)
+                found.append(Let(f"{place}_{t}", load("columns", at, kind=COMPLEX)))
+                z.append(name(f"{place}_{t}", COMPLEX))
+            (a, b), (c, d) = ([each.lane(0), each.lane(1)] for each in z)
+            both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
+            found += [Let(f"{n}_{t}", value) for n, value in zip("abcd", both, strict=True)]
+        (layer,) = readers_of_window(self.program)
+        first = self.offset(layer["weight"]) // 4
+        at = ((K * self.sizes.neurons + name("group") // (HALF // IMAGES)) * POINTS + F) * PAIRS + name("own")
+        return [*found, Let("at", first + at * (2 * HALF) + name("group") % (HALF // IMAGES) * (IMAGES // 4))]
+
+    def weighted(self, v: int) -> list[Statement]:
+        """Return the products of four neurons' weights with each tile's spectra."""
+        half, own = divmod(v, IMAGES // 4)
+        at = name("at") + (half * (HALF // 4) + own)
+        lines: list[Statement] = [Let(f"w{j}", weight(at + j * (2 * HALF // 4), VECTOR)) for j in range(4)]
+        for t, (part, terms) in product(range(TILES), PRODUCTS.items()):
+            for sign, j, value in terms:
+                found = apply("multiply", name(f"w{j}", VECTOR), splat(name(f"{value}_{t}", FLOAT), 4))
+                found = found if sign == "+" else apply("negative", found)
+                lines.append(Store(f"{part}_{t}_{v}", (), found, add=True))
+        return lines
+
+    # ---- layers ------------------------------------------------------------------------------------------
+
+    def layers(self) -> list[Statement]:
+        """Return the layers after the first one's sums, for one pixel."""
+        x, y = name("tile_x") + ITEM % OUT, name("tile_y") + ITEM // OUT
+        found: list[Statement] = [*self.corner(), Let("column", x), Let("row", y)]
+        lines: list[Statement] = []
+        for nodes in self.groups:
+            node = self.program.nodes[nodes[0]]
+            if node.op != "input":
+                lines += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
+        write = self.written(name("row"), name("column"), 0)
+        inside = (name("column") < WIDTH) & (name("row") < HEIGHT)
+        return [*found, *lines, self.output_comment(), If(inside, (write,))]
+
+    def start(self, bias: str, vector: int) -> Expr:
+        """Return four values of a bias; that of the first layer, with the centres' sums, is in memory."""
+        if bias in self.slots:
+            return weight(self.offset(bias) // 4 + vector, VECTOR)
+        return super().start(bias, vector)
+
+    def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[Statement]:
+        """Return the sums over the window, which are in memory."""
+        found: list[Statement] = []
+        start = ITEM * name("IMAGES")
+        for j in range(self.vectors(index)):
+            group, of = divmod(j, 2 * HALF // 4)
+            part, vector = divmod(of, HALF // 4)
+            numbers = [group * HALF + vector * 4 + n for n in range(4)]
+            reads = [load("sums", (start + n) * TILE_COUNT + TILE, kind=COMPLEX).lane(part) for n in numbers]
+            found.append(Store(self.variable(index, 0, j), (), stack(reads), add=True))
+        return found
+
+
+class FourierPasses(Fourier):
+    """Tiles of `points` x `points` pixels, one launch after another."""
+
+    order = (
+        "the spectrum of the matrix that reads the window: columns of frequencies 0 to points / 2, groups "
+        "of 32 neurons, rows of frequencies, pairs of channels, (real, imaginary) of the first and of the "
+        "second channel, neurons; weights of the layers after it are constants of the source"
+    )
+
+    def __init__(self, name: str, idea: str, dialect: Dialect, points: int) -> None:
+        super().__init__(name, idea, dialect, HALF, 1, points, 1)
+        self.instead = "inlined"
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        count = sum(a.size for key, a in weights(program).items() if key not in self.stored(program))
+        if count > LARGEST_WEIGHTS:
+            return f"its layers have {count} weights, of at most {LARGEST_WEIGHTS}"
+        return super().refusal(program)
+
+    def build(self, program: Program) -> Kernel:
+        """Return the kernel of a program."""
+        return passes(self.held(program), self.points)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return the weights outside the source as they are stored, by name."""
+        return stored(program, self.points)
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return what is launched, and the memory of the device: numbers of each array for a tile."""
+        kernel = self.kernel(program)
+
+        def of(count: Expr, tiles: int) -> int:
+            return integer(kernel, substituted(count, {BATCH[1]: const(tiles)}))
+
+        arrays = [s for s in kernel.body if isinstance(s, Array)]
+        return {
+            "launches": [
+                {"tiles": TILES // of(each.counts[0], TILES), "lines": of(each.counts[1], 1)}
+                for each in kernel.launches
+            ],
+            "memory": {s.name: s.type.lanes * of(expr(s.sizes[0]), 1) for s in arrays},
+        }

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
@@ -62,23 +62,29 @@ HOW_TO_GET = {
 SOFTWARE = (llvmpipe.NAME, "softpipe", "swrast", "SwiftShader")
 """Renderers on the processor, by what their names contain."""
 
-SOFTWARE_SCHEDULE = "inlined"
-"""Schedule of a denoiser there: reads of weights are chains of checks and gathers, constants are not."""
+SOFTWARE_SCHEDULE = "fftpasses:32"
+"""Schedule of a denoiser there: a twelfth of the operations, and short programs, which compile in seconds."""
 
 GPU_SCHEDULE = "group:2"
 """Schedule of a denoiser on a graphics processor with compute shaders: the fastest of all on an H200."""
 
-SOFTWARE_PIXELS = 700_000
-"""Pixels of the smallest picture for which that is compiled: llvmpipe compiles a weight in 0.63 ms on one
-core, and on two cores multiplies by it in 0.96 ns with the plain kernel, in 0.04 ns with the other: 690
-thousand pixels pay for the time."""
+SOFTWARE_PIXELS = 2**14
+"""Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
+kernel computes some 25,000 pixels of the bundled network."""
+
+BATCH_TILES = 256
+"""Tiles that passes compute at once: 100 MB of the bundled network's."""
+
+ITEMS = 8
+"""Items of a group of a pass, as many as vectors of llvmpipe have lanes."""
 
 
 @dataclass(frozen=True)
 class _Prepared:
     """A kernel on the device, what it takes, and its weights or None.
 
-    A compute shader has no triangle, and the pixels (x, y) of a group's `tile`.
+    A compute shader has no triangle, and the pixels (x, y) of a group's `tile`. One in passes has a program
+    for each, and `schedule` says what is launched.
     """
 
     program: Any
@@ -86,6 +92,8 @@ class _Prepared:
     weights: Any
     interface: Interface
     tile: tuple[int, int] | None = None
+    passes: tuple[Any, ...] = ()
+    schedule: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -118,12 +126,13 @@ class OpenGLExecutor(Executor):
         with self._context:
             self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
         self.software = any(name in self.device for name in SOFTWARE)
-        if llvmpipe.NAME in self.device:
+        computes = self._context.version_code >= SHADER_VERSION
+        if llvmpipe.NAME in self.device and computes:
             self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
             self.schedule_reason = (
                 f"built-in choice for software, {self.schedule} from {self.schedule_pixels} pixels on"
             )
-        elif self._context.version_code >= SHADER_VERSION:
+        elif computes:
             self.schedule = GPU_SCHEDULE
             self.schedule_reason = "built-in choice for graphics processors"
         else:
@@ -147,7 +156,7 @@ class OpenGLExecutor(Executor):
             if is_denoiser(kernel):
                 self._check_promise(kernel)
                 self._check_loops(kernel)
-                if "group" in kernel.manifest["schedule"]:
+                if {"group", "launches"} & set(kernel.manifest["schedule"]):
                     return self._compile_compute(kernel)
                 weights = self._weights(kernel)
                 made.callback(weights.release)
@@ -175,7 +184,7 @@ class OpenGLExecutor(Executor):
             )
 
     def _discard(self, prepared: _Prepared) -> None:
-        for thing in (prepared.triangle, prepared.program, prepared.weights):
+        for thing in (prepared.triangle, prepared.program, prepared.weights, *prepared.passes):
             if thing is not None:
                 thing.release()
 
@@ -192,14 +201,31 @@ class OpenGLExecutor(Executor):
             data = artifact.weights.astype("<f4").tobytes() or bytes(16)
             weights = self._context.buffer(data)
             made.callback(weights.release)
-            try:
-                program = self._context.compute_shader(artifact.source)
-            except moderngl.Error as error:
-                raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
+            if "launches" in schedule:
+                version = f"#version {SHADER_VERSION} core\n"
+                texts = [
+                    artifact.source.replace(
+                        version, f"{version}#define STAGE {number}\n#define ITEMS {ITEMS}\n"
+                    )
+                    for number in range(len(schedule["launches"]))
+                ]
+                passes = tuple(self._compute(text, made) for text in texts)
+                made.pop_all()
+                return _Prepared(None, None, weights, artifact.interface, passes=passes, schedule=schedule)
+            program = self._compute(artifact.source, made)
             made.pop_all()
             width, height = schedule["group"]
             tile = (width * schedule["pixels"], height)
             return _Prepared(program, None, weights, artifact.interface, tile)
+
+    def _compute(self, source: str, made: ExitStack) -> Any:
+        """Return a compute shader; `made` gives it back if something fails."""
+        try:
+            program = self._context.compute_shader(source)
+        except moderngl.Error as error:
+            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
+        made.callback(program.release)
+        return program
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
@@ -276,6 +302,9 @@ class OpenGLExecutor(Executor):
         written = [arrays[array.name] for array in prepared.interface.arrays if array.access == WRITE]
         targets = [texture for memory in written for texture in memory.held]
         textures = self._named(prepared.interface, arrays)
+        if prepared.passes:
+            self._launch(prepared, textures, targets[0])
+            return
         if prepared.tile is not None:
             self._dispatch(prepared, textures, targets[0])
             return
@@ -330,6 +359,26 @@ class OpenGLExecutor(Executor):
         groups = (-(-n // size) for n, size in zip(target.size, tile, strict=True))
         prepared.program.run(*groups, 1)
         self._context.memory_barrier()
+
+    def _launch(self, prepared: _Prepared, textures: Mapping[str, Any], target: Any) -> None:
+        """Run passes for one batch of tiles after another, with memory for the largest."""
+        schedule = prepared.schedule
+        launches, across, down = schedule["launches"], schedule["pixels"], schedule["rows"]
+        whole = ITEMS * max(launch["tiles"] for launch in launches)
+        tiles = -(-target.size[0] // across) * -(-target.size[1] // down)
+        batch = -(-min(tiles, BATCH_TILES) // whole) * whole
+        with ExitStack() as made:
+            for number, count in enumerate(schedule["memory"].values()):
+                buffer = self._context.buffer(reserve=4 * count * batch)
+                made.callback(buffer.release)
+                buffer.bind_to_storage_buffer(number + 1)
+            prepared.weights.bind_to_storage_buffer(0)
+            target.bind_to_image(0, read=False, write=True)
+            for first in range(0, tiles, batch):
+                for program, launch in zip(prepared.passes, launches, strict=True):
+                    self._bind(program, textures, {"first_tile": first, "tile_count": batch})
+                    program.run(batch // (launch["tiles"] * ITEMS), launch["lines"], 1)
+                    self._context.memory_barrier()
 
     def _bind(self, program: Any, textures: Mapping[str, Any], values: Mapping[str, Any]) -> None:
         """Give a program its textures and numbers."""

@@ -38,6 +38,7 @@ SHADERS = tuple(("opengl", f"group:{pixels}") for pixels in (1, 2, 4))
 LARGEST = {
     **{way: (3, 10) for way in LADDER if way[1] == "inlined"},
     **dict.fromkeys(SHADERS, (6, 10)),
+    ("opengl", "fftpasses:32"): (20, 20),
     **{way: (20, 32) for way in LADDER if way[1] in SPECTRA},
 }
 """Largest window and layer by target and schedule: Mesa compiles two thousand weights a second, and layers in

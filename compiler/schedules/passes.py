@@ -358,10 +358,12 @@ class FourierPasses(Fourier):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
+        if reason := super().refusal(program):
+            return reason
         count = sum(a.size for key, a in weights(program).items() if key not in self.stored(program))
         if count > LARGEST_WEIGHTS:
             return f"its layers have {count} weights, of at most {LARGEST_WEIGHTS}"
-        return super().refusal(program)
+        return ""
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""

@@ -170,7 +170,7 @@ class Group(Straight):
         found: list[Statement] = [self.mapped(index, node)]
         for p, j in self.places(index):
             start = weight(self.offset(bias) // 4 + j, VECTOR) if bias else ZERO
-            found.append(Array(self.variable(index, p, j), VECTOR, value=start))
+            found.append(Array(self.variable(index, p, j), VECTOR, kept=source.op == "input", value=start))
         first = self.offset(node["weight"]) // 4
         if source.op == "input":
             return [*found, *self.of_window(index, first)]

@@ -70,7 +70,8 @@ class Inlined(Straight):
         found: list[Statement] = [self.mapped(index, node)]
         for j in range(self.vectors(index)):
             start = self.start(str(bias), j) if bias else ZERO
-            found.append(Array(self.variable(index, 0, j), VECTOR, value=start))
+            kept = self.program.nodes[node.args[0]].op == "input"
+            found.append(Array(self.variable(index, 0, j), VECTOR, kept=kept, value=start))
         if self.program.nodes[node.args[0]].op == "input":
             return [*found, *self.of_window(index, matrix)]
         for i, column in enumerate(matrix.T):

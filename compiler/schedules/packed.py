@@ -8,6 +8,7 @@ graphics processor).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +97,8 @@ class Packed(Plainly):
         v, first = f"v{index}", self.offset(node["weight"]) // 4
         start = weight(self.offset(bias) // 4 + J, VECTOR) if bias else ZERO
         starts = loop("j", count, Store(v, (J,), start))
-        found: list[Statement] = [self.mapped(index, node), self.array(index), starts]
+        sums = replace(self.array(index), kept=source.op == "input")
+        found: list[Statement] = [self.mapped(index, node), sums, starts]
         if source.op == "input":
             return [*found, *self.of_window(index, count, first)]
         whole, rest = divmod(source.type.shape[0], 4)
@@ -115,7 +117,7 @@ class Packed(Plainly):
         split, v, part = is_split(self.gather), f"v{index}", f"part{index}"
         zero = (loop("j", count, Store(part, (J,), ZERO)),) if split else ()
         add = (loop("j", count, Store(v, (J,), load(part, J, kind=VECTOR), add=True)),) if split else ()
-        found: list[Statement] = [Array(part, VECTOR, (count,))] if split else []
+        found: list[Statement] = [Array(part, VECTOR, (count,), kept=True)] if split else []
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
             inner = [

@@ -7,6 +7,7 @@ of an image [core/sums.py]; the window is an array only if something else reads 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..core.ir import Node, Program
 from ..core.sums import is_split
@@ -99,7 +100,8 @@ class Plainly(Nest):
         first, bias, source = self.offset(node["weight"]), node.get("bias"), self.program.nodes[node.args[0]]
         start = weight(self.offset(bias) + j) if bias else const(0.0)
         starts = loop("j", n_out, Store(v, (j,), start))
-        found: list[Statement] = [self.mapped(index, node), self.array(index), starts]
+        sums = replace(self.array(index), kept=source.op == "input")
+        found: list[Statement] = [self.mapped(index, node), sums, starts]
 
         def accumulated(sums: str, row: Expr) -> Statement:
             """Return the loop that adds `value` times one row of weights to all neurons' sums."""

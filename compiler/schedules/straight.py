@@ -140,7 +140,7 @@ class Straight(Nest):
 
 def variables(names: Sequence[str], value: Expr, kind: Type = VECTOR) -> list[Array]:
     """Return variables with one first value."""
-    return [Array(each, kind, value=value, register=True) for each in names]
+    return [Array(each, kind, kept=True, value=value, register=True) for each in names]
 
 
 ZERO = splat(const(0.0), 4)

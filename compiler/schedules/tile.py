@@ -316,7 +316,7 @@ class Tiled(Nest):
         block = BLOCK if blocks.count > 1 else const(0)
         at, n_in = block * blocks.vectors, source.type.shape[0]
         first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
-        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors), register=True)]
+        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors), kept=True, register=True)]
         starts = [Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
         if source.op == "input":
             products = self.windowed(blocks, first)
@@ -373,7 +373,7 @@ class Tiled(Nest):
                 part = [load("part", P, const(j), kind=self.vector) for j in each]
                 add = self.each_pixel(*(Store("sum", (P, const(j)), part[j], add=True) for j in each))
                 lines = [
-                    Array("part", self.vector, (PIXELS, blocks.vectors), register=True),
+                    Array("part", self.vector, (PIXELS, blocks.vectors), kept=True, register=True),
                     zero,
                     *lines,
                     add,

@@ -97,14 +97,14 @@ void main()
     int top = y - local_y - WINDOW_CENTRE;
 
     /* %1: affine map W0 from 12 to 5 */
-    vec4 v1_0_0 = w[24];
-    vec4 v1_0_1 = w[25];
-    vec4 v1_1_0 = w[24];
-    vec4 v1_1_1 = w[25];
-    vec4 v1_2_0 = w[24];
-    vec4 v1_2_1 = w[25];
-    vec4 v1_3_0 = w[24];
-    vec4 v1_3_1 = w[25];
+    PRECISE vec4 v1_0_0 = w[24];
+    PRECISE vec4 v1_0_1 = w[25];
+    PRECISE vec4 v1_1_0 = w[24];
+    PRECISE vec4 v1_1_1 = w[25];
+    PRECISE vec4 v1_2_0 = w[24];
+    PRECISE vec4 v1_2_1 = w[25];
+    PRECISE vec4 v1_3_0 = w[24];
+    PRECISE vec4 v1_3_1 = w[25];
     for (int i = item; i < PLANE; i += GROUP_WIDTH * GROUP_HEIGHT) {
         int tile_row = top + i / TILE_WIDTH;
         int tile_column = left + i % TILE_WIDTH;
@@ -115,14 +115,14 @@ void main()
     }
     barrier();
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-        vec4 part_0_0 = vec4(0.0f);
-        vec4 part_0_1 = vec4(0.0f);
-        vec4 part_1_0 = vec4(0.0f);
-        vec4 part_1_1 = vec4(0.0f);
-        vec4 part_2_0 = vec4(0.0f);
-        vec4 part_2_1 = vec4(0.0f);
-        vec4 part_3_0 = vec4(0.0f);
-        vec4 part_3_1 = vec4(0.0f);
+        PRECISE vec4 part_0_0 = vec4(0.0f);
+        PRECISE vec4 part_0_1 = vec4(0.0f);
+        PRECISE vec4 part_1_0 = vec4(0.0f);
+        PRECISE vec4 part_1_1 = vec4(0.0f);
+        PRECISE vec4 part_2_0 = vec4(0.0f);
+        PRECISE vec4 part_2_1 = vec4(0.0f);
+        PRECISE vec4 part_3_0 = vec4(0.0f);
+        PRECISE vec4 part_3_1 = vec4(0.0f);
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int at = (local_y + dy) * TILE_WIDTH + local_x + dx;
             int first = (dy * WINDOW_SIZE + dx) * 4;
@@ -182,14 +182,14 @@ void main()
     }
     barrier();
     for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
-        vec4 part_0_0 = vec4(0.0f);
-        vec4 part_0_1 = vec4(0.0f);
-        vec4 part_1_0 = vec4(0.0f);
-        vec4 part_1_1 = vec4(0.0f);
-        vec4 part_2_0 = vec4(0.0f);
-        vec4 part_2_1 = vec4(0.0f);
-        vec4 part_3_0 = vec4(0.0f);
-        vec4 part_3_1 = vec4(0.0f);
+        PRECISE vec4 part_0_0 = vec4(0.0f);
+        PRECISE vec4 part_0_1 = vec4(0.0f);
+        PRECISE vec4 part_1_0 = vec4(0.0f);
+        PRECISE vec4 part_1_1 = vec4(0.0f);
+        PRECISE vec4 part_2_0 = vec4(0.0f);
+        PRECISE vec4 part_2_1 = vec4(0.0f);
+        PRECISE vec4 part_3_0 = vec4(0.0f);
+        PRECISE vec4 part_3_1 = vec4(0.0f);
         for (int dx = 0; dx < WINDOW_SIZE; ++dx) {
             int at = (local_y + dy) * TILE_WIDTH + local_x + dx;
             int first = 16 + (dy * WINDOW_SIZE + dx) * 2;

@@ -49,7 +49,7 @@ void main()
     result = vec4(0.0, 0.0, 0.0, 1.0);
 
     /* %1: affine map W0 from 24 to 4 */
-    float v1[4];
+    PRECISE float v1[4];
     for (int j = 0; j < 4; ++j) {
         v1[j] = weights(96 + j);
     }

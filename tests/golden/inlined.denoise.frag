@@ -84,11 +84,11 @@ void main()
     result = vec4(0.0, 0.0, 0.0, 1.0);
 
     /* %1: affine map W0 from 12 to 5 */
-    vec4 v1_0 = vec4((-0.03125f), 0.0f, 0.25f, 0.4375f);
-    vec4 v1_1 = vec4((-0.46875f), 0.0f, 0.0f, 0.0f);
+    PRECISE vec4 v1_0 = vec4((-0.03125f), 0.0f, 0.25f, 0.4375f);
+    PRECISE vec4 v1_1 = vec4((-0.46875f), 0.0f, 0.0f, 0.0f);
     {
-        vec4 part1_0 = vec4(0.0f);
-        vec4 part1_1 = vec4(0.0f);
+        PRECISE vec4 part1_0 = vec4(0.0f);
+        PRECISE vec4 part1_1 = vec4(0.0f);
         {
             int row = clamp(y - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);
@@ -113,8 +113,8 @@ void main()
         v1_1 += part1_1;
     }
     {
-        vec4 part1_0 = vec4(0.0f);
-        vec4 part1_1 = vec4(0.0f);
+        PRECISE vec4 part1_0 = vec4(0.0f);
+        PRECISE vec4 part1_1 = vec4(0.0f);
         {
             int row = clamp(y + 1 - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);
@@ -139,8 +139,8 @@ void main()
         v1_1 += part1_1;
     }
     {
-        vec4 part1_0 = vec4(0.0f);
-        vec4 part1_1 = vec4(0.0f);
+        PRECISE vec4 part1_0 = vec4(0.0f);
+        PRECISE vec4 part1_1 = vec4(0.0f);
         {
             int row = clamp(y - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);
@@ -161,8 +161,8 @@ void main()
         v1_1 += part1_1;
     }
     {
-        vec4 part1_0 = vec4(0.0f);
-        vec4 part1_1 = vec4(0.0f);
+        PRECISE vec4 part1_0 = vec4(0.0f);
+        PRECISE vec4 part1_1 = vec4(0.0f);
         {
             int row = clamp(y + 1 - 1, 0, height - 1);
             int column = clamp(x - 1, 0, width - 1);

@@ -54,7 +54,7 @@ void main()
     result = vec4(0.0, 0.0, 0.0, 1.0);
 
     /* %1: affine map W0 from 1728 to 32 */
-    float v1[32];
+    PRECISE float v1[32];
     for (int j = 0; j < 32; ++j) {
         v1[j] = weights(55296 + j);
     }

@@ -47,7 +47,7 @@ void main()
     }
 
     /* %1: affine map W0 from 2160 to 32 */
-    float v1[32];
+    PRECISE float v1[32];
     for (int j = 0; j < 32; ++j) {
         v1[j] = weights[69120 + j];
     }

@@ -27,6 +27,7 @@ from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
 from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.kernel.instructions import REFUSED, STRAIGHT, VECTORS
 from wamnet.compiler.proof.evidence import Refused, read
 from wamnet.compiler.reading.check import run_text
 from wamnet.compiler.reading.lanes import Unread
@@ -240,6 +241,27 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
 #pragma STDC FP_CONTRACT ON
 #endif
 {CENTRE}"""),
+    ("a number beyond integers on the way", ("c", "cuda", "metal", "opencl"), "* 3 + i] =",
+        "* 3 + 2000000000 - 2000000000 + i] ="),
+    ("brackets beyond integers", ("c", "cuda", "metal", "opencl"), "v90[i];",
+        "v90[i + ((0 - 2147483647) + (2147483647 + 1)) - 1];"),
+    ("zero times what is no integer", ("c", "cuda", "metal", "opencl"), "v90[i];",
+        "v90[i + 0 * (2147483647 + i)];"),
+    ("a coordinate that wraps", ("c", "cuda", "metal", "opencl"), "x + dx -", "x * 30 - x * 29 + dx -"),
+    ("a value that changes", ("wgsl",), "let t16: f32 = t13 - t15;",
+        "let t16: f32 = t13;\n        t16 = t13 - t15;"),
+    ("undeclared vectors of weights", ("c", "cuda", "metal", "opencl", "wgsl"), "weights[", "w[0 + "),
+    ("an undeclared array of weights", ("glsl-es", "opengl"), TAP, f"float q = weights[0]; {TAP}"),
+    ("an array of arrays", ("glsl-es", "opengl"), "PRECISE float p",
+        "PRECISE float q[1][1]; PRECISE float p"),
+    ("a mix of integers", ("glsl-es", "opengl"), TAP, f"{TAP}0 * mix(0, 1, true) + "),
+    ("two blocks of one name", ("glsl-vulkan",), "Image_normal {", "Image_color {"),
+    ("a message of another schedule", ("c",), "\n/* No product may", f"\n{REFUSED}\n/* No product may"),
+    ("vectors of no size", ("c",), "static inline void wa", f"{STRAIGHT}\n{VECTORS}static inline void wa"),
+    ("a picture of another kernel", ("opengl",),
+        "    for (int i = 0; i < 3; ++i) {\n        result[i] = v90[i];\n    }",
+        "vec4 color = vec4(0.0, 0.0, 0.0, 1.0);\ncolor[0] = v90[0]; color[1] = v90[1]; color[2] = v90[2];\n"
+        "imageStore(result, ivec2(x, y), color);"),
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""
 
@@ -273,6 +295,24 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a component of a colour", "cuda group:1 full", "v90_0_0.x;", "v90_0_0.r;"),
     ("a pragma of no loop", "c tile:8 full", "    int top = y", "    WAMNET_UNROLL int top = y"),
     ("a row of an array by another", "c tile:8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
+    ("sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 part_0_0", "vec4 part_0_0"),
+    ("sums of sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 v1_0_0", "vec4 v1_0_0"),
+    ("a name of a type", "opencl dot:16 whole8", "int16 sum[", "int16 sums[1]; int16 sum["),
+    ("an address of another vector", "c dot:16 whole8", "wamnet_weights(&w0", "wamnet_start(&w0"),
+    ("a comparison that vectors lack", "glsl-vulkan group:1 full", "    barrier();",
+        "    bvec4 q = w[0] < w[0]; barrier();"),
+    ("a minimum of a number and a vector", "glsl-vulkan group:1 full", "    barrier();",
+        "    PRECISE vec4 q = min(1.0f, w[0]); barrier();"),
+    ("a number of a vector", "glsl-vulkan group:1 full", "    barrier();",
+        "    vec4 q = float(w[0]); barrier();"),
+    ("a choice of a number or a vector", "wgsl group:1 full", "    workgroupBarrier();",
+        "    let q: vec4<f32> = select(0.0f, w[0], w[0] > w[0]); workgroupBarrier();"),
+    ("a maximum of a vector and a number", "wgsl group:1 full", "    workgroupBarrier();",
+        "    let q: vec4<f32> = max(w[0], 0.0f); workgroupBarrier();"),
+    ("a vector of a number", "opencl group:1 full", "x0_0 = tile[at]", "x0_0 = convert_float4(tile[at])"),
+    ("bits of a part of a vector", "opencl group:1 full", "as_float4(as_int4(v1)", "as_float2(as_int2(v1)"),
+    ("another vector by a cast", "opencl dot:16 whole8", "CONVERT(sum[p][0], float16)",
+        "(float16)(sum[p][0])"),
 )  # fmt: skip
 """What a fault is, in which language, schedule and variant, and what it puts instead of what."""
 
@@ -301,7 +341,9 @@ def faults(source: str) -> Iterator[Fault]:
         place = m.start(), m.end()
         if m["number"] or m["name"] or m["operator"]:
             words += 1
-            yield Fault(m.start(), m.start(), FOREIGN[words % len(FOREIGN)] + " ", "a foreign word")
+            foreign = FOREIGN[words % len(FOREIGN)]
+            if (foreign, m["number"]) != ("-", "0"):  # the same number
+                yield Fault(m.start(), m.start(), foreign + " ", "a foreign word")
         if m["number"]:
             yield from (Fault(*place, new, kind) for new, kind in numbers(m["number"]))
         elif m["name"] in NAMES:

@@ -470,5 +470,7 @@ def substituted(value: Expr, known: Mapping[str, Expr]) -> Expr:
         return value
     args = tuple(substituted(each, known) for each in value.args)
     if value.op in INTEGERS and value.type == INT:
-        return apply(value.op, *args)
+        found = apply(value.op, *args)
+        if found.op != "const" or all(each.op == "const" for each in args):
+            return found  # else 0 times what may be no integer of 32 bits
     return replace(value, args=args)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS
 from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name
-from .canonical import terms
-from .grammar import BINARY, PRODUCTS
+from .canonical import terms, total
+from .grammar import BINARY, COMPARED, PRODUCTS, SHIFTS
 from .reader import Reader, Unread
 
 
@@ -19,14 +19,28 @@ class Expressions(Reader):
     """Reads an expression: `_expression()`."""
 
     def _made(self, what: str, *args: Expr, value: Any = None) -> Expr:
-        """Return an operation; a single value among vectors fills all lanes."""
-        lanes = max((each.type.lanes for each in args), default=1)
-        if not (what == "select" and args[0].type.lanes == 1):
+        """Return an operation; a single value among vectors fills all lanes where the language lets it."""
+        lanes, dtype = max(each.type.lanes for each in args), args[-1].type.dtype
+        if lanes > 1 and not self._takes_lanes(what, *(each.type.lanes for each in args)):
+            raise Unread(f"{what} of vectors and single values, or of vectors, which has no such form")
+        if what != "select":
             args = tuple(Expr("splat", (a,), a.type.of(lanes)) if a.type.lanes < lanes else a for a in args)
-        dtype = args[-1].type.dtype
         if what.startswith(("less", "greater", "equal", "not_", "logical")):
             dtype = "bool"
         return Expr(what, args, Type(value if what == "convert" else dtype, lanes), value)
+
+    def _takes_lanes(self, what: str, first: int, *rest: int) -> bool:
+        """Return whether an operation takes operands of so many lanes, one of them a vector."""
+        language, alike = self.language, {first, *rest} == {first}
+        if what.startswith("logical"):
+            return language.casts
+        if what == "select":
+            return rest[0] == rest[1] and first in (1, rest[0])
+        if what in ("minimum", "maximum", "clamp"):
+            splats = "float16" in language.types or not (language.casts or language.lets)
+            return alike or (splats and first > 1 and {*rest} == {1})
+        signs = BINARY if language.casts else BINARY[PRODUCTS - 1 :]
+        return alike or (what != "remainder" and any(what in level.values() for level in signs))
 
     def _expression(self) -> Expr:
         """Read an expression."""
@@ -35,6 +49,8 @@ class Expressions(Reader):
             return condition
         chosen = self._expression()
         self._check_vectors("?", chosen)
+        if condition.type.lanes > 1 and not self.language.casts:
+            raise Unread("a vector of conditions in front of ?")
         self._take(":")
         return self._made("select", condition, chosen, self._expression())
 
@@ -49,6 +65,10 @@ class Expressions(Reader):
             other = self._binary(level + 1)
             product = sign == "*" and value.type.lanes > 1 and other.type == FLOAT and not self.by_calls
             self._check_vectors(sign, *(() if product else (value, other)))
+            if sign == "+" and other.type == INT and other.op in ("add", "subtract"):
+                raise Unread("a sum of integers in brackets behind +, which is made first")
+            if value.type.lanes > 1 and level < SHIFTS and not self.language.casts and not self.language.lets:
+                raise Unread(f"{sign} of vectors, which have none")
             value = self._made(BINARY[level][sign], value, other)
             if self.language.lets and not binds(sign, first, self.operator):
                 raise Unread(f"an operand of {sign} without brackets")
@@ -81,13 +101,19 @@ class Expressions(Reader):
             if kind.lanes > 1:
                 self._take("(")
                 return self._filled_lanes(kind, self._arguments())
-            return self._made("convert", self._unary(), value=kind.dtype)
+            return self._number(kind, self._unary())
         return self._primary()
 
+    def _number(self, kind: Type, value: Expr) -> Expr:
+        """Return a value as one of another kind, of as many lanes."""
+        if value.type.lanes != kind.lanes:
+            raise Unread(f"{value.type} as {kind}")
+        return self._made("convert", value, value=kind.dtype)
+
     def _filled_lanes(self, kind: Type, values: list[Expr]) -> Expr:
-        """Return a vector of values, or of one in all lanes."""
-        if [value.type.lanes for value in values] == [kind.lanes]:
-            return self._made("convert", *values, value=kind.dtype)
+        """Return a vector of values, or of one in all lanes; no cast makes a vector of another one."""
+        if [value.type.lanes for value in values] == [kind.lanes] and not self.language.casts:
+            return self._number(kind, *values)
         if len(values) not in (1, kind.lanes):
             raise Unread(f"{len(values)} values of {kind.lanes} lanes")
         return Expr("splat" if len(values) == 1 else "stack", tuple(values), kind)
@@ -152,22 +178,32 @@ class Expressions(Reader):
             result = self.functions[word].result
             return Expr("call", tuple(values), result.type if result else FLOAT, word)
         if word in self.types and not language.casts and len(values) == 1:
-            return self._made("convert", *values, value=self.types[word].dtype)
+            return self._number(self.types[word], *values)
         if word == ("select" if language.lets else "mix") and not language.casts and len(values) == 3:
-            return self._made("select", values[2], values[1], values[0])
+            return self._mixed(*values)
         if word not in language.calls:
             raise Unread(f"{word} is not a function of the language's list")
         operation = language.calls[word]
         if operation in ("pack4", "bits"):
             return Expr(operation, tuple(values), INT if operation == "pack4" else FLOAT.of(4))
-        if operation != "convert":
-            self._check_vectors(word, *values)
+        if operation == "convert":
+            return self._number(FLOAT.of(4), *values)
+        self._check_vectors(word, *values)
         if word.startswith("f") and any(value.type.dtype != "float32" for value in values):
             raise Unread(f"{word} of integers")
-        return self._made(operation, *values, value="float32" if operation == "convert" else None)
+        return self._made(operation, *values)
+
+    def _mixed(self, no: Expr, yes: Expr, where: Expr) -> Expr:
+        """Return one of two values; GLSL takes a truth for each lane, in fragment shaders floats only."""
+        lanes, language = where.type.lanes, self.language
+        if not language.lets and (lanes != no.type.lanes or (language.texels and no.type.dtype != "float32")):
+            raise Unread(f"mix of {no.type}")
+        return self._made("select", where, yes, no)
 
     def _check_vectors(self, word: str, *values: Expr) -> None:
         """Refuse vectors where the language has only functions for them, or operators of few."""
+        if word in COMPARED and values[0].type.lanes == 1:
+            raise Unread(f"{word} of single values")
         bare = self.by_calls or not self.language.operators
         if bare and any(value.type.lanes > 1 for value in values):
             raise Unread(f"{word} of vectors, which have none")
@@ -178,7 +214,7 @@ class Expressions(Reader):
         if lanes != word and self._has(f"as_int{lanes}", "("):
             value = self._expression()
             self._take(")", "&", "0x7fffffff", ")")
-            return self._made("absolute", value)
+            return self._made("absolute", self._of(value, self._kind(f"float{lanes}"), word))
         value = self._expression()
         if lanes != word:
             self._take(")")
@@ -187,7 +223,9 @@ class Expressions(Reader):
             word.removeprefix("convert_") if word != "CONVERT" else self._take(",") and self._take()
         )
         self._take(")")
-        return self._made("convert", value, value=kind.dtype)
+        if word == "CONVERT" and kind.lanes == 1:
+            raise Unread("CONVERT of single values")
+        return self._number(kind, value)
 
     def _texel(self) -> Expr:
         """Read a channel of a texture's pixel."""
@@ -266,26 +304,20 @@ class Expressions(Reader):
 
     def _pixel(self, image: str, place: Expr) -> Expr:
         """Return an element: `(row * width + column) * channels + c`."""
-        first, *rest = terms(place)
-        if first[0].op != "multiply" or not rest or rest[0][1] < 0:
+        first, *index = terms(place)
+        if first[0].op != "multiply" or [sign for _, sign in index] != [1]:
             raise Unread(f"a place in {image} of another form")
         pixel, channels = first[0].args
-        index = rest[0][0]
-        for value, sign in rest[1:]:
-            index = Expr("add" if sign > 0 else "subtract", (index, value), INT)
         if channels.op != "const" or self.channels.setdefault(image, channels.value) != channels.value:
             raise Unread(f"{image} has two numbers of channels")
         (row, _), *columns = terms(pixel)
         if row.op != "multiply" or row.args[1] != name("width"):
             raise Unread(f"a place in {image} without its row")
-        if not columns:
+        if [sign for _, sign in columns] not in ([1], [1, 1]):
             raise Unread(f"a place in {image} without its column")
-        column = columns[0][0]
-        if columns[0][1] < 0:
-            raise Unread(f"a place in {image} left of its row")
-        for value, sign in columns[1:]:
-            column = Expr("add" if sign > 0 else "subtract", (column, value), INT)
-        return load(image, row.args[0], column, index)
+        if len(columns) > 1 and columns[0][0] != name("x"):
+            raise Unread(f"a place in {image} with two columns")
+        return load(image, row.args[0], total(columns), index[0][0])
 
     def _sizes(self) -> list[Expr]:
         """Read the sizes of an array."""
@@ -306,8 +338,9 @@ class Expressions(Reader):
     def _vector(self) -> Expr:
         """Read the address of a vector: `&name[...]`, or `name + index * LANES`."""
         if self._has("&"):
+            self.pointer = self.scope.words.get(self._now(), "")
             return self._postfix(self._take())
-        array = self._take()
+        array, self.pointer = self._take(), "float"
         self._take("+")
         place = self._binary(PRODUCTS)
         if place.op != "multiply" or place.args[1] != name("LANES"):

@@ -42,7 +42,7 @@ OPEN: Mapping[str, str] = {
     "images": r"(?P=images)",
     "given": r"(?P<given>(?:image_\w+, )+)",
     "first": r"(?P<first>image_\w+)", "same_first": r"(?P=first)",
-    "group": r"(?P<grouped>)", "words": r"(?P<words>)",
+    "group": r"(?P<grouped>)", "words": r"(?P<words>)", "gnu": r"(?P<gnu>)", "tiled": r"(?P<tiled>)",
     "bounded": r"(?P<bounded>)",
     "column": r"(?P<column>x|tile_x)", "row": r"(?P<row>y|tile_y)",
     "x": r"(?P=column)", "y": r"(?P=row)",
@@ -59,16 +59,9 @@ OPEN: Mapping[str, str] = {
 """The open places by name; `@each LINE@` are lines, one for each image."""
 
 BLOCKS = (
-    "constants",
-    "wgsl_constants",
-    "functions",
-    "undefined",
-    "images",
-    "body",
-    "bounded",
-    "words",
-    *"(|)<>",
-)
+    "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
+    "tiled", *"(|)<>",
+)  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
 GUARD = """if (@x@ >= width || @y@ >= height) {
@@ -180,19 +173,20 @@ FRAMES: dict[str, str] = {
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
 @)@
-@(@{REFUSED}
+@(@@gnu@{REFUSED}
 @)@
 @<@{UNFUSED}
 @|@{FUSED}
 @>@
-@(@{STRAIGHT}
+@(@@gnu@{STRAIGHT}
 {gnu_vectors("@lanes@")}
 @)@
 @constants@
 @functions@
-@(@{STRAIGHT}
+@(@@tiled@{STRAIGHT}
 {VECTORS}
 @|@@words@
+@tiled@
 {STRAIGHT}
 {C_TILE}
 @)@
@@ -452,7 +446,7 @@ def frame(target: str) -> re.Pattern[str]:
 def parts_of(match: re.Match[str]) -> dict[str, str] | None:
     """Return what stands in the open places, by name; nothing of half a kernel of groups, or of bytes."""
     texts = [(name.rstrip("0123456789"), text) for name, text in match.groupdict().items()]
-    for together in (("grouped", "shared"), ("words",)):
+    for together in (("grouped", "shared"), ("words",), ("gnu",)):
         if len({text is None for name, text in texts if name in together}) > 1:
             return None
     return {name: text for name, text in texts if text is not None}

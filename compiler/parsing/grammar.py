@@ -28,6 +28,9 @@ BINARY: tuple[Mapping[str, str], ...] = (
 PRODUCTS = len(BINARY) - 1
 """The level of products."""
 
+SHIFTS = PRODUCTS - 2
+"""The level of shifts: only operators from here on are of vectors in every language that has any."""
+
 COMMON = {"floor": "floor", "sqrt": "sqrt", "exp": "exp", "sin": "sin", "cos": "cos"}
 """Functions that most languages name as the operations."""
 
@@ -38,6 +41,12 @@ C_CALLS = {f"{word}f": op for word, op in COMMON.items()} | {
     "powf": "power", "fabsf": "absolute", "wamnet_clamp": "clamp",
 }  # fmt: skip
 """Functions of C and CUDA."""
+
+OPENCL_CALLS = {
+    "fabs": "absolute", "fmin": "minimum", "fmax": "maximum", "clamp": "clamp", "FLOOR": "floor",
+    "exp2": "exp2", "log2": "log2",
+}  # fmt: skip
+"""Further functions of OpenCL C."""
 
 LEAST_MOST = {"min": "minimum", "max": "maximum"}
 """Functions of integers."""
@@ -107,15 +116,7 @@ LANGUAGES: Mapping[str, Language] = {
     ),
     "opencl": Language(
         {**C_TYPES, **VECTORS, "uint": Type("uint32"), "uchar": BYTE},
-        {
-            **COMMON,
-            "fabs": "absolute",
-            "fmin": "minimum",
-            "fmax": "maximum",
-            "clamp": "clamp",
-            "FLOOR": "floor",
-        }
-        | {**LEAST_MOST, "exp2": "exp2", "log2": "log2", **DOTS},
+        {**COMMON, **LEAST_MOST, **DOTS, **OPENCL_CALLS},
         "barrier(CLK_LOCAL_MEM_FENCE)",
     ),
     "cuda": Language(
@@ -168,14 +169,9 @@ FUNCTION = re.compile(r"elementwise_\d+(_of_one)?|forward|backward")
 """The names of functions."""
 
 CALLS = {
-    "clear": 0,
-    "load": 1,
-    "store": 1,
-    "start": 1,
-    "weights": 1,
-    "floats": 1,
-    "add": 1,
-    "add_product": 1,
-    "dot": 1,
-}
-"""C's functions on vectors, and how many vectors they take beside the one that they set."""
+    "clear": "wamnet_vector", "load": "wamnet_vector float", "store": "float wamnet_vector",
+    "start": "wamnet_sums float", "weights": "wamnet_bytes float", "floats": "float wamnet_sums",
+    "add": "wamnet_vector wamnet_vector", "add_product": "wamnet_vector wamnet_vector",
+    "dot": "wamnet_sums wamnet_bytes",
+}  # fmt: skip
+"""C's functions on vectors, and what they take the addresses of: first the vector that they set."""

@@ -54,12 +54,8 @@ from .reader import Unread as Unread
 
 Space = Literal["item", "group"]
 
-PATCH = "patch_"
-"""What the names of arrays begin with that hold pixels: no sum goes into them [`Parser._assignment`]."""
-
-LAYER = re.compile(r"v\d+")
-"""Arrays of values that a layer has made: what goes into them has been rounded before."""
-
+LAYER = re.compile(r"v\d+(_\d+)*")
+"""Sums of a layer: products with weights, which may be added in any order [PRO-6b]."""
 
 STRANGE = re.compile(r"//|\\(?!\n *[^\s/])")
 """A comment up to the end of a line, and a backslash that no line follows."""
@@ -67,7 +63,7 @@ STRANGE = re.compile(r"//|\\(?!\n *[^\s/])")
 DEEPEST = 60
 """Most blocks in each other: WGSL's compilers take 127."""
 
-WORD = re.compile(r"\b(?:wamnet_\w+|DOT|FLOOR|CONVERT|WAMNET_\w+)\b")
+WORD = re.compile(r"(?<!\.)\b(?:wamnet_\w+|DOT|FLOOR|CONVERT|WAMNET_\w+|w|weights)\b(?:(?<=weights)\()?")
 """What the frame of a source defines, where its statements use it."""
 
 NESTED = re.compile(r"(?<=.)/\*|\\", re.S)
@@ -103,7 +99,7 @@ def parse(
     if (
         re.search(r"(?m)^.+#pragma|#pragma (?!unroll$)", own)
         or (language != "opencl" and "#pragma" in own)
-        or (language != "opengl" and "imageStore" in own)
+        or ((language != "opengl" or "shared" not in parts) and "imageStore" in own)
     ):
         raise Unread(f"a word that {language} does not have")
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
@@ -138,15 +134,16 @@ class Parser(Expressions):
         known = {each.name: each.value for each in constants}
         if set(re.findall(r"#undef (\w+)", parts.get("undefined", ""))) - {*known}:
             raise Unread("an #undef of what is not a constant of this source")
+        if "tiled" in parts and "LANES" not in known:
+            raise Unread("vectors of no stated lanes")
         self._vectors(known.get("LANES"))
         self._read(parts.get("functions", ""))
         while self._now():
             self._function()
         shared: tuple[Statement, ...] = ()
         if "shared" in parts:
-            shared = (
-                self._array("tile", self.types[parts["shared"]], [name("TILE_NUMBERS")], space="group"),
-            )
+            kind = self.types[parts["shared"]]
+            shared = (self._array("tile", kind, [name("TILE_NUMBERS")], "var", space="group"),)
         self._read(parts.get("body", ""))
         body = (*shared, *self._body(end=""))
         missing = [key for key in (*images, RESULT) if key not in self.channels]
@@ -254,6 +251,9 @@ class Parser(Expressions):
         listed = given is None or given == "".join(f"{image}, " for image in images)
         if numbers not in ([], [*range(3, 3 + len(images))]) or len(set(images)) < len(images) or not listed:
             raise Unread("images in two orders, or with other numbers")
+        blocks = re.findall(r"\bImage_\w+", text)
+        if blocks and blocks != [f"I{image[1:]}" for image in images]:
+            raise Unread("blocks of other names than their images")
         if (first := self.parts.get("first")) and first != images[0]:
             raise Unread(f"a size of {first}, which is not the first image")
         return images
@@ -281,7 +281,7 @@ class Parser(Expressions):
     def _body(self, end: str = "}") -> Body:
         """Read statements up to a brace, or to the end; their names end there."""
         outer = self.scope
-        self.scope = Scope(dict(outer.values), dict(outer.arrays))
+        self.scope = outer.inner()
         self.depth += 1
         if self.depth > DEEPEST:
             raise Unread(f"more than {DEEPEST} blocks in each other")
@@ -325,6 +325,7 @@ class Parser(Expressions):
         values: list[Expr] = []
         while self._has("color", "[", str(len(values)), "]", "="):
             values.append(self._expression())
+            self._check_order("color", values[-1], "")
             self._take(";")
         self._take("imageStore", "(", RESULT, ",", "ivec2", "(")
         column = self._expression()
@@ -342,7 +343,7 @@ class Parser(Expressions):
         self._take("=")
         start = self._expression()
         outer = self.scope
-        self.scope = Scope({**outer.values, counter: INT}, dict(outer.arrays))
+        self.scope = outer.inner(counter)
         self._take(";")
         condition, until = self._expression(), None
         if condition.op == "logical_and":
@@ -372,51 +373,59 @@ class Parser(Expressions):
             if qualified:
                 raise Unread(f"{self.language.qualifier} without a declaration")
             return None
-        kind = self.types[self._take()]
-        key = self._word()
-        sizes = self._sizes()
+        word = self._take()
+        kind, key = self.types[word], self._word()
+        sizes, word = self._sizes(), self.language.qualifier if qualified else word
         if not sizes and self._has(";"):  # a vector of C, which a call sets
-            return self._filled(key, kind)
+            return self._filled(key, kind, word)
         if sizes or self._now() == ";":
-            if sizes and not LAYER.fullmatch(key) and not key.startswith(PATCH):
-                self._check_order(key, kind, qualified)
-            return self._array(key, kind, sizes)
+            return self._array(key, kind, sizes, word)
         self._take("=")
         value = self._of(self._expression(), kind, key)
-        if rounds(value):
-            self._check_order(key, kind, qualified)
-        self.scope.values[key] = value.type
+        self._check_order(key, value, word)
+        word = WEIGHTS if re.fullmatch(r"m|w\d+", key) and self._is_weight(value) else word
+        self.scope.declare(key, value.type, word)
         return Let(key, value)
 
-    def _check_order(self, key: str, kind: Type, qualified: bool) -> None:
-        """Refuse a number of which GLSL may change the order of operations."""
-        if self.bounded and self.language.qualifier and kind == FLOAT and not qualified:
-            raise Unread(f"{key} is not declared {self.language.qualifier}")
+    def _check_order(self, key: str, value: Expr, word: str, add: bool = False) -> None:
+        """Refuse a sum, or another value, of which GLSL may change the order of operations."""
+        qualifier = self.bounded and self.language.qualifier
+        if qualifier and word != qualifier and value.type.dtype == "float32" and (add or rounds(value)):
+            raise Unread(f"{key} is not declared {qualifier}")
+
+    def _is_weight(self, value: Expr) -> bool:
+        """Return whether a value is of the weights, whose products are added in any order [PRO-6b]."""
+        if value.op == "stack" and len(set(value.args)) > 1:  # a column of weights in the source itself
+            return {each.op for each in value.args} <= {"const", "negative"}
+        if value.op == "name":
+            return self.scope.words.get(value.value) == WEIGHTS
+        return value.op == "load" and value.value == WEIGHTS
 
     def _array(
-        self, key: str, kind: Type, sizes: list[Expr], mixed: bool = False, space: Space = "item"
+        self, key: str, kind: Type, sizes: list[Expr], word: str, mixed: bool = False, space: Space = "item"
     ) -> Array:
         """Return an array; in C one of floats of LANES times a count holds vectors."""
         if self.in_floats and len(sizes) == 1 and kind == FLOAT:
             size = sizes[0]
             if size.op == "multiply" and size.args[1] == name("LANES"):
                 kind, sizes, mixed = self.types["wamnet_vector"], [size.args[0]], True
-        self.scope.arrays[key] = (kind, len(sizes), mixed)
-        self.scope.values.pop(key, None)
+        if len(sizes) > 1 and self.language.texels and "shared" not in self.parts:
+            raise Unread("an array of arrays")
+        self.scope.declare(key, kind, word)
+        self.scope.arrays[key] = (self.scope.values.pop(key), len(sizes), mixed)
         return Array(key, kind, tuple(sizes), space)
 
-    def _filled(self, key: str, kind: Type) -> Statement:
+    def _filled(self, key: str, kind: Type, word: str) -> Statement:
         """Read the call that sets a vector of C, or return a variable without a first value."""
         self.at -= 1
         if kind.lanes == 1:
-            return self._array(key, kind, [])
+            return self._array(key, kind, [], word)
         self._take(";")
-        self.scope.arrays[key] = (kind, 0, False)
+        self._array(key, kind, [], word)
         statement = self._vector_call()
         if not isinstance(statement, Store) or statement.array != key or statement.add:
             raise Unread(f"{key} is not set where it is declared")
-        del self.scope.arrays[key]
-        self.scope.values[key] = kind
+        self.scope.declare(key, kind, word)
         return Let(key, statement.value)
 
     def _union(self) -> Array:
@@ -429,24 +438,24 @@ class Parser(Expressions):
         self._take("]", ";", "}")
         if numbers != self._made("multiply", count, const(vector.lanes)):
             raise Unread("a union of two sizes")
-        return self._array(self._word(), vector, [count], True)
+        return self._array(self._word(), vector, [count], "union", True)
 
     def _declaration_of_wgsl(self) -> Statement | None:
         """Read a declaration of WGSL, if there is one."""
         if self._now() not in ("let", "var"):
             return None
-        fixed = self._take() == "let"
-        key = self._word()
+        word = self._take()
+        fixed, key = word == "let", self._word()
         self._take(":")
         sizes: list[Expr] = []
         kind = self._sized(sizes)
         if self._has("="):
             value = self._of(self._expression(), kind, key)
-            self.scope.values[key] = kind
+            self.scope.declare(key, kind, word)
             return Let(key, value) if fixed else Array(key, kind, value=value)
         if fixed:
             raise Unread(f"{key} has no value")
-        return self._array(key, kind, sizes)
+        return self._array(key, kind, sizes, word)
 
     def _sized(self, sizes: list[Expr]) -> Type:
         """Read a type of WGSL, and collect the sizes of an array."""
@@ -471,14 +480,18 @@ class Parser(Expressions):
             target = Expr("load", (), target.type, target.value)
         if target.op != "load" or target.value == WEIGHTS or target.value.startswith(IMAGE):
             raise Unread("an assignment to no element")
+        word = self.scope.words.get(target.value, "")
+        if word == WEIGHTS or (self.language.lets and word != "var" and target.value != RESULT):
+            raise Unread(f"an assignment to {target.value}, which never changes")
         if sign == "=" and (self._has("DOT", "(") or self._has("wamnet_dots", "(")):
             return Store(target.value, target.args, self._dot(target), True)
         value = self._expression()
         if target.type == BYTE and value.op == "const":
             value = const(value.value, BYTE)
         value = self._of(value, target.type, target.value)
-        if target.value.startswith(PATCH) and (sign != "=" or rounds(value)):
-            self._check_order(target.value, target.type, qualified=False)
+        product = sign == "+=" and value.op == "multiply" and any(map(self._is_weight, value.args))
+        if not (product and LAYER.fullmatch(target.value)):
+            self._check_order(target.value, value, word, sign != "=")
         if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
             self._check_vectors(sign, value)
         value = self._made("negative", value) if sign == "-=" else value
@@ -550,12 +563,13 @@ class Parser(Expressions):
         target = self._vector()
         if target.op != "load":
             raise Unread("a call that sets a value which never changes")
-        add = call in ("add", "add_product", "dot")
+        add, pointers = call in ("add", "add_product", "dot"), [self.pointer]
         vectors: list[Expr] = []
-        while call in CALLS and len(vectors) < CALLS[call] and self._has(","):
+        while len(pointers) < len(CALLS.get(call, "").split()) and self._has(","):
             vectors.append(self._vector())
-        if call not in CALLS or len(vectors) != CALLS[call]:
-            raise Unread(f"wamnet_{call} of {len(vectors)} values")
+            pointers.append(self.pointer)
+        if pointers != CALLS.get(call, "").split():
+            raise Unread(f"wamnet_{call} of {', '.join(pointers)}")
         if call == "clear":
             value = Expr("splat", (const(0.0),), target.type)
         elif call == "add_product":

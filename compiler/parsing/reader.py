@@ -17,10 +17,26 @@ class Unread(Exception):
 
 @dataclass
 class Scope:
-    """The names of values and of arrays: their types, numbers of indices, whether components are read too."""
+    """The names of values and of arrays: their types, numbers of indices, whether components are read too.
+
+    `words`: what each was declared with: a type, GLSL's qualifier, `let` or `var`.
+    """
 
     values: dict[str, Type] = field(default_factory=dict)
     arrays: dict[str, tuple[Type, int, bool]] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
+
+    def inner(self, *counters: str) -> Scope:
+        """Return the names at the beginning of a block, or of a loop with a counter."""
+        scope = Scope(dict(self.values), dict(self.arrays), dict(self.words))
+        for counter in counters:
+            scope.declare(counter, INT, "")
+        return scope
+
+    def declare(self, key: str, kind: Type, word: str) -> None:
+        """Note a value."""
+        self.values[key], self.words[key] = kind, word
+        self.arrays.pop(key, None)
 
 
 class Reader:
@@ -40,7 +56,7 @@ class Reader:
         self.by_calls = self.in_floats = self.bounded = False
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []
-        self.at, self.depth, self.operator = 0, 0, ""
+        self.at, self.depth, self.operator, self.pointer = 0, 0, "", ""
 
     def _read(self, text: str) -> None:
         """Begin to read the tokens of a text."""
@@ -80,7 +96,8 @@ class Reader:
         """Take the name of a value: one of the closed list, or of a layer."""
         word = self._take()
         layer = re.search(rf"\b{IMAGE}{re.escape(word.removeprefix('patch_'))}\b", self.parts["images"])
-        if not (NAME.fullmatch(word) or FUNCTION.fullmatch(word) or layer) or word == "w":
+        taken = ("w", "sums") if self.vector.dtype == "int32" else ("w",)  # `sums`: a type of bytes' kernels
+        if not (NAME.fullmatch(word) or FUNCTION.fullmatch(word) or layer) or word in taken:
             raise Unread(f"{word!r} is not a name of a value")
         return word
 

@@ -175,7 +175,9 @@ class Machine(Runner):
             value = literal(value, kind.dtype)
         if isinstance(memory, Result):
             row, column, channel = index
-            if type(channel) is not int or not 0 <= channel < memory.channels:
+            rows = plus(row, self.lanes.constant(0)).values
+            outside = ((rows < 0) | (rows >= self.names["height"].values)) & self.running
+            if type(channel) is not int or not 0 <= channel < memory.channels or outside.any():
                 raise Wrong("it writes a result that is not its own")
             at = times(plus(times(row, self.names["width"]), column), memory.channels)
             memory.store(self._whole(plus(at, channel)), 1, value, self)
@@ -283,8 +285,11 @@ class Machine(Runner):
         if type(value) is int:
             if not -(2**31) <= value < 2**31:
                 raise Wrong(f"{value} is no integer of 32 bits")
-        elif isinstance(value, Place) and (np.abs(value.values) > self.lanes.most)[self.running].any():
-            raise Wrong("an integer is larger than an index of an image")
+        elif isinstance(value, Place):
+            if (np.abs(value.values) > self.lanes.most)[self.running].any():
+                raise Wrong("an integer is larger than an index of an image")
+            if (np.abs(value.form) > self.lanes.channels).any():
+                raise Wrong("a coordinate is multiplied by more than the channels of an image")
         return value
 
     def _whole_compared(self, what: str, a: Any, b: Any) -> Any:

@@ -146,7 +146,8 @@ class Image:
         """Return numbers of it: of a row, a column, and a channel or what lies behind."""
         row, column, *behind = index
         channel = behind[0] if behind else 0
-        if machine.texels and not (type(channel) is int and 0 <= channel <= self.channels - kind.lanes):
+        most = self.channels - kind.lanes if machine.texels else 2**31
+        if type(channel) is not int or not 0 <= channel <= most:
             raise Wrong(f"image {self.name} has no channel {channel}")
         at = plus(times(column, self.channels), channel)
         width, height = self.size

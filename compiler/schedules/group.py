@@ -141,11 +141,7 @@ class Group(Straight):
             Let("left", X - LOCAL_X - self.column),
             Let("top", Y - LOCAL_Y - self.row),
         ]
-        for nodes in self.groups:
-            node = self.program.nodes[nodes[0]]
-            if node.op != "input":
-                body += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
-        body.append(self.output_comment())
+        body += [*self.all_groups(), self.output_comment()]
         for p in range(self.pixels):
             column = X + const(p) * GROUP_WIDTH
             inside = (column < WIDTH) & (Y < HEIGHT)

@@ -50,12 +50,7 @@ class Inlined(Straight):
     def built(self) -> Kernel:
         """Return the kernel."""
         constants = self.window()
-        body: list[Statement] = []
-        for nodes in self.groups:
-            node = self.program.nodes[nodes[0]]
-            if node.op != "input":
-                body += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
-        body += [self.output_comment(), self.written(Y, X, 0)]
+        body = [*self.all_groups(), self.output_comment(), self.written(Y, X, 0)]
         return self.kernel(body, constants, functions=tuple(self.functions()))
 
     def parameter(self, node: Node, vector: int) -> Expr:

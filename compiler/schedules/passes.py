@@ -67,6 +67,9 @@ TILES, IMAGES = 4, 8
 COMPLEX = FLOAT.of(2)
 """A complex number in memory of the device."""
 
+Path = tuple[str, Expr, Expr]
+"""A line of an array: its name, the first place, and how far places are apart."""
+
 FIRST_TILE, TILE_COUNT = map(name, BATCH)
 ACROSS, ITEM, PAIR, K, F, G = map(name, ("across", "line", "pair", "k", "f", "g"))
 FREQUENCIES, MIRRORED, BLOCK = map(name, ("FREQUENCIES", "MIRRORED", "BLOCK"))
@@ -118,12 +121,14 @@ class Passes(Inlined):
             ("rows", spectrum), ("columns", spectrum), ("products", back),
             ("back", images * OUT * POINTS), ("sums", images * OUT * OUT),
         ]  # fmt: skip
+        own, kept = (ITEM // POINTS * (lines * POINTS) + ITEM % POINTS for lines in (POINTS, OUT))
+        row = ITEM % OUT * OUT * images + ITEM // OUT
         body: list[Statement] = [
             *(Array(key, COMPLEX, (TILE_COUNT * count,), "device") for key, count in arrays),
             Comment("rows of the images around the tiles, transformed"),
             self.launch(POINTS, *self.forward_rows()),
             Comment("columns, transformed"),
-            self.launch(PAIRS * POINTS, *self.forward_columns()),
+            self.launch(PAIRS * POINTS, *self.turned(("rows", own, POINTS), ("columns", own, POINTS), -1)),
             Comment("products with the weights' spectra, at each frequency and at its mirror image"),
             Launch(
                 ("tile", "line"),
@@ -131,9 +136,11 @@ class Passes(Inlined):
                 tuple(self.products()),
             ),
             Comment("columns, transformed back"),
-            self.launch(images * POINTS, *self.backward("products", "back", POINTS, POINTS, OUT)),
+            self.launch(images * POINTS, *self.turned(("products", own, POINTS), ("back", kept, POINTS), 1)),
             Comment("rows, transformed back"),
-            self.launch(images * OUT, *self.backward("back", "sums", OUT, const(1), OUT)),
+            self.launch(
+                images * OUT, *self.turned(("back", ITEM * POINTS, const(1)), ("sums", row, images), 1)
+            ),
             Comment("the other layers, pixel by pixel"),
             self.launch(OUT * OUT, *self.layers()),
         ]
@@ -154,15 +161,6 @@ class Passes(Inlined):
             Let("tile_x", name("number") % ACROSS * OUT),
             Let("tile_y", name("number") // ACROSS * OUT),
         ]
-
-    def complex(self, array: str, places: Sequence[Expr]) -> tuple[list[Statement], list[tuple[Expr, Expr]]]:
-        """Return the statements that read complex numbers, and their parts."""
-        reads: list[Statement] = []
-        parts = []
-        for n, place in enumerate(places):
-            reads.append(Let(f"z{n}", load(array, place * TILE_COUNT + TILE, kind=COMPLEX)))
-            parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
-        return reads, parts
 
     def put(self, array: str, place: Expr, parts: Sequence[Expr]) -> Store:
         """Return the statement that writes a complex number."""
@@ -202,30 +200,17 @@ class Passes(Inlined):
             loop("pair", PAIRS, *lets, *puts),
         ]
 
-    def forward_columns(self) -> list[Statement]:
-        """Return the transformation of a column."""
-        first = Let("first", ITEM // POINTS * (POINTS * POINTS) + ITEM % POINTS)
-        places = [name("first") + POINTS * n for n in range(self.points)]
-        reads, parts = self.complex("rows", places)
-        lets, found = line(parts, self.points, -1)
-        return [
-            first,
-            *reads,
-            *lets,
-            *(self.put("columns", p, z) for p, z in zip(places, found, strict=True)),
-        ]
-
-    def backward(self, source: str, target: str, of_image: Expr, step: Expr, kept: Expr) -> list[Statement]:
-        """Return the inverse transformation of a column or a row, of which OUT are kept."""
-        image, own = ITEM // of_image, ITEM % of_image
-        columns = source == "products"
-        start = image * (POINTS * POINTS) + own if columns else ITEM * POINTS
-        reads, parts = self.complex(source, [name("first") + step * n for n in range(self.points)])
-        lets, found = line(parts, self.sizes.out, 1)
-        of_target = POINTS if columns else name("IMAGES")
-        to = image * (OUT * POINTS) + own if columns else own * OUT * name("IMAGES") + image
-        puts = [self.put(target, name("to") + of_target * n, z) for n, z in enumerate(found)]
-        return [Let("first", start), Let("to", to), *reads, *lets, *puts]
+    def turned(self, source: Path, target: Path, sign: int) -> list[Statement]:
+        """Return the transformation of a line: arrays, first place and step of what is read and written."""
+        (array, start, step), (into, to, leap) = source, target
+        reads: list[Statement] = [Let("first", start), Let("to", to)]
+        parts = []
+        for n in range(self.points):
+            at = (name("first") + step * n) * TILE_COUNT + TILE
+            reads.append(Let(f"z{n}", load(array, at, kind=COMPLEX)))
+            parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
+        lets, found = line(parts, self.points if sign < 0 else self.sizes.out, sign)
+        return [*reads, *lets, *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
 
     # ---- products ----------------------------------------------------------------------------------------
 
@@ -245,25 +230,16 @@ class Passes(Inlined):
             Let("here", F * POINTS + K),
             Let("there", (POINTS - F) % POINTS * POINTS + (POINTS - K) % POINTS),
         ]
-        split = self.sizes.block < self.sizes.pairs
         sums = [f"{part}_{t}_{v}" for part in PRODUCTS for t in range(TILES) for v in range(IMAGES // 2)]
         zero = variables(sums, ZERO)
-        lines: list[Statement] = [
-            Let("own", BLOCK * name("block") + PAIR if split else PAIR),
-            *self.spectra(),
-        ]
+        lines = [Let("own", BLOCK * name("block") + PAIR), *self.spectra()]
         lines += [Block(tuple(self.weighted(v))) for v in range(IMAGES // 2)]
-        if not split:
-            found += [*zero, loop("pair", PAIRS, *lines)]
-            whole = ""
-        else:
-            whole = "whole_"
-            adds = [Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
-            found += variables([f"whole_{each}" for each in sums], ZERO)
-            found.append(loop("block", PAIRS // BLOCK, *zero, loop("pair", BLOCK, *lines), *adds))
+        adds = [Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
+        found += variables([f"whole_{each}" for each in sums], ZERO)
+        found.append(loop("block", PAIRS // BLOCK, *zero, loop("pair", BLOCK, *lines), *adds))
         for t, n in product(range(TILES), range(IMAGES)):
             (a, c), (b, d) = (
-                [name(f"{whole}{part}_{t}_{v}", VECTOR).lane(n % 4) for v in (n // 4, (n + IMAGES) // 4)]
+                [name(f"whole_{part}_{t}_{v}", VECTOR).lane(n % 4) for v in (n // 4, (n + IMAGES) // 4)]
                 for part in PRODUCTS
             )
             image = (name("group") * IMAGES + n) * (POINTS * POINTS)
@@ -315,14 +291,9 @@ class Passes(Inlined):
         """Return the layers after the first one's sums, for one pixel."""
         x, y = name("tile_x") + ITEM % OUT, name("tile_y") + ITEM // OUT
         found: list[Statement] = [*self.corner(), Let("column", x), Let("row", y)]
-        lines: list[Statement] = []
-        for nodes in self.groups:
-            node = self.program.nodes[nodes[0]]
-            if node.op != "input":
-                lines += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
         write = self.written(name("row"), name("column"), 0)
         inside = (name("column") < WIDTH) & (name("row") < HEIGHT)
-        return [*found, *lines, self.output_comment(), If(inside, (write,))]
+        return [*found, *self.all_groups(), self.output_comment(), If(inside, (write,))]
 
     def start(self, bias: str, vector: int) -> Expr:
         """Return four values of a bias; that of the first layer, with the centres' sums, is in memory."""

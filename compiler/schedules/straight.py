@@ -63,6 +63,19 @@ class Straight(Nest):
         """Return four values of a parameter that is a vector."""
         raise NotImplementedError
 
+    def all_groups(self) -> list[Statement]:
+        """Return the statements of all layers."""
+        found: list[Statement] = []
+        for nodes in self.groups:
+            node = self.program.nodes[nodes[0]]
+            if node.op != "input":
+                found += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
+        return found
+
+    def affine(self, index: int, node: Node) -> list[Statement]:
+        """Return v = W x + b."""
+        raise NotImplementedError
+
     # ---- elementwise groups ------------------------------------------------------------------------------
 
     def operands(self, group: Sequence[int]) -> list[int]:

@@ -19,12 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contender import Contender, Opened, Tools, told_as_missing
+from wamnet.kernels.bench.contender import Contender, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network.denoise import Model
+
+from .common import told_as_missing
 
 LAYERS = ("color", "albedo", "normal")
 """Layers that it is given, in the order of its arguments."""

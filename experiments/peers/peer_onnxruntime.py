@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contender import Contender, Opened, Tools, told_as_missing
-from wamnet.kernels.bench.cost import layered
+from wamnet.kernels.bench.contender import Contender, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
+
+from .common import layered, told_as_missing
 
 
 def _open(tools: Tools, model: Model, size: int) -> Opened:

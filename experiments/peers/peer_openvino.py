@@ -10,12 +10,12 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, told_as_missing
-from wamnet.kernels.bench.cost import layered
+from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
 
+from .common import layered, told_as_missing
 from .peer_onnxruntime import Run, at_first, quantised
 
 

@@ -7,8 +7,8 @@ against the full network in float64, whatever it leaves out. Another denoiser ha
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import Any
@@ -181,15 +181,3 @@ class Tools:
 
     def __exit__(self, *_: object) -> None:
         self.made.close()
-
-
-@contextmanager
-def told_as_missing(name: str) -> Iterator[None]:
-    """Turn what a peer's package raises while it is opened into ExecutorUnavailable: its own errors vary."""
-    try:
-        yield
-    except (KeyboardInterrupt, ExecutorUnavailable, MemoryError):
-        raise
-    except Exception as error:
-        lines = str(error).strip().splitlines() or [type(error).__name__]
-        raise ExecutorUnavailable(f"{name} cannot run here: {lines[0]}") from error

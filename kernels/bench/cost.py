@@ -22,9 +22,6 @@ from dataclasses import dataclass
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Program
 from ...compiler.schedules.common import kernel_gather, output_channels
-from ...refimpl.network.activation import SINE
-from ...refimpl.network.dataset import channels_of
-from ...refimpl.network.denoise import Model
 
 FLOAT_BYTES = 4
 """Bytes of a float32."""
@@ -81,25 +78,4 @@ def fused(artifact: Artifact, sines: int) -> tuple[Stage, ...]:
         channels = kernel_gather(kernel.program).channels + output_channels(kernel.program)
         of_kernel = sines if kernel is artifact else 0
         stages.append(Stage(products_of(kernel.program), of_kernel, FLOAT_BYTES * channels))
-    return tuple(stages)
-
-
-def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
-    """Return the stages of a library that runs a network layer by layer, each reading and writing memory.
-
-    `fuses`: factor and sine are one pass over the numbers of a layer, and not two.
-    """
-    widths, stages = model.siren.widths, []
-    read = channels_of(model.features)
-    for layer, weight in enumerate(model.siren.weights):
-        neurons = widths[layer + 1]
-        stages.append(Stage(weight.size, 0, FLOAT_BYTES * (read + neurons)))
-        elementwise = Stage(0, 0, FLOAT_BYTES * 2 * neurons)
-        if layer < len(model.siren.weights) - 1:
-            stages += [] if fuses else [elementwise]
-            sines = neurons if model.siren.activation == SINE else 0
-            stages.append(Stage(0, sines, elementwise.bytes))
-        else:
-            stages.append(elementwise)
-        read = neurons
     return tuple(stages)

@@ -100,7 +100,7 @@ def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch)
 
 
 def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
-    from wamnet.kernels.bench.contender import told_as_missing
+    from wamnet_peers.common import told_as_missing
 
     with (
         pytest.raises(ExecutorUnavailable, match="it cannot run here: no such symbol"),

@@ -1,0 +1,45 @@
+"""What peers have in common: their errors, and the stages of a network that runs layer by layer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from wamnet.kernels.bench.cost import FLOAT_BYTES, Stage
+from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.network.activation import SINE
+from wamnet.refimpl.network.dataset import channels_of
+from wamnet.refimpl.network.denoise import Model
+
+
+@contextmanager
+def told_as_missing(name: str) -> Iterator[None]:
+    """Turn what a peer's package raises while it is opened into ExecutorUnavailable: its own errors vary."""
+    try:
+        yield
+    except (KeyboardInterrupt, ExecutorUnavailable, MemoryError):
+        raise
+    except Exception as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        raise ExecutorUnavailable(f"{name} cannot run here: {lines[0]}") from error
+
+
+def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
+    """Return the stages of a library that runs a network layer by layer, each reading and writing memory.
+
+    `fuses`: factor and sine are one pass over the numbers of a layer, and not two.
+    """
+    widths, stages = model.siren.widths, []
+    read = channels_of(model.features)
+    for layer, weight in enumerate(model.siren.weights):
+        neurons = widths[layer + 1]
+        stages.append(Stage(weight.size, 0, FLOAT_BYTES * (read + neurons)))
+        elementwise = Stage(0, 0, FLOAT_BYTES * 2 * neurons)
+        if layer < len(model.siren.weights) - 1:
+            stages += [] if fuses else [elementwise]
+            sines = neurons if model.siren.activation == SINE else 0
+            stages.append(Stage(0, sines, elementwise.bytes))
+        else:
+            stages.append(elementwise)
+        read = neurons
+    return tuple(stages)

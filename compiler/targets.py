@@ -16,6 +16,7 @@ from .core.profiles import SineContract
 from .kernel.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages import opencl_path, planes
 from .languages.c import C
+from .languages.c_path import CPath
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL, GLSLCompute
@@ -144,7 +145,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.native_sine,
         (Plain(dialect), *ladder),
         dialect,
-        {1: dialect} if PATH in dialect.said else {},
+        {1: CPath() if isinstance(dialect, C) else dialect} if PATH in dialect.said else {},
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
         assumes=dialect.assumes,

@@ -69,6 +69,14 @@ RESTORED = """\
 STACK = "stack: {stack} bytes at most, without optimisation too"
 """What a denoiser's text says of the thread that calls it."""
 
+CLAMP = """\
+static inline int wamnet_clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+"""
+"""The function that keeps places inside of an image."""
+
 ALL_PIXELS = "/* All pixels, one after another. */"
 """What the function is for that calls the one of a pixel."""
 
@@ -94,11 +102,7 @@ def includes(role: str, *names: str) -> list[str]:
 
 
 class C(Arguments):
-    """The dialect's table.
-
-    `pixels` is what one call of the denoiser computes, from the pixel `first_pixel` on; `steps` move to that
-    of the next call, along a row and down.
-    """
+    """The dialect's table; `steps` move to the pixel of the next call, along a row and down."""
 
     target = "c"
     language = "C99"
@@ -109,8 +113,6 @@ class C(Arguments):
         PATH: f"{RESTORED}{POPPED[1:]}",
         ENCODE: f"    }}\n{POPPED}",
     }
-    pixels = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
-    first_pixel = ("x", "y")
     steps = ("++x", "++y")
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
@@ -119,7 +121,6 @@ class C(Arguments):
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    painted = "image_{image}[((size_t)y * (size_t)part->width + x) * {channels} + {channel}]"
     said = {
         DENOISE: (
             f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
@@ -130,7 +131,8 @@ class C(Arguments):
             "sums: float, one plane of rows * width numbers for each of:\n"
             "{planes};\n"
             f"part: {NUMBERS}; seed_number.\n"
-            "wamnet_trace does all pixels, wamnet_trace_pixel one: call that from your own loops"
+            "wamnet_trace does all pixels, wamnet_trace_pixel WAMNET_PATHS of a row from a column on, or\n"
+            "fewer at its end: call that from your own loops"
         ),
         ENCODE: (
             "sums: float, one plane of width * height numbers for each of:\n"
@@ -200,9 +202,6 @@ class C(Arguments):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the functions."""
-        if kernel.role == DENOISE:
-            names = ("float", "math", "stdbool", "stdint")
-            return [*includes(DENOISE, *names), self.unordered[parts.bounded], UNFUSED, parts.top]
         head = [*includes(kernel.role, "float", "math", "stdbool", "stddef", "stdint"), PRAGMAS]
         if kernel.role == ENCODE:
             return [*head, "", "/* All pixels. */"]
@@ -216,10 +215,8 @@ class C(Arguments):
         return f"{'uint32_t' if name in UNSIGNED else 'int'} {name}"
 
     def head(self, kernel: Interface) -> list[str]:
-        """Return the lines of the functions: one for a pixel, and one that calls it for all pixels."""
-        if kernel.role == ENCODE:
-            return super().head(kernel)
-        return self._of_paths(kernel) if kernel.role == PATH else self._of_denoiser(kernel)
+        """Return the lines of the functions: of paths one for some pixels, and one that calls it for all."""
+        return super().head(kernel) if kernel.role == ENCODE else self._of_paths(kernel)
 
     def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
         """Return the lines of a kernel that is data, up to its first statement."""
@@ -252,25 +249,15 @@ class C(Arguments):
         listed, name = super().listed(interface), self.entries[DENOISE]
         one = self.signature(name, [*listed, *(f"int {place}" for place in kernel.place)])
         given = ", ".join([*(array.name for array in interface.arrays), *interface.integers, "x", "y"])
-        return [
-            f"/* {said} */",
-            *one[:-1],
-            f"{one[-1]};",
-            "",
-            ALL_PIXELS,
-            *self.signature("wamnet_image", listed),
-            "{",
-            *loops(("x", "y"), ("width", "height"), steps, f"{name}({given});"),
-            "}",
-            "",
-            "static inline int wamnet_clamp(int value, int low, int high)",
-            "{",
-            "    return value < low ? low : value > high ? high : value;",
-            "}",
-            "",
-            *one,
-            "{",
-        ]
+        call = loops(("x", "y"), ("width", "height"), steps, f"{name}({given});")
+        return self.around(said, one, self.signature("wamnet_image", listed), call, CLAMP)
+
+    def around(
+        self, said: str, one: Sequence[str], all_pixels: Sequence[str], calls: Sequence[str], *more: str
+    ) -> list[str]:
+        """Return the function of all pixels, `more` functions, and the head of the function that it calls."""
+        declared = [f"/* {said} */", *one[:-1], f"{one[-1]};", "", ALL_PIXELS]
+        return [*declared, *all_pixels, "{", *calls, "}", "", *more, *one, "{"]
 
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have."""
@@ -311,49 +298,10 @@ class C(Arguments):
         listed = ", ".join(["const wamnet_part *part", *map(self.array_argument, kernel.arrays)])
         given = ", ".join(["part", *(array.name for array in kernel.arrays), "column", "row"])
         one = f"{self.heading.format(entry=name)}({listed}, int column, int row)"
-        return [
-            "/* One pixel, in column `column` of row first_row + `row`. */",
-            f"{one};",
-            "",
-            ALL_PIXELS,
-            f"{self.heading.format(entry='wamnet_trace')}({listed})",
-            "{",
-            *loops(
-                ("column", "row"),
-                ("part->width", "part->rows"),
-                ("++column", "++row"),
-                f"{name}({given});",
-            ),
-            "}",
-            "",
-            one,
-            "{",
-        ]
-
-    def _of_denoiser(self, kernel: Interface) -> list[str]:
-        """Return the functions of a denoiser up to the statements of a pixel."""
-        whole, name = super().listed(kernel), self.entries[DENOISE]
-        one = self.signature(name, [*whole, *(f"int {place}" for place in self.first_pixel)])
-        given = ", ".join([*(array.name for array in kernel.arrays), *kernel.integers, "x", "y"])
-        return [
-            f"/* {self.pixels} */",
-            *one[:-1],
-            f"{one[-1]};",
-            "",
-            ALL_PIXELS,
-            *self.signature("wamnet_image", whole),
-            "{",
-            *loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});"),
-            "}",
-            "",
-            "static inline int wamnet_clamp(int value, int low, int high)",
-            "{",
-            "    return value < low ? low : value > high ? high : value;",
-            "}",
-            "",
-            *one,
-            "{",
-        ]
+        said = "Pixels of row first_row + `row` from column `column` on: WAMNET_PATHS, or fewer at its end."
+        ends, steps = ("part->width", "part->rows"), ("column += WAMNET_PATHS", "++row")
+        calls = loops(("column", "row"), ends, steps, f"{name}({given});")
+        return self.around(said, [one], [f"{self.heading.format(entry='wamnet_trace')}({listed})"], calls)
 
     def signature(self, name: str, listed: Sequence[str]) -> list[str]:
         """Return the lines of a function's head."""
@@ -363,10 +311,14 @@ class C(Arguments):
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the functions have the place of a pixel already."""
         if kernel.role == PATH:
-            return ["    const int samples = part->samples;", *self.path_start(kernel)]
-        if kernel.role == ENCODE:
-            return self.encode_start(kernel)
-        return ["    (void)weights;"] if kernel.named("weights") else [""]
+            return [
+                "    const int samples = part->samples;",
+                "    const int left = part->width - column;",
+                "    const size_t line = (size_t)(row + part->first_row);",
+                "    const size_t place = line * (size_t)part->width + (size_t)column;",
+                *self.path_start(kernel),
+            ]
+        return self.encode_start(kernel)
 
     def encode_start(self, kernel: Interface) -> list[str]:
         """Return the loop over all pixels."""

@@ -57,10 +57,12 @@ class Dialect:
     `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
     channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
-    for each, and `single` declares what is the same for all. `helpers`: functions that an operation calls, by
-    operation. `scene_number` reads a number of the scene that is an input, by its `number`, or the `vector`
-    of four and the `component`; a kernel takes `most_numbers`, and callers read `said_numbers`. `painted`: a
-    channel of an image in a path kernel; a language without it writes sums.
+    for each, written `splatted` if it is the same for all, and `single` declares what is the same for all.
+    `at_once` describes their number if the target's compiler chooses it. `helpers`: functions that an
+    operation calls. `scene_number` reads an input of the scene, by its `number`, or the `vector` of four and
+    the `component`; a kernel takes `most_numbers`, and callers read `said_numbers`. `painted`
+    writes a channel of an image in a path kernel, by the function `painter` if that is there; a language
+    without it writes sums.
     `types` are those of values; `scalars` those of single numbers, where values are vectors.
     """
 
@@ -93,7 +95,9 @@ class Dialect:
     qualifiers: Mapping[str, str] = {}
     table: str
     lanes: int = 1
+    splatted: str = ""
     lane_numbers: str = "0u"
+    at_once: str = ""
     any_lane: str = "{mask}"
     any_enters: str = "{mask}"
     helpers: Mapping[str, str] = {}
@@ -107,6 +111,7 @@ class Dialect:
     load: str = "float {name} = sums[{plane} * plane + at];"
     image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     painted: str = ""
+    painter: str = ""
     unroll: str = ""
     casts: bool = False
     dot_of_bytes: str = ""
@@ -220,7 +225,7 @@ class Dialect:
 
     def splat(self, value: str, dtype: str) -> str:
         """Return the text of a number that is the same in all lanes."""
-        return value
+        return self.splatted.format(type=self.types[dtype], value=value) if self.splatted else value
 
     def depth(self, parts: Parts) -> str:
         """Return the definition of the number of scatterings."""
@@ -236,14 +241,10 @@ class Dialect:
         texts = {"x": f"{shared['column']} + {self.lane_numbers}", "y": shared["row"], "seed": shared["seed"]}
         return [f"    {self.let('uint32', name, text)}" for name, text in texts.items()]
 
-    def image_helpers(self, kernel: Interface) -> list[str]:
-        """Return the functions that `images_end` calls."""
-        return []
-
     def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
         """Return the last statements of a path kernel: the channels of each image's pixel, by name."""
         return [
-            f"    {self.painted.format(image=name, channels=len(texts), channel=channel)} = {text};"
+            f"    {self.painted.format(image=name, channels=len(texts), channel=channel, value=text)};"
             for name, texts in values.items()
             for channel, text in enumerate(texts)
         ]
@@ -261,11 +262,11 @@ class Dialect:
 
     def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
         """Return the declaration of a value; `kept`: its operations stay in order where the language can."""
-        return f"{self.variable(dtype) if kept else self.types[dtype]} {name} = {value};"
+        return self.let_value(self.variable(dtype) if kept else self.types[dtype], name, value)
 
     def single(self, name: str, value: str) -> str:
         """Return the declaration of one number, also in a language whose values are vectors."""
-        return f"float {name} = {value};"
+        return self.let_value(self.scalars["float32"], name, value)
 
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
@@ -353,12 +354,7 @@ class Dialect:
 
     def var(self, dtype: str, name: str, value: str = "", kept: bool = False) -> str:
         """Return the declaration of a variable that is assigned later, or again."""
-        kind = self.variable(dtype) if kept else self.types[dtype]
-        return f"{kind} {name}{f' = {value}' if value else ''};"
-
-    def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
-        """Return the declaration of an array."""
-        return f"{self.variable(dtype) if kept else self.types[dtype]} {name}[{count}];"
+        return self.memory(self.variable(dtype) if kept else self.types[dtype], name, [], value)
 
     def loop(self, counter: str, count: int | str, start: int | str = 0) -> str:
         """Return the line that opens a loop of a counter from `start` on."""
@@ -375,14 +371,22 @@ class Dialect:
     def expression(self, node: Node, kind: str, operands: Sequence[str]) -> str:
         """Return the text of an operation on operands, the last of which is of the given kind."""
         template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
-        return template.format(*operands, type=self.types[node.type.dtype], table=node.get("table"))
+        kinds = {"type": self.types[node.type.dtype], "lanes": self.lanes}
+        return template.format(*operands, **kinds, table=node.get("table"))
 
     def constant(self, node: Node) -> str:
         """Return the text of a constant."""
         return self.number(node["value"], node.type.dtype)
 
     def number(self, value: Any, dtype: str) -> str:
-        """Return the text of a number of the given kind."""
+        """Return the text of a number of the given kind, in all lanes where values are vectors."""
+        text = self.single_number(value, dtype)
+        if self.splatted:
+            return self.splat({"true": "-1", "false": "0"}.get(text, text.strip("()")), dtype)
+        return text
+
+    def single_number(self, value: Any, dtype: str) -> str:
+        """Return the text of one number."""
         if dtype == "float32":
             return self.literal(float(value))
         if dtype == "bool":
@@ -393,12 +397,12 @@ class Dialect:
     def table_declaration(self, name: str, array: NDArray[Any]) -> str:
         """Return the declaration of a constant table."""
         dtype = str(array.dtype)
-        texts = [self.number(value, dtype) for value in array]
+        texts = [self.single_number(value, dtype) for value in array]
         values = ", ".join(texts)
         if len(texts) > LONG_TABLE:
             rows = (", ".join(texts[i : i + TABLE_ROW]) for i in range(0, len(texts), TABLE_ROW))
             values = "\n    " + ",\n    ".join(rows)
-        return self.table.format(type=self.types[dtype], name=name, count=len(array), values=values)
+        return self.table.format(type=self.scalars[dtype], name=name, count=len(array), values=values)
 
     @staticmethod
     def literal(value: float) -> str:

@@ -35,7 +35,7 @@ class OpenCL(Arguments):
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
     image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
-    painted = "image_{image}[place * {channels} + {channel}]"
+    painted = "image_{image}[place * {channels} + {channel}] = {value}"
     said = {
         DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
         PATH: (
@@ -174,13 +174,9 @@ class OpenCL(Arguments):
             "    int left = width - (int)column; /* pixels of the row from here on */",
             "    if ((int)row + first_row < height && left > 0) {",
             "        size_t place = (size_t)((int)row + first_row) * (size_t)width + column;",
-            *(f"    {line}" for line in self.painting(kernel, values)),
+            *(f"    {line}" for line in super().images_end(kernel, values)),
             "    }",
         ]
-
-    def painting(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the statements that write the pixels of an item inside the picture."""
-        return super().images_end(kernel, values)
 
     def place(self, kernel: Interface) -> tuple[str, str]:
         """Return the texts of an item's column and row."""

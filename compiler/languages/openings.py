@@ -43,8 +43,9 @@ class Buffers(Dialect):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
-        found = [*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)]
-        return "\n".join(found if parts.kernel is None else self.of_kernel(kernel, parts, parts.kernel))
+        if parts.kernel is not None:
+            return "\n".join(self.of_kernel(kernel, parts, parts.kernel))
+        return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
 
     def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
         """Return the lines of a kernel that is data, up to its first statement."""

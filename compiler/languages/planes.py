@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from ..kernel.instructions import PRAGMAS
 from ..kernel.interface import FOLLOW, GUIDE, SMOOTH, WRITE, Array, Interface
-from .c import ALL_PIXELS, POPPED, C, includes, loops
+from .c import POPPED, C, includes, loops
 from .dialect import Parts
 from .glsl import GLSL
 from .opencl import OpenCL
@@ -193,20 +193,8 @@ class CPlanes(BufferedPlanes, C):
         name, listed = self.entries[kernel.role], self.listed(kernel)
         one = self.signature(name, [*listed, "int x", "int y"])
         given = ", ".join([*(array.name for array in kernel.arrays), *kernel.integers, "x", "y"])
-        return [
-            "/* One pixel (x, y). */",
-            *one[:-1],
-            f"{one[-1]};",
-            "",
-            ALL_PIXELS,
-            *self.signature(OF_ALL[kernel.role], listed),
-            "{",
-            *loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});"),
-            "}",
-            "",
-            *one,
-            "{",
-        ]
+        calls = loops(("x", "y"), ("width", "height"), self.steps, f"{name}({given});")
+        return self.around("One pixel (x, y).", one, self.signature(OF_ALL[kernel.role], listed), calls)
 
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: places in planes and images."""

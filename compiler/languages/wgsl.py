@@ -99,18 +99,6 @@ class WGSL(Declared):
         """Return the lines of the function up to its brace."""
         return [self.group_size, f"fn main({self.places}) {{"]
 
-    def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
-        """Return the declaration of a value."""
-        return f"let {name}: {self.types[dtype]} = {value};"
-
-    def var(self, dtype: str, name: str, value: str = "", kept: bool = False) -> str:
-        """Return the declaration of a variable that is assigned later, or again."""
-        return f"var {name}: {self.types[dtype]}{f' = {value}' if value else ''};"
-
-    def array(self, dtype: str, name: str, count: int, kept: bool = False) -> str:
-        """Return the declaration of an array."""
-        return f"var {name}: array<{self.types[dtype]}, {count}>;"
-
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type."""
         return f"vec{lanes}<{self.scalars[dtype]}>"
@@ -133,10 +121,6 @@ class WGSL(Declared):
         """Return the line that opens a loop."""
         turn = f"{name}++" if step == "1" else f"{name} += {step}"
         return f"for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
-
-    def single(self, name: str, value: str) -> str:
-        """Return the declaration of one number."""
-        return self.let("float32", name, value)
 
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""

@@ -39,7 +39,7 @@ from ..kernel import interface
 from ..kernel.interface import ENCODE
 from ..languages.dialect import Dialect, Parts
 from ..languages.renderer import framed
-from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, Values, kinds, names
+from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, kinds, names
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
 """Planes of the first surface: outputs of `look`, by group."""
@@ -186,9 +186,11 @@ class _Kernel(Lines):
         for (part, name), table in self.tables.items():
             declared[table] = self.programs.parts()[part].parameters[name]
         constants = [self.dialect.table_declaration(name, array) for name, array in declared.items()]
-        helpers = [text for op, text in self.dialect.helpers.items() if op in self._operations()]
+        operations = self._operations()
+        helpers = dict.fromkeys(text for op, text in self.dialect.helpers.items() if op in operations)
+        painter = [self.dialect.painter] if self.kernel.images and self.dialect.painter else []
         return Parts(
-            top="\n".join([*constants, *helpers, *self.dialect.image_helpers(self.kernel)]),
+            top="\n".join([*constants, *helpers, *painter]),
             max_depth=self.programs.settings.max_depth if self.followed or not self.short else 0,
         )
 
@@ -212,7 +214,8 @@ class _Kernel(Lines):
         self._open(dialect.loop("n", "samples"))
         self._line(dialect.let("uint32", "sample_number", self.shared["sample"]))
         self._line(dialect.var("uint32", "pixel"))
-        self._declare({**PATH, **SURFACE})
+        for name, kind in kinds({**PATH, **SURFACE}).items():
+            self._line(dialect.var(kind, name))
         self._line(dialect.var("bool", "alive", dialect.number(True, "bool")))
         if self.followed:
             self._line(dialect.var("bool", "way_going", dialect.number(True, "bool")))
@@ -234,7 +237,8 @@ class _Kernel(Lines):
         self._line("break;")
         self._close()
         self.block("scatter", "the path goes on", masked=("radiance_r", "radiance_g", "radiance_b"))
-        mask = "(alive && way_going)" if self.short and self.followed else "alive"
+        both = self.dialect.operations["logical_and"]
+        mask = f"({both.format('alive', 'way_going')})" if self.short and self.followed else "alive"
         self._open(f"if (!{self.dialect.any_lane.format(mask=mask)}) {{")
         self._line("break;")
         self._close()
@@ -253,25 +257,17 @@ class _Kernel(Lines):
         number = f"{self.shared['sample']} + {dialect.number(1, 'uint32')}"
         self._line(dialect.let("uint32", "sample_number", number))
         # The rays of a feature draw no further numbers; a compiler may refuse what nothing reads.
-        unread = () if self._reads("pixel", "arrive", "look") else ("pixel",)
+        nodes = [*self.programs.arrive.nodes, *self.programs.look.nodes]
+        unread = () if any(n.op == "input" and n["name"] == "pixel" for n in nodes) else ("pixel",)
         if not unread:
             self._line(dialect.var("uint32", "pixel"))
-        self._declare({**PATH, **SURFACE})
+        for name, kind in kinds({**PATH, **SURFACE}).items():
+            self._line(dialect.var(kind, name))
         size = {"width": "image_width", "height": "image_height"}
         self.block("ray", "the ray at the camera", size, unread=unread)
         self.block("arrive", "the first surface")
         self.block("look", "its features", summed=True)
         self._close()
-
-    def _reads(self, name: str, *parts: str) -> bool:
-        """Tell whether one of the programs reads a variable."""
-        nodes = (node for part in parts for node in self.programs.parts()[part].nodes)
-        return any(node.op == "input" and node["name"] == name for node in nodes)
-
-    def _declare(self, values: Values) -> None:
-        """Declare the variables of some values."""
-        for name, kind in kinds(values).items():
-            self._line(self.dialect.var(kind, name))
 
     def _gather(self) -> None:
         """Add what a path has gathered."""
@@ -298,11 +294,16 @@ class _Kernel(Lines):
         kind = {**kinds({**PATH, **SURFACE}), "alive": "bool"}[name]
         if kind == "bool":
             one, zero = (self.dialect.number(value, "float32") for value in (1.0, 0.0))
-            return "(" + self.dialect.operations["select"].format(name, one, zero) + ")"
+            return "(" + self._select(name, one, zero) + ")"
         if kind == "float32":
             return name
         node = Node("convert", (0,), Type(), attributes(dtype="float32"))
         return self.dialect.expression(node, kind, [name])
+
+    def _select(self, mask: str, yes: str, no: str) -> str:
+        """Return the text of a choice between two floats of each path."""
+        kind = self.dialect.types["float32"]
+        return self.dialect.operations["select"].format(mask, yes, no, type=kind)
 
     def _stores(self) -> None:
         """Write the sums out, unless images are made of them."""
@@ -320,7 +321,8 @@ class _Kernel(Lines):
             return
         program = self.encoding.program
         self._line("/* the features, encoded */")
-        self._line(self.dialect.let("float32", "encoded_samples", self._as_lanes("samples")))
+        samples = self.dialect.splat(self.dialect.cast("float32", "samples"), "float32")
+        self._line(self.dialect.let("float32", "encoded_samples", samples))
         named = {plane: f"sum_{plane}" for plane in self.planes} | {"samples": "encoded_samples"}
         outputs = dict(program.outputs)
         texts = self._statements(ENCODE, program, named)
@@ -329,10 +331,6 @@ class _Kernel(Lines):
             for image in self.encoding.images
         }
         self.lines += self.dialect.images_end(self.kernel, values)
-
-    def _as_lanes(self, integer: str) -> str:
-        """Return an integer that all paths share as a float in all lanes."""
-        return self.dialect.splat(self.dialect.cast("float32", integer), "float32")
 
     def _scene_numbers(self) -> dict[str, str]:
         """Return the text of each of the scene's numbers that are inputs, in all lanes."""
@@ -364,8 +362,9 @@ class _Kernel(Lines):
         self._line(f"/* {part}: {comment} */")
         self._open("{")
         texts = self._statements(part, program, renamed)
-        for line in self._added(program, texts) if summed else []:
-            self._line(line)
+        for name, index in program.outputs:
+            if summed and name in self.planes:
+                self._line(f"sum_{name} += {texts[index]};")
         left = [name for name, _ in program.outputs if name not in unread]
         for line in self._assignments(program, texts, masked, WAY if summed else left):
             self._line(line)
@@ -397,10 +396,6 @@ class _Kernel(Lines):
         expression = self._expression(part, program, node, texts)
         declared = self.dialect.var if node.op == "carried" else self.dialect.let
         self._line(declared(node.type.dtype, texts[index], expression, kept=True))
-
-    def _kept(self, dtype: str, name: str, value: str) -> str:
-        """Return the declaration of a value whose operations stay in order."""
-        return self.dialect.let(dtype, name, value, kept=True)
 
     def _loop(self, part: str, program: Program, texts: Sequence[str], loop: Loop) -> None:
         """Write a loop over the rows of tables."""
@@ -441,8 +436,9 @@ class _Kernel(Lines):
             value = texts[new]
             if new in loop.carried and new != carried:
                 # Another carried number, which may be assigned before it is read: keep its value.
-                before.append(self._kept(program.nodes[new].type.dtype, f"new_{texts[carried]}", value))
-                value = f"new_{texts[carried]}"
+                kind, name = program.nodes[new].type.dtype, f"new_{texts[carried]}"
+                before.append(self.dialect.let(kind, name, value, kept=True))
+                value = name
             if new != carried:
                 after.append(f"{texts[carried]} = {value};")
         for line in before + after:
@@ -461,10 +457,6 @@ class _Kernel(Lines):
         kind = program.nodes[node.args[-1]].type.dtype
         return self.dialect.expression(node, kind, [texts[arg] for arg in node.args])
 
-    def _added(self, program: Program, texts: Sequence[str]) -> list[str]:
-        """Return the statements that add a program's outputs up, where they are planes."""
-        return [f"sum_{name} += {texts[i]};" for name, i in program.outputs if name in self.planes]
-
     def _assignments(
         self, program: Program, texts: Sequence[str], masked: Sequence[str], only: Collection[str]
     ) -> list[str]:
@@ -477,12 +469,13 @@ class _Kernel(Lines):
             value = texts[index]
             if value in inputs and value != name:
                 # The variable may be assigned before it is read: keep its value.
-                before.append(self._kept(program.nodes[index].type.dtype, f"new_{name}", value))
+                kind = program.nodes[index].type.dtype
+                before.append(self.dialect.let(kind, f"new_{name}", value, kept=True))
                 value = f"new_{name}"
             if name == "alive":
-                after.append(f"alive = alive && {value};")
+                after.append(f"alive = {self.dialect.operations['logical_and'].format('alive', value)};")
             elif name in masked and value != name:
-                after.append(f"{name} = {self.dialect.operations['select'].format('alive', value, name)};")
+                after.append(f"{name} = {self._select('alive', value, name)};")
             elif value != name:
                 after.append(f"{name} = {value};")
         return before + after

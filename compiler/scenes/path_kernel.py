@@ -147,7 +147,8 @@ def compile_path(
     written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
     if programs.rays:
         written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
-    header = _header(programs, dialect.language if dialect else chosen.language, promised, lanes, written)
+    at_once = (dialect and dialect.at_once) or f"{lanes} {'path' if lanes == 1 else 'paths'}"
+    header = _header(programs, dialect.language if dialect else chosen.language, promised, at_once, written)
     arguments = dialect.said[interface.PATH] if dialect else PRINTED
     if images:
         arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
@@ -204,7 +205,7 @@ def _written(images: Sequence[Image]) -> tuple[str, ...]:
 
 
 def _header(
-    programs: PathPrograms, language: str, profile: Profile, lanes: int, written: Sequence[str]
+    programs: PathPrograms, language: str, profile: Profile, at_once: str, written: Sequence[str]
 ) -> list[str]:
     """Return the lines of the comment at the top of the source, up to the arguments.
 
@@ -220,7 +221,7 @@ def _header(
         f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
         f"scene     {_harmless(programs.scene)}, digest {programs.scene_digest[:32]}",
         f"paths     {', '.join(settings)}",
-        f"schedule  {lanes} {'path' if lanes == 1 else 'paths'} at once",
+        f"schedule  {at_once} at once",
         f"profile   {profile.name}: {profile.text}",
         "bound     none: a path's decisions may fall differently near an edge",
         f"fixed     {fixed}",

@@ -73,7 +73,7 @@ def compile_lowered(step: Step, size: int) -> StepKernel:
     dialect = of_lanes(LANES)
     emitted = replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes))
     operations = {node.op for node in emitted.program.nodes}
-    helpers = [text for op, text in dialect.helpers.items() if op in operations]
+    helpers = list(dict.fromkeys(text for op, text in dialect.helpers.items() if op in operations))
     (n_in,) = next(node.type.shape for node in step.program.nodes if node.op == "input")
     form = WindowForm(size, n_in // size)
     text, scratch_vectors = step_text(emitted, form, dialect, helpers)

@@ -188,7 +188,7 @@ BODIES = {
     wamnet_part part;
     memcpy(&part, integers, sizeof part);
     for (int row = first; row < end; ++row) {{
-        for (int column = 0; column < part.width; ++column) {{
+        for (int column = 0; column < part.width; column += WAMNET_PATHS) {{
             {entry}(&part, {arrays}, column, row);
         }}
     }}""",

@@ -65,6 +65,9 @@ class Number:
     def __add__(self, other):
         return self._with(other, int.__add__)
 
+    def __sub__(self, other):
+        return self._with(other, int.__sub__)
+
     def __mul__(self, other):
         return self._with(other, int.__mul__)
 

@@ -20,14 +20,20 @@
  */
 #define LANES 16
 #define MAX_DEPTH 3u /* scatterings of a path */
-/* The largest integer up to x: one of 2^23 or more is an integer itself. */
-float16 floor_float16(float16 x)
-{
-    float16 near = convert_float16(convert_int16(x));
-    float16 below = near > x ? near - 1.0f : near;
-    return (as_int16(x) & 0x7fffffff) < 0x4b000000 ? below : x;
-}
-
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif
 __kernel void wamnet_trace(
     __global float *restrict sums,
     int width,
@@ -102,8 +108,8 @@ __kernel void wamnet_trace(
         {
             uint16 t7 = (uint16)(65536u) * y;
             uint16 t8 = x + t7;
-            float16 t9 = convert_float16(x);
-            float16 t10 = convert_float16(y);
+            float16 t9 = CONVERT(x, float16);
+            float16 t10 = CONVERT(y, float16);
             uint16 t12 = t8 * (uint16)(1664525u);
             uint16 t14 = t12 + (uint16)(1013904223u);
             uint16 t15 = sample_number * (uint16)(1664525u);
@@ -131,10 +137,10 @@ __kernel void wamnet_trace(
             uint16 t38 = t33 * t37;
             uint16 t39 = t31 + t38;
             uint16 t41 = t37 >> (uint16)(8u);
-            float16 t42 = convert_float16(t41);
+            float16 t42 = CONVERT(t41, float16);
             float16 t44 = t42 * (float16)(5.96046448e-08f);
             uint16 t45 = t39 >> (uint16)(8u);
-            float16 t46 = convert_float16(t45);
+            float16 t46 = CONVERT(t45, float16);
             float16 t47 = t46 * (float16)(5.96046448e-08f);
             float16 t48 = t9 + t44;
             float16 t50 = (float16)(2.0f) * t48;
@@ -226,8 +232,8 @@ __kernel void wamnet_trace(
                 float16 t49 = t39 + t42;
                 float16 t50 = t40 + t43;
                 float16 t51 = t41 + t44;
-                float16 t52 = t46 < t47 ? t47 : t46;
-                float16 t53 = t52 < t48 ? t48 : t52;
+                float16 t52 = t47 > t46 ? t47 : t46;
+                float16 t53 = t48 > t52 ? t48 : t52;
                 float16 t54 = t50 < t49 ? t50 : t49;
                 float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
@@ -348,8 +354,8 @@ __kernel void wamnet_trace(
                 float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
                 float16 t52 = as_float16(as_int16(point_y) & 0x7fffffff);
                 float16 t53 = as_float16(as_int16(point_z) & 0x7fffffff);
-                float16 t54 = t51 < t52 ? t52 : t51;
-                float16 t55 = t54 < t53 ? t53 : t54;
+                float16 t54 = t52 > t51 ? t52 : t51;
+                float16 t55 = t53 > t54 ? t53 : t54;
                 float16 t56 = t55 + t50;
                 float16 t58 = (float16)(3.81469727e-06f) * t56;
                 float16 t59 = normal_x * t58;
@@ -381,10 +387,10 @@ __kernel void wamnet_trace(
                 uint16 t85 = t80 * t84;
                 uint16 t86 = t78 + t85;
                 uint16 t87 = t84 >> (uint16)(8u);
-                float16 t88 = convert_float16(t87);
+                float16 t88 = CONVERT(t87, float16);
                 float16 t89 = t88 * (float16)(5.96046448e-08f);
                 uint16 t90 = t86 >> (uint16)(8u);
-                float16 t91 = convert_float16(t90);
+                float16 t91 = CONVERT(t90, float16);
                 float16 t92 = t91 * (float16)(5.96046448e-08f);
                 float16 t94 = (float16)(2.0f) * t89;
                 float16 t96 = t94 - (float16)(1.0f);
@@ -403,7 +409,7 @@ __kernel void wamnet_trace(
                 float16 t112 = t101 ? t109 : t111;
                 float16 t114 = t112 * (float16)(0.318309873f);
                 float16 t115 = t114 + (float16)(1.0f);
-                float16 t116 = floor_float16(t115);
+                float16 t116 = FLOOR(t115);
                 float16 t118 = t116 - (float16)(0.5f);
                 float16 t120 = t118 * (float16)(3.14160156f);
                 float16 t121 = t112 - t120;
@@ -412,7 +418,7 @@ __kernel void wamnet_trace(
                 float16 t126 = t118 * (float16)(-1.74122761e-09f);
                 float16 t127 = t124 - t126;
                 float16 t128 = (float16)(0.5f) * t116;
-                float16 t129 = floor_float16(t128);
+                float16 t129 = FLOOR(t128);
                 float16 t130 = (float16)(2.0f) * t129;
                 float16 t131 = t116 - t130;
                 float16 t132 = (float16)(2.0f) * t131;
@@ -431,14 +437,14 @@ __kernel void wamnet_trace(
                 float16 t150 = t127 + t149;
                 float16 t151 = t133 * t150;
                 float16 t152 = (float16)(1.0f) < t151 ? (float16)(1.0f) : t151;
-                float16 t154 = t152 < (float16)(-1.0f) ? (float16)(-1.0f) : t152;
+                float16 t154 = (float16)(-1.0f) > t152 ? (float16)(-1.0f) : t152;
                 float16 t155 = as_float16(as_int16(t112) & 0x7fffffff);
                 int16 t157 = t155 <= (float16)(6400.0f);
                 float16 t158 = t112 - t112;
                 float16 t159 = t157 ? t154 : t158;
                 float16 t160 = t102 * t159;
                 float16 t161 = t114 + (float16)(0.5f);
-                float16 t162 = floor_float16(t161);
+                float16 t162 = FLOOR(t161);
                 float16 t163 = t162 * (float16)(3.14160156f);
                 float16 t164 = t112 - t163;
                 float16 t165 = t162 * (float16)(-8.9071691e-06f);
@@ -446,7 +452,7 @@ __kernel void wamnet_trace(
                 float16 t167 = t162 * (float16)(-1.74122761e-09f);
                 float16 t168 = t166 - t167;
                 float16 t169 = (float16)(0.5f) * t162;
-                float16 t170 = floor_float16(t169);
+                float16 t170 = FLOOR(t169);
                 float16 t171 = (float16)(2.0f) * t170;
                 float16 t172 = t162 - t171;
                 float16 t173 = (float16)(2.0f) * t172;
@@ -465,7 +471,7 @@ __kernel void wamnet_trace(
                 float16 t186 = t168 + t185;
                 float16 t187 = t174 * t186;
                 float16 t188 = (float16)(1.0f) < t187 ? (float16)(1.0f) : t187;
-                float16 t189 = t188 < (float16)(-1.0f) ? (float16)(-1.0f) : t188;
+                float16 t189 = (float16)(-1.0f) > t188 ? (float16)(-1.0f) : t188;
                 int16 t191 = t155 <= (float16)(12800.0f);
                 float16 t192 = t191 ? t189 : t158;
                 float16 t193 = t102 * t192;
@@ -473,7 +479,7 @@ __kernel void wamnet_trace(
                 float16 t195 = (float16)(1.0f) - t194;
                 float16 t196 = t193 * t193;
                 float16 t197 = t195 - t196;
-                float16 t198 = (float16)(0.0f) < t197 ? t197 : (float16)(0.0f);
+                float16 t198 = t197 > (float16)(0.0f) ? t197 : (float16)(0.0f);
                 float16 t199 = sqrt(t198);
                 int16 t200 = normal_z < (float16)(0.0f);
                 float16 t201 = t200 ? (float16)(-1.0f) : (float16)(1.0f);
@@ -507,10 +513,10 @@ __kernel void wamnet_trace(
                 float16 t229 = t223 + t226;
                 float16 t230 = t224 + t227;
                 float16 t231 = t225 + t228;
-                float16 t232 = t199 < (float16)(0.0f) ? (float16)(0.0f) : t199;
+                float16 t232 = (float16)(0.0f) > t199 ? (float16)(0.0f) : t199;
                 float16 t233 = t232 * (float16)(0.318309873f);
-                float16 t234 = t65 < t66 ? t66 : t65;
-                float16 t235 = t234 < t67 ? t67 : t234;
+                float16 t234 = t66 > t65 ? t66 : t65;
+                float16 t235 = t67 > t234 ? t67 : t234;
                 int16 t236 = t235 > (float16)(0.0f);
                 int16 t237 = t29 && t236;
                 origin_x = t62;

@@ -22,6 +22,20 @@ __constant float table_0[3] = {0.0f, 0.300000012f, 0.600000024f};
 __constant float table_1[3] = {0.200000003f, (-0.800000012f), (-1.79999995f)};
 __constant float table_2[3] = {0.100000001f, 0.200000003f, 0.300000012f};
 __constant int table_3[3] = {6, 7, 8};
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif
 __kernel void wamnet_trace(
     __global float *restrict sums,
     int width,
@@ -77,8 +91,8 @@ __kernel void wamnet_trace(
         {
             uint16 t7 = (uint16)(65536u) * y;
             uint16 t8 = x + t7;
-            float16 t9 = convert_float16(x);
-            float16 t10 = convert_float16(y);
+            float16 t9 = CONVERT(x, float16);
+            float16 t10 = CONVERT(y, float16);
             uint16 t12 = t8 * (uint16)(1664525u);
             uint16 t14 = t12 + (uint16)(1013904223u);
             uint16 t15 = sample_number * (uint16)(1664525u);
@@ -106,10 +120,10 @@ __kernel void wamnet_trace(
             uint16 t38 = t33 * t37;
             uint16 t39 = t31 + t38;
             uint16 t41 = t37 >> (uint16)(8u);
-            float16 t42 = convert_float16(t41);
+            float16 t42 = CONVERT(t41, float16);
             float16 t44 = t42 * (float16)(5.96046448e-08f);
             uint16 t45 = t39 >> (uint16)(8u);
-            float16 t46 = convert_float16(t45);
+            float16 t46 = CONVERT(t45, float16);
             float16 t47 = t46 * (float16)(5.96046448e-08f);
             float16 t48 = t9 + t44;
             float16 t50 = (float16)(2.0f) * t48;
@@ -201,8 +215,8 @@ __kernel void wamnet_trace(
                 float16 t49 = t39 + t42;
                 float16 t50 = t40 + t43;
                 float16 t51 = t41 + t44;
-                float16 t52 = t46 < t47 ? t47 : t46;
-                float16 t53 = t52 < t48 ? t48 : t52;
+                float16 t52 = t47 > t46 ? t47 : t46;
+                float16 t53 = t48 > t52 ? t48 : t52;
                 float16 t54 = t50 < t49 ? t50 : t49;
                 float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
@@ -242,7 +256,7 @@ __kernel void wamnet_trace(
                     float16 t90 = t85 * t85;
                     float16 t91 = t89 + t90;
                     float16 t92 = t86 - t91;
-                    float16 t93 = t92 < (float16)(0.0f) ? (float16)(0.0f) : t92;
+                    float16 t93 = (float16)(0.0f) > t92 ? (float16)(0.0f) : t92;
                     float16 t94 = sqrt(t93);
                     int16 t95 = t79 < (float16)(0.0f);
                     float16 t96 = -t94;
@@ -257,7 +271,7 @@ __kernel void wamnet_trace(
                     float16 t106 = t105 ? (float16)(1e-15f) : t98;
                     float16 t107 = t104 / t106;
                     float16 t108 = t107 < t98 ? t107 : t98;
-                    float16 t109 = t98 < t107 ? t107 : t98;
+                    float16 t109 = t107 > t98 ? t107 : t98;
                     int16 t110 = t92 > (float16)(0.0f);
                     int16 t111 = t109 > (float16)(0.0f);
                     int16 t112 = t110 && t111;
@@ -308,7 +322,7 @@ __kernel void wamnet_trace(
                 int16 t163 = t139 >= (int16)(6);
                 int16 t164 = t163 && t140;
                 int16 t165 = t139 - (int16)(6);
-                int16 t166 = t165 < (int16)(0) ? (int16)(0) : t165;
+                int16 t166 = (int16)(0) > t165 ? (int16)(0) : t165;
                 int16 t167 = (int16)(2) < t166 ? (int16)(2) : t166;
                 int16 t169 = t167 < (int16)(2);
                 float16 t171 = t169 ? (float16)(0.300000012f) : (float16)(0.600000024f);
@@ -398,8 +412,8 @@ __kernel void wamnet_trace(
                 float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
                 float16 t52 = as_float16(as_int16(point_y) & 0x7fffffff);
                 float16 t53 = as_float16(as_int16(point_z) & 0x7fffffff);
-                float16 t54 = t51 < t52 ? t52 : t51;
-                float16 t55 = t54 < t53 ? t53 : t54;
+                float16 t54 = t52 > t51 ? t52 : t51;
+                float16 t55 = t53 > t54 ? t53 : t54;
                 float16 t56 = t55 + t50;
                 float16 t58 = (float16)(3.81469727e-06f) * t56;
                 float16 t59 = normal_x * t58;
@@ -431,10 +445,10 @@ __kernel void wamnet_trace(
                 uint16 t85 = t80 * t84;
                 uint16 t86 = t78 + t85;
                 uint16 t87 = t84 >> (uint16)(8u);
-                float16 t88 = convert_float16(t87);
+                float16 t88 = CONVERT(t87, float16);
                 float16 t89 = t88 * (float16)(5.96046448e-08f);
                 uint16 t90 = t86 >> (uint16)(8u);
-                float16 t91 = convert_float16(t90);
+                float16 t91 = CONVERT(t90, float16);
                 float16 t92 = t91 * (float16)(5.96046448e-08f);
                 float16 t94 = (float16)(2.0f) * t89;
                 float16 t96 = t94 - (float16)(1.0f);
@@ -459,7 +473,7 @@ __kernel void wamnet_trace(
                 float16 t118 = (float16)(1.0f) - t117;
                 float16 t119 = t116 * t116;
                 float16 t120 = t118 - t119;
-                float16 t121 = (float16)(0.0f) < t120 ? t120 : (float16)(0.0f);
+                float16 t121 = t120 > (float16)(0.0f) ? t120 : (float16)(0.0f);
                 float16 t122 = sqrt(t121);
                 int16 t123 = normal_z < (float16)(0.0f);
                 float16 t125 = t123 ? (float16)(-1.0f) : (float16)(1.0f);
@@ -493,10 +507,10 @@ __kernel void wamnet_trace(
                 float16 t153 = t147 + t150;
                 float16 t154 = t148 + t151;
                 float16 t155 = t149 + t152;
-                float16 t156 = t122 < (float16)(0.0f) ? (float16)(0.0f) : t122;
+                float16 t156 = (float16)(0.0f) > t122 ? (float16)(0.0f) : t122;
                 float16 t158 = t156 * (float16)(0.318309873f);
-                float16 t159 = t65 < t66 ? t66 : t65;
-                float16 t160 = t159 < t67 ? t67 : t159;
+                float16 t159 = t66 > t65 ? t66 : t65;
+                float16 t160 = t67 > t159 ? t67 : t159;
                 int16 t161 = t160 > (float16)(0.0f);
                 int16 t162 = t29 && t161;
                 origin_x = t62;

@@ -99,6 +99,25 @@ def test_all_schedules_give_the_same_image(executor_named):
         assert same.mean() >= 0.99
 
 
+WIDER = (r"defined(__AVX512F__)", r"defined(__AVX2__)", r"defined(__SSE2__) || defined(__ARM_NEON)")
+"""What chooses vectors in C, the widest first; single values if there is none."""
+
+
+@pytest.mark.parametrize("name", ["minicubes", "vitrine", "daylight"])
+def test_c_has_the_same_bits_in_vectors_of_any_width(executor_named, name):
+    """PTK-9: 16, 8, 4 paths at once, or one, in the middle of an image and at the end of a row."""
+    executor, part = executor_named("c"), Part(21, 9, 1, 7, 0, 2, 3)
+    kernel = compile_scene(executor, scene(name), R.Job(21, 9, 2, 3, Settings(max_depth=3)))
+    found, source = [executor.trace(kernel, part)], kernel.source
+    for count, feature in enumerate(WIDER):
+        assert feature in source
+        source = source.replace(f"#elif {feature}", "#elif 0")
+        narrower = replace(kernel, source=source, manifest={**kernel.manifest, "digest": f"{name} {count}"})
+        found.append(executor.trace(narrower, part))
+    assert found[0][0].std() > 0
+    assert all(np.array_equal(found[0], sums) for sums in found[1:])
+
+
 # ---- parts ---------------------------------------------------------------------------------------------
 
 

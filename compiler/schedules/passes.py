@@ -79,8 +79,7 @@ def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
     """Return what is in memory: the first layer's spectra and bias, as the FFT schedule has them."""
     (layer,) = readers_of_window(program)
     own = [str(layer[key]) for key in ("weight", "bias") if layer.get(key)]
-    found = spectra_stored(program, HALF, points, 1)
-    return {key: found[key] for key in own}
+    return {key: a for key, a in spectra_stored(program, HALF, points, 1).items() if key in own}
 
 
 def passes(program: Program, points: int) -> Kernel:

@@ -156,7 +156,7 @@ def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_
         ("int top = tile_y + dy", "int top = tile_y + 1 + dy", "never made"),
         ("inside ? ", "row == top ? ", "never made"),
         ("tile_y + line < height", "tile_y + line < height - 1", "without a result"),
-        ("line < OUT && tile_y + line < height", "line < OUT", "beyond the picture"),
+        ("line < OUT && tile_y + line < height", "line < OUT", "not its own|beyond the picture"),
         ("min(tile_x + TILES * OUT, width)", "tile_x + TILES * OUT", "not its own|beyond the picture"),
         ("(y * width + x + p)", "(line * width + x + p)", "not its own"),
         ("(int)get_global_id(1) * OUT", "(int)get_global_id(1) * POINTS", "its work items are of"),

@@ -445,6 +445,7 @@ SHOWN_BY_MODULE = ("blender", "domain", "gpu", "house3")
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
     "bench-pipeline": whole_pictures,
+    "bench-c-pipeline": as_printed("bench-c-pipeline"),
     "ablations": study("ablations", "all else as `short`"),
     **{name: bench(name) for name in ("bench-integers", "bench-paper")},
     "bench-train-paper": as_printed("bench-train", 1),

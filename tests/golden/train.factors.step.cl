@@ -21,14 +21,20 @@
 #define RUN 6
 #define NEURONS 2
 #define RANKS 1
-/* The largest integer up to x: one of 2^23 or more is an integer itself. */
-float16 floor_float16(float16 x)
-{
-    float16 near = convert_float16(convert_int16(x));
-    float16 below = near > x ? near - 1.0f : near;
-    return (as_int16(x) & 0x7fffffff) < 0x4b000000 ? below : x;
-}
-
+#ifdef __has_builtin
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(a) __builtin_elementwise_floor(a)
+#endif
+#if __has_builtin(__builtin_convertvector)
+#define CONVERT(a, kind) __builtin_convertvector(a, kind)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(a) floor(a)
+#endif
+#ifndef CONVERT
+#define CONVERT(a, kind) convert_##kind(a)
+#endif
 __kernel __attribute__((reqd_work_group_size(1, 1, 1)))
 void wamnet_step(
     __global const float *restrict values,
@@ -125,7 +131,7 @@ void wamnet_step(
             for (int j = 0; j < 2; ++j) {
                 float16 t4 = v2[e * 2 + j] * (float16)(0.318309873f);
                 float16 t6 = t4 + (float16)(0.5f);
-                float16 t7 = floor_float16(t6);
+                float16 t7 = FLOOR(t6);
                 float16 t9 = t7 * (float16)(3.14160156f);
                 float16 t10 = v2[e * 2 + j] - t9;
                 float16 t12 = t7 * (float16)(-8.9071691e-06f);
@@ -133,7 +139,7 @@ void wamnet_step(
                 float16 t15 = t7 * (float16)(-1.74122761e-09f);
                 float16 t16 = t13 - t15;
                 float16 t17 = (float16)(0.5f) * t7;
-                float16 t18 = floor_float16(t17);
+                float16 t18 = FLOOR(t17);
                 float16 t20 = (float16)(2.0f) * t18;
                 float16 t21 = t7 - t20;
                 float16 t22 = (float16)(2.0f) * t21;
@@ -152,7 +158,7 @@ void wamnet_step(
                 float16 t41 = t16 + t40;
                 float16 t42 = t24 * t41;
                 float16 t43 = (float16)(1.0f) < t42 ? (float16)(1.0f) : t42;
-                float16 t45 = t43 < (float16)(-1.0f) ? (float16)(-1.0f) : t43;
+                float16 t45 = (float16)(-1.0f) > t43 ? (float16)(-1.0f) : t43;
                 float16 t46 = as_float16(as_int16(v2[e * 2 + j]) & 0x7fffffff);
                 int16 t48 = t46 <= (float16)(12800.0f);
                 float16 t49 = v2[e * 2 + j] - v2[e * 2 + j];
@@ -258,7 +264,7 @@ void wamnet_step(
         for (int e = 0; e < filled; ++e) {
             for (int j = 0; j < 2; ++j) {
                 float16 t57 = (v2[e * 2 + j] * (float16)(0.318309873f)) + (float16)(1.0f);
-                float16 t58 = floor_float16(t57);
+                float16 t58 = FLOOR(t57);
                 float16 t59 = t58 - (float16)(0.5f);
                 float16 t60 = t59 * (float16)(3.14160156f);
                 float16 t61 = v2[e * 2 + j] - t60;
@@ -267,7 +273,7 @@ void wamnet_step(
                 float16 t64 = t59 * (float16)(-1.74122761e-09f);
                 float16 t65 = t63 - t64;
                 float16 t66 = (float16)(0.5f) * t58;
-                float16 t67 = floor_float16(t66);
+                float16 t67 = FLOOR(t66);
                 float16 t68 = (float16)(2.0f) * t67;
                 float16 t69 = t58 - t68;
                 float16 t70 = (float16)(2.0f) * t69;
@@ -286,7 +292,7 @@ void wamnet_step(
                 float16 t83 = t65 + t82;
                 float16 t84 = t71 * t83;
                 float16 t85 = (float16)(1.0f) < t84 ? (float16)(1.0f) : t84;
-                float16 t86 = t85 < (float16)(-1.0f) ? (float16)(-1.0f) : t85;
+                float16 t86 = (float16)(-1.0f) > t85 ? (float16)(-1.0f) : t85;
                 int16 t88 = (as_float16(as_int16(v2[e * 2 + j]) & 0x7fffffff)) <= (float16)(6400.0f);
                 float16 t89 = t88 ? t86 : (v2[e * 2 + j] - v2[e * 2 + j]);
                 float16 t90 = v56[e * 2 + j] * t89;

@@ -477,7 +477,9 @@ def asked(task: tuple[str, str, Sequence[str]], given: argparse.Namespace, resul
     command += ["--size", str(given.size), "--rounds", str(given.rounds), "-o", str(given.output)]
     command += ["--prepared", str(given.prepared)] if given.prepared else []
     start, found, whole = time.monotonic(), False, b""
-    one = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    # With PYTHONSAFEPATH a program's folder is not among those of modules.
+    folders = os.pathsep.join(filter(None, [str(Path(__file__).parent), os.environ.get("PYTHONPATH")]))
+    one = {**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with subprocess.Popen(command, env=one, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         assert running.stdout is not None
         assert running.stderr is not None

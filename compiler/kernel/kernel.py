@@ -188,7 +188,7 @@ class Barrier:
 
 @dataclass(frozen=True)
 class Launch:
-    """A grid of items of its own, which start when those of the launch before have ended.
+    """A grid of items, which start when all items of the previous launch have ended.
 
     `place`: names of an item's column and row; `counts`: how many columns and rows there are.
     """

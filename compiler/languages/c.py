@@ -75,7 +75,7 @@ static inline int wamnet_clamp(int value, int low, int high)
     return value < low ? low : value > high ? high : value;
 }
 """
-"""The function that keeps places inside of an image."""
+"""The function that clamps a coordinate to the image."""
 
 ALL_PIXELS = "/* All pixels, one after another. */"
 """What the function is for that calls the one of a pixel."""

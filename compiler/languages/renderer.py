@@ -480,7 +480,7 @@ class Renderer(Lines):
         self._line(self.dialect.wait)
 
     def _write_launch(self, statement: Launch) -> None:
-        """Write a launch as a program of its own, which is compiled where STAGE is its number."""
+        """Write a launch as a separate program, which is compiled if STAGE is its number."""
         number = self.kernel.launches.index(statement)
         counts = [self.text(each) for each in statement.counts]
         self.lines += [

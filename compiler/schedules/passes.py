@@ -1,4 +1,4 @@
-"""The FFT schedule in passes: lines, frequencies and pixels as launches of their own.
+"""The FFT schedule in passes: a launch each for lines, frequencies and pixels.
 
     images -> rows -> columns -> products at each frequency -> columns back -> rows back -> layers -> result
 
@@ -71,7 +71,7 @@ Path = tuple[str, Expr, Expr]
 """A line of an array: its name, the first place, and how far places are apart."""
 
 FIRST_TILE, TILE_COUNT = map(name, BATCH)
-ACROSS, ITEM, PAIR, K, F, G = map(name, ("across", "line", "pair", "k", "f", "g"))
+ACROSS, ITEM, PAIR, K, F = map(name, ("across", "line", "pair", "k", "f"))
 FREQUENCIES, MIRRORED, BLOCK = map(name, ("FREQUENCIES", "MIRRORED", "BLOCK"))
 
 

@@ -70,7 +70,7 @@ GPU_SCHEDULE = "group:2"
 
 SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
-kernel computes some 25,000 pixels of the bundled network."""
+kernel computes some 14,000 pixels of the bundled network."""
 
 BATCH_TILES = 256
 """Tiles that passes compute at once: 100 MB of the bundled network's."""

@@ -18,11 +18,15 @@ MINUTES ?= 10
 COUNT ?= 300
 export VENV PYTHON WAMNET_REQUIRE
 
+# Seconds of processor time that the tests may take (tests/support/tiers.py).
+QUICK_S = 240
+TEST_S = 600
+
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup baselines demo docs quick test long fuzz faults hosts lint clean distclean
+.PHONY: help setup baselines demo docs quick test nightly long fuzz faults hosts lint clean distclean
 
 help: ## List the targets
 	@grep -hE '^[a-z]+: .*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1	\2/' | expand -t 20
@@ -43,10 +47,16 @@ docs: ## Build the web site: spec, tutorial, course; open out/site/index.html
 
 quick: ## Run the tests that need NumPy, and no device, compiler or browser (2 minutes at most on two cores)
 	@.ci/setup quick
-	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE
+	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE --budget $(QUICK_S)
 
-test: setup ## Run all tests (15 minutes at most on two cores)
-	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS)
+test: setup ## Run the tests, those of devices and programs too (6 minutes on two cores)
+	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --budget $(TEST_S)
+
+nightly: baselines ## Run every test and all combinations of parameters, then long, fuzz and faults (hours on two cores)
+	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --nightly
+	@$(MAKE) --no-print-directory long
+	@$(MAKE) --no-print-directory fuzz MINUTES=60
+	@$(MAKE) --no-print-directory faults
 
 long: setup ## Test kernels with other cases each time, many and wide (2 hours on two cores); SEED=n repeats a run
 	@$(ONE_THREAD) PYTEST_OPTIONS="$(PYTEST_OPTIONS)" .ci/long $(TESTS)
@@ -61,7 +71,7 @@ faults: setup ## Kill commands and workers, fill their disk, start two at once: 
 
 hosts: setup ## Run the programs of `wamnet export --host` in all hosts that can be had, and say which are missing
 	@.ci/setup hosts
-	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest --slow -rsfE -v tests/kernels/export/test_hosts.py
+	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest --nightly -rsfE -v tests/kernels/export/test_hosts.py
 
 lint: setup ## Check style, format, types on the installed wheel, and the house rules
 	@.ci/lint

@@ -13,15 +13,14 @@
    Measurements do not rest between runs [`no_rests`].
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 5. Processes stay small (tests/support/workers.py, tests/support/apart.py).
-6. Tests that take a minute are marked [`COSTLY`], and skipped unless a run wants them; the summary says so.
-7. `--quick` runs what needs NumPy only (tests/support/quick.py).
+6. `--quick` runs what needs NumPy only (tests/support/quick.py), `--nightly` what takes long as well
+   (tests/support/tiers.py).
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ import hypothesis
 import pytest
 from packages import FOUND, PACKAGES, SANDBOX, required
 
-pytest_plugins = ["quick", "apart", "workers"]
+pytest_plugins = ["quick", "apart", "workers", "tiers"]
 
 PIPELINES = ("numpy", "opencl", "opengl-egl", "opengl-osmesa")
 """Executors on which every test of paths and pipelines runs; an OpenGL executor is named with the kind of its
@@ -55,15 +54,6 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
-COSTLY = {
-    "slow": "it takes a minute: pytest --slow runs it, as .ci/run does",
-    "nightly": "it takes a minute, and the slow tests hold one of its kind: make long runs it",
-}
-"""Markers of tests that take long, with what is said where they are left out."""
-
-THINNED = "one of several cases of this test runs, make long runs all"
-"""What is said of cases left out of a test whose cases all take long together."""
-
 _state_key = pytest.StashKey[dict[str, str]]()
 """Where a run keeps "ok (device)" or "MISSING: reason" of each executor that it has requested, by name."""
 
@@ -81,55 +71,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden instead of comparing with it"
     )
-    parser.addoption("--slow", action="store_true", help="run tests marked slow too")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     required_executors()
     config.stash[_state_key] = {}
-    for marker, reason in COSTLY.items():
-        config.addinivalue_line("markers", f"{marker}: {reason}")
-    config.addinivalue_line("markers", f"thinned(every): {THINNED}")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests that take long, loudly, unless this run wants them."""
-    if os.environ.get("HYPOTHESIS_PROFILE") == "long":
-        return
-    left_out = [marker for marker in COSTLY if marker == "nightly" or not config.getoption("--slow")]
-    for item in items:
-        for marker in left_out:
-            if item.get_closest_marker(marker):
-                item.add_marker(pytest.mark.skip(reason=f"{marker}: {COSTLY[marker]}"))
-    _thin(items)
-
-
-def _thin(items: list[pytest.Item]) -> None:
-    """Leave out all but each so many cases of a test that is marked so, in their order.
-
-    Each value of each parameter remains in some case: where those do not hold it, others are added. Fewer are
-    added if the number has no divisor in common with how many values a parameter has.
-    """
-    tests = defaultdict[str, list[pytest.Item]](list)
-    for item in items:
-        if item.get_closest_marker("thinned"):
-            tests[item.nodeid.partition("[")[0]].append(item)
-    for cases in tests.values():
-        (every,) = next(cases[0].iter_markers("thinned")).args
-        kept = cases[::every]
-        missing = set().union(*map(_values, cases)).difference(*map(_values, kept))
-        while missing:
-            kept.append(max(cases, key=lambda item: len(_values(item) & missing)))
-            missing -= _values(kept[-1])
-        for item in cases:
-            if item not in kept:
-                item.add_marker(pytest.mark.skip(reason=f"thinned: {THINNED}"))
-
-
-def _values(item: pytest.Item) -> set[tuple[str, str]]:
-    """Return the values that a case has of the parameters of its test."""
-    callspec = getattr(item, "callspec", None)
-    return set() if callspec is None else {(name, repr(value)) for name, value in callspec.params.items()}
 
 
 # ---- executors ------------------------------------------------------------------------------------------

@@ -57,6 +57,7 @@ def test_the_pictures_are_the_references(wamnet, tmp_path) -> None:
     assert difference.max() <= 0.5 / 255 + 256 * 2.0**-23
 
 
+@pytest.mark.nightly(but=("2-3-opengl", "0-0-opencl"))
 @pytest.mark.parametrize("name", ["opencl", "opengl"])
 @pytest.mark.parametrize(("spp", "rays"), [(0, 0), (2, 0), (0, 3), (2, 3)])
 def test_one_device_draws_by_one_pipeline(
@@ -78,6 +79,7 @@ def test_one_device_draws_by_one_pipeline(
         assert (levels > 0).mean() <= 0.01  # values within 1e-5 of a rounding limit: 255 x 2e-5 of all
 
 
+@pytest.mark.nightly(but=("seen_smoothed-opencl", "smoothed-numpy"))
 @pytest.mark.parametrize("name", ["numpy", "opencl"])
 @pytest.mark.parametrize("feature", ["smoothed", "seen_smoothed"])
 def test_a_network_that_sees_smoothed_colour_is_drawn_apart(
@@ -97,6 +99,7 @@ def test_a_network_that_sees_smoothed_colour_is_drawn_apart(
     assert np.abs(got - denoise(load_model(tmp_path / "s.safetensors"), noisy)).max() <= 1.0 / 255
 
 
+@pytest.mark.nightly(but="numpy")
 @pytest.mark.parametrize("name", ["numpy", "opencl"])
 def test_a_network_that_sees_the_history_gets_that_of_the_film(
     wamnet, tmp_path, monkeypatch, executor_named, name
@@ -213,6 +216,7 @@ def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
     assert np.abs(got - encoding.to_display(noisy["color"])).max() <= 0.5 / 255 + 256 * 2.0**-23
 
 
+@pytest.mark.nightly(but=("numpy", "opencl"))
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl", "c"])
 def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> None:
     """The pictures of the model whose first layer is expanded from its factors, up to one level."""

@@ -274,6 +274,7 @@ def test_what_a_model_has_not_learned_is_said() -> None:
     assert "a test frame: it shows cornell" in bench_report.notes(data)
 
 
+@pytest.mark.nightly(but="opengl")
 @pytest.mark.parametrize("executor", ["opencl", "opengl"])
 def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor_named, executor) -> None:
     """Each is a row with the steps of its training; one that the model cannot have has no row."""
@@ -397,6 +398,7 @@ def test_rows_are_sorted_and_have_dashes() -> None:
     assert rows[2][1] == "5,000"
 
 
+@pytest.mark.nightly(but="theme2")
 @pytest.mark.parametrize("theme", [plots.LIGHT, plots.DARK, plots.PAPER])
 def test_plots_of_any_data(theme) -> None:
     """Also of one point, of losses below 0, and of nothing."""

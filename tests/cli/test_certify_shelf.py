@@ -32,7 +32,7 @@ def kernel_of(row):
 ROWS = {kernel_of(row).relative_to(SHELF).as_posix(): row for row in rows()}
 """Rows of the index by the folders of their kernels."""
 
-USUAL = ("cornell/glsl-es", "glossy/wgsl", "minicubes/c", "minicubes/cuda")
+USUAL = ("cornell/glsl-es", "minicubes/c")
 """Kernels that every run certifies, of which each takes seconds; the others are for the night."""
 
 
@@ -41,9 +41,8 @@ def test_the_index_has_a_row_for_each_kernel():
     assert set(USUAL) < set(ROWS)
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in USUAL else pytest.param(name, marks=pytest.mark.nightly) for name in ROWS]
-)
+@pytest.mark.nightly(but=USUAL)
+@pytest.mark.parametrize("name", ROWS)
 def test_the_index_says_what_certify_finds(wamnet, name):
     """CER-6, TXT-1: bound, schedule, and that the text computes the certified program."""
     row, outcome = ROWS[name], wamnet("certify", SHELF / name)
@@ -59,6 +58,7 @@ def test_the_index_says_what_certify_finds(wamnet, name):
     )
 
 
+@pytest.mark.nightly
 def test_a_text_of_the_shelf_that_is_changed_is_refused(wamnet, tmp_path):
     """A weight's index is one off, and the digests agree."""
     shutil.copytree(SHELF / "glossy/wgsl", tmp_path / "kernel")

@@ -114,6 +114,7 @@ def test_without_a_command_it_shows_help(wamnet):
     assert "start" in outcome.out
 
 
+@pytest.mark.nightly
 def test_the_folder_works_with_pytest_and_make(started):
     (started / "lab08_adam.py").write_text((SOLUTIONS / "lab08_adam.py").read_text())
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "lab08 or lab01"]

@@ -210,6 +210,7 @@ def test_other_frames_are_refused(tmp_path) -> None:
         make(tmp_path)
 
 
+@pytest.mark.nightly(but=("train", "unfinished"))
 @pytest.mark.parametrize("name", ["unfinished", "train", "test", "outside", "unfinished/journal.jsonl"])
 def test_links_in_a_data_set_are_refused_before_anything_changes(tmp_path, name) -> None:
     """A link of a work folder's name once led to the removal of all files in another folder."""
@@ -326,6 +327,9 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
     assert content(tmp_path) == whole
 
 
+@pytest.mark.nightly(
+    but=('"frames": [-"pictures": [-or damaged', "train/00000-noisy.exr-../../00000-noisy.exr-or damaged")
+)
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [

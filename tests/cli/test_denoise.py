@@ -130,6 +130,7 @@ def test_compile_writes_a_kernel(wamnet, here, target, source) -> None:
     assert (here / "n" / source).read_text() != first
 
 
+@pytest.mark.nightly(but="opencl-path.cl")
 @pytest.mark.parametrize(("target", "source"), [("opencl", "path.cl"), ("glsl", "path.frag")])
 def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     """The bytes that the compiler gives for this scene, time and schedule; a scene file is a scene too."""

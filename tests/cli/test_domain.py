@@ -108,6 +108,7 @@ def test_an_animation_counts_its_pictures(wamnet, here) -> None:
     assert "png: distance " in outcome.out
 
 
+@pytest.mark.nightly(but="opengl")
 @pytest.mark.parametrize("name", ["opencl", "opengl"])
 def test_a_pipeline_measures_the_same_pictures(here, monkeypatch, executor_named, wamnet, name) -> None:
     """Its images are those of the separate way within rounding: distances differ by little.

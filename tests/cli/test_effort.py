@@ -96,6 +96,7 @@ def test_many_primitives_are_said_before_they_start(started, monkeypatch):
     assert line.startswith("30 primitives: by a rule of thumb")
 
 
+@pytest.mark.nightly
 def test_a_file_of_a_hundred_thousand_boxes_is_read_and_said(started, tmp_path):
     """It was refused by the reader: 103 values too many."""
     data = json.loads(to_json(canonical("minicubes", time=1.0)))

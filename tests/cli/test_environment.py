@@ -73,12 +73,14 @@ def as_stranger() -> tuple[str, ...]:
     return words
 
 
+@pytest.mark.nightly(but="opencl")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_an_unknown_user_without_a_home(place: Path, executor: str) -> None:
     """Containers and units of systemd have such users: every executor ended in a traceback."""
     command(place, executor, *as_stranger())
 
 
+@pytest.mark.nightly(but="opencl")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_nothing_but_the_output_can_be_written(place: Path, executor: str) -> None:
     """HOME and TMPDIR are of somebody else, and read-only."""
@@ -87,6 +89,7 @@ def test_nothing_but_the_output_can_be_written(place: Path, executor: str) -> No
     command(place, executor, *as_stranger(), HOME=str(closed), TMPDIR=str(closed))
 
 
+@pytest.mark.nightly(but="c")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_a_cache_of_somebody_else_is_named_and_left_alone(place: Path, executor: str) -> None:
     if os.geteuid():
@@ -100,6 +103,7 @@ def test_a_cache_of_somebody_else_is_named_and_left_alone(place: Path, executor:
     assert executor == "numpy" or "is not used: others own it" in told
 
 
+@pytest.mark.nightly(but="c")
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_folders_that_run_no_programs(place: Path, executor: str) -> None:
     """The message told to install a compiler, which was there."""

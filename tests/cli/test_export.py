@@ -119,6 +119,7 @@ def test_a_target_without_its_own_device_is_refused(wamnet, tmp_path, target):
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.nightly
 def test_the_command_writes_a_time(wamnet, executor_named, tmp_path):
     executor_named("opencl")
     outcome = wamnet("export", "minicubes", "--target", "opencl", "--measure", "-o", tmp_path / "new")

@@ -189,6 +189,7 @@ def test_as_a_process(tmp_path) -> None:
     assert run_process("--version", cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.nightly(but="True")
 @pytest.mark.parametrize("whole_group", [True, False])
 def test_ctrl_c_in_a_process_leaves_nothing(tmp_path, whole_group) -> None:
     """A long render with two workers is interrupted, by a terminal or by a program that knows one process.
@@ -251,6 +252,7 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.nightly(but=("2-0.9", "15-1.3"))
 @pytest.mark.parametrize("seconds", [0.9, 1.3, 1.8, 4.0])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signals_end_the_workers(tmp_path, number, seconds) -> None:

@@ -32,6 +32,7 @@ def opencl(executor_named):
     return executor
 
 
+@pytest.mark.nightly(but=("render", "train"))
 @pytest.mark.parametrize("name", CALLS)
 @pytest.mark.usefixtures("opencl")
 def test_a_command_prints_its_table(wamnet, name) -> None:

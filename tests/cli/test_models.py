@@ -82,6 +82,7 @@ def test_a_model_says_its_ranges(name):
     assert "trained_on_lights" not in info
 
 
+@pytest.mark.nightly(but="minicubes-basic")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_model_denoises_an_unseen_frame(name):
     """A band of rows, at a time and with noise that training had none of."""

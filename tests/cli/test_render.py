@@ -211,6 +211,7 @@ def test_refusals_of_scene_files(refused, wamnet, tmp_path) -> None:
     assert "must end in .json" in refused("scene", "empty", "-o", "c.txt")
 
 
+@pytest.mark.nightly(but="opencl")
 @pytest.mark.parametrize("name", ["opencl", "opengl", "c"])
 def test_a_kernel_renders_the_frame(wamnet, tmp_path, executor_named, name) -> None:
     """At least 95 pixels in 100 have the reference's colour to 1e-5; the others' paths may pass an edge."""

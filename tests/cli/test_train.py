@@ -207,6 +207,7 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     assert "widths, omegas and activation of the first network (" in refused("train", *others)
 
 
+@pytest.mark.nightly
 def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> None:
     """Trained by the compiled trainer, resumed by the reference, and run within its bound."""
     executor_named("opencl")

@@ -99,6 +99,7 @@ def test_the_odd_one_out_is_kept(wamnet, here, fault) -> None:
     assert not list(here.glob(".wamnet-*"))
 
 
+@pytest.mark.nightly
 def test_the_kept_command_repeats_it(wamnet, here, fault, monkeypatch, capsys) -> None:
     """With the kept kernel (TRI-11) also when the compiler is fixed; without it no longer."""
     assert wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd").status == 1

@@ -22,6 +22,7 @@ def here(samples, tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.nightly
 def test_tuning_is_kept_shown_and_used(wamnet, executor_named, here) -> None:
     """A table with a row a schedule; the second time it is read; denoise and compile take its pick."""
     executor_named("opencl")

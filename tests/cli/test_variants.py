@@ -101,6 +101,7 @@ def test_a_curve_is_chosen_from(wamnet, here) -> None:
     assert "chosen: full, schedule plain" in outcome.out
 
 
+@pytest.mark.nightly
 def test_a_curve_is_measured_once_and_kept(wamnet, here, monkeypatch) -> None:
     """Then read from the cache; measured again where that is damaged, or the model is another."""
     made = wamnet(

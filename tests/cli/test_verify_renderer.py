@@ -45,6 +45,7 @@ def test_a_program_that_breaks_rules(wamnet, tmp_path):
     assert "not confirmed" not in done.out
 
 
+@pytest.mark.nightly
 def test_the_own_tracer_as_a_program(wamnet):
     """Files, layers and a picture for a screen go all the way through."""
     words = ("-k", "sky-dim", "-k", "display-dark", "-k", "normal-turned", "--pictures", "4")

@@ -102,6 +102,7 @@ def check(scene, origin, direction, visit=1.0):
             assert np.array_equal(found, dark[some])
 
 
+@pytest.mark.nightly
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**16),

@@ -81,6 +81,7 @@ def components(values, *tuples):
     }
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.strategy}-{s.roulette_depth}-{s.sampler}")
 @pytest.mark.parametrize("name", SCENES)
 def test_programs_give_the_reference_s_bits(name, settings):

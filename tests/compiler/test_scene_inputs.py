@@ -57,6 +57,7 @@ def inputs_of(name):
     return varying([first, at(name, 0.6), at(name, 3.3), other(first, 1), other(first, 2)], SETTINGS)
 
 
+@pytest.mark.nightly(but=("furnace", "daylight"))
 @pytest.mark.parametrize("name", scenes.CANONICAL)
 def test_a_kernel_with_inputs_gives_the_bits_of_one_of_constants(name):
     """At a time, from a place and in colours that the inputs were not found with."""
@@ -71,6 +72,7 @@ def test_a_kernel_with_inputs_gives_the_bits_of_one_of_constants(name):
     assert np.ptp(expected) > 0 or name == "empty"
 
 
+@pytest.mark.nightly
 def test_another_number_gives_another_picture():
     """The rotation, the camera and the lights do reach the picture."""
     inputs, scene = inputs_of("minicubes"), at("minicubes", 0.05)
@@ -157,6 +159,7 @@ def test_what_fits_and_what_widens():
     assert wide.widened([tables, parted]).fits(tables, parted)
 
 
+@pytest.mark.nightly(but="opengl-egl-1")
 @pytest.mark.parametrize(("name", "lanes"), [("opencl", 16), ("opencl", 1), ("c", 1), ("opengl-egl", 1)])
 @pytest.mark.needs("devices")
 def test_a_kernel_with_inputs_draws_what_the_constant_one_draws(executor_named, name, lanes):

@@ -62,6 +62,7 @@ def test_the_program_has_the_reference_s_bits(name):
     assert ends == len(x)
 
 
+@pytest.mark.nightly(but="c-1")
 @pytest.mark.parametrize(("target", "lanes"), TARGETS)
 def test_a_kernel_that_is_not_asked_has_no_word_of_it(target, lanes):
     scene = scenes.canonical("glossy")

@@ -53,6 +53,7 @@ def test_reduction_is_that_of_the_script(script):
     assert made["r_max"] == sine.R_MAX
 
 
+@pytest.mark.nightly(but="7")
 @pytest.mark.parametrize("degree", DEGREES)
 def test_polynomial_is_that_of_the_script(script, degree):
     """SIN-6: the whole error is steps 2 to 4 on 4,000 intervals of r: reduction, approximation, rounding."""

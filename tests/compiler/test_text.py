@@ -33,6 +33,7 @@ def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
     assert found["sums"] == 2 * size + 3
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     ("target", "schedule"), [("c", "tile:8"), ("opencl", "tile:8"), ("opencl", "tile:16")]
 )

@@ -118,6 +118,7 @@ def test_a_manifest_of_another_form_is_rejected(tmp_path):
                 checker.check(path) and check_text(path)
 
 
+@pytest.mark.nightly(but=("opencl", "wgsl"))
 @pytest.mark.parametrize("target", sorted(TITLES))
 def test_a_foreign_word_is_rejected_anywhere(plain, target):
     """The mirror of the classes above: no other word is before a word of a kernel."""

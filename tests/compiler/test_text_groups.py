@@ -26,6 +26,7 @@ def four(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("four"), "glsl-vulkan", "group:4"))
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("schedule", ["group:1", "group:4"])
 @pytest.mark.parametrize(("border", "activation", "size"), [("zero", "sine", 3), ("clamp", "relu", 4)])
@@ -124,6 +125,7 @@ def test_places_of_an_item_are_told_apart(tmp_path):
             run_text(source.replace(*new), *others)
 
 
+@pytest.mark.nightly(but="opencl-group:1-24")
 @pytest.mark.parametrize(
     ("target", "schedule", "count"), [("wgsl", "group:4", 16), ("opencl", "group:1", 24)]
 )

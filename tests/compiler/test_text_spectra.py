@@ -111,6 +111,7 @@ def test_the_sums_that_are_required_are_those_of_the_window(channels, block):
 # ---- texts -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(but=("1-kwargs1-c", "2-kwargs0-opencl"))
 @pytest.mark.parametrize("target", ["opencl", "c"])
 @pytest.mark.parametrize(
     ("tiles", "kwargs"),
@@ -127,7 +128,7 @@ def test_texts_of_spectra_compute_what_is_certified(target, tiles, kwargs, tmp_p
     assert check_text(path)["sums"] == 3 * 36 * tiles
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_path):
     network = siren.init((81 * 6, 21, 6, 3), 2.0, 3.0, 5)
@@ -221,6 +222,7 @@ def test_the_operands_of_a_sum_may_be_exchanged(opencl):
     assert run_text(*changed(opencl, "real[t][0] += w0 * a;", "real[t][0] = a * w0 + real[t][0];"))
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     ("place", "value"),
     [
@@ -241,6 +243,7 @@ def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
         run_text(source, {**held, "spectra": spectra}, *others)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("target", "count"), [("opencl", 12), ("c", 8)])
 def test_planted_faults_in_spectra_are_noticed(target, count, request):
     """TXT-8: what holds the reader."""

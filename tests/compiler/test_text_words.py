@@ -27,7 +27,8 @@ def grouped(request, tmp_path_factory):
     return parts(planned(folder, request.param, "groupdot:4", border="clamp"))
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
+@pytest.mark.product
 @pytest.mark.parametrize(
     ("target", "schedule"),
     [
@@ -91,6 +92,7 @@ def test_weights_in_another_order_are_refused(dot16):
         run_text(source, held, manifest, turned)
 
 
+@pytest.mark.nightly(but="wgsl-groupdot:4-8")
 @pytest.mark.parametrize(
     ("target", "schedule", "count"), [("opencl", "dot:16", 8), ("wgsl", "groupdot:4", 8)]
 )

@@ -44,6 +44,7 @@ def network(amplitude: int = 127, seed: int = 1):
     return rounded(siren.init((4, 5, 6, 3), 1.0, 5.0, seed=seed), 1, amplitude)
 
 
+@pytest.mark.nightly
 @given(seed=st.integers(0, 2**16), amplitude=st.sampled_from(sorted(SINES)))
 def test_ranges_hold_all_values(seed, amplitude) -> None:
     net = network(amplitude, seed)

@@ -105,6 +105,7 @@ def test_it_passes_all_cases_of_all_kinds(built, verdicts):
     assert len(found) == sum(map(len, run.read_vectors(vectors.FOLDER).values()))
 
 
+@pytest.mark.nightly
 def test_it_passes_under_sanitizers(built, verdicts):
     found = verdicts([built(SANITIZERS)], [])
     assert Counter(v.verdict for v in found) == {run.PASS: len(found)}

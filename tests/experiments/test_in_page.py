@@ -118,7 +118,7 @@ def test_a_browser_that_does_not_start_is_no_executor(monkeypatch):
     in_own_thread(begin_beside_another)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("programs")
 def test_it_shows_known_answers():
     """Mirrors and the sky are right; glass mirrors by Schlick's formula, and that is seen.

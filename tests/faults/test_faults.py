@@ -40,7 +40,7 @@ def test_a_fault_of_another_user_loses_nothing(open_to_all) -> None:
     assert bench.fault(case, "KILL", faults.random.Random(8), bench.other) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", list(faults.CASES))
 def test_faults_at_every_command(open_to_all, name) -> None:
     """One at each: make faults runs hundreds."""

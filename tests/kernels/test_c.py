@@ -108,7 +108,7 @@ def bordered(request, kit):
     return program, images, expected
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize(
     "options",
     [["-O0"], ["-O3"], ["-O1", "-g", *SANITIZERS]],

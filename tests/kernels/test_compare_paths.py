@@ -71,7 +71,7 @@ SCENES = {**{name: scene(name) for name in scenes.CANONICAL}, "balls": BALLS, "m
 # ---- right kernels -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("name", SCENES)
 def test_paths_are_those_of_the_reference(executor, name):
     """Nothing is unexplained; decisions within rounding of their threshold are rare.

@@ -79,7 +79,7 @@ def excess(kit, executor, artifact, program, images, of_cut):
     return float(np.max(difference / bound))
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize(("target", "schedule"), WAYS)
 @settings(max_examples=EXAMPLES)
 @given(case=cases(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
@@ -114,7 +114,7 @@ def paper_s(kit, border="clamp", rank=0):
     return kit.denoiser(network, {"color": 3, "normal": 3}, 12, border)
 
 
-@pytest.mark.thinned(5)
+@pytest.mark.product
 @pytest.mark.parametrize("border", dataset.BORDERS)
 @pytest.mark.parametrize(("target", "schedule"), [way for way in WAYS if way not in ONE_IMAGE])
 def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, border) -> None:

@@ -36,7 +36,7 @@ def resident():
     return int(STATUS.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["opencl", "opengl-egl", "c"])
 def test_memory_is_flat_over_a_thousand_pictures(executor_named, name) -> None:
     if not STATUS.exists():

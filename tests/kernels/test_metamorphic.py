@@ -193,7 +193,7 @@ def _spectra_of_small_windows(monkeypatch):
     monkeypatch.setattr(schedules, "COST", 0.0)
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.__name__)
 def test_variants_agree_within_the_bound(denoiser, kit, original, variant, border):

@@ -100,7 +100,7 @@ def difference_bound(model, executor, images, errors):
     return found[index].high - found[index].low + 2 * found[index].read
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("sums", [False, True])
 @pytest.mark.parametrize("case", CASES)
 def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
@@ -183,7 +183,7 @@ RAYS = {
 """Scene, features, (height, width), sampler, features' sampler, (rays, samples, first sample)."""
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("sums", [False, True])
 @pytest.mark.parametrize("case", RAYS)
 def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, case, sums):

@@ -111,7 +111,7 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
     executor._built.clear()
 
 
-@pytest.mark.thinned(5)
+@pytest.mark.product
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_the_paper_s_network(executor_named, kit, target, schedule, border):
@@ -210,7 +210,7 @@ def test_a_wrong_spectrum_is_caught(executor_named, kit, target, schedule, fault
     assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
 
 
-@pytest.mark.thinned(5)
+@pytest.mark.product
 @pytest.mark.parametrize("border", dataset.BORDERS)
 @pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
 @pytest.mark.parametrize("target", ["opencl", "c"])

@@ -90,7 +90,7 @@ def sums(executor, scene, forms, size=(24, 16), samples=2):
     return kernel.source, executor.trace(kernel, Part(*size, 0, size[1], 0, samples, 3))
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("name", SCENES)
 def test_a_loop_computes_what_statements_compute(executor, name):
     """The same operations in the same order, one a statement: no compiler contracts them, no bit differs."""
@@ -159,7 +159,7 @@ GROWN = {
 """Scenes of enough primitives for a tree."""
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("name", GROWN)
 def test_a_tree_computes_what_the_list_computes(denoiser, name, monkeypatch):
     """The same bits, whichever paths go together; nodes are taken for cheap, so that each kind has a tree."""

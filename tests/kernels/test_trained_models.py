@@ -132,10 +132,7 @@ def trained(name: str) -> Trained:
 
 def marked(way: str, schedule: str, profile: str) -> Any:
     """Return the parameters of a test, marked if its kernel takes long to compile."""
-    marks: tuple[Any, ...] = ()
-    if schedule in LONG_TO_COMPILE:
-        one_of_a_kind = way == "opengl-egl" and profile == "ieee"
-        marks = (pytest.mark.slow if one_of_a_kind else pytest.mark.nightly,)
+    marks = [pytest.mark.nightly] * (schedule in LONG_TO_COMPILE)
     return pytest.param(way, schedule, profile, marks=marks)
 
 
@@ -149,7 +146,7 @@ KERNELS = [
 """Every executor, schedule and profile that promises a bound."""
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.product
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(("way", "schedule", "profile"), KERNELS)
 def test_error_is_within_the_bound(executor_named, name, way, schedule, profile):

@@ -60,7 +60,7 @@ def float64_of(program, images):
     return found
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("target", "schedule"), WAYS)
 def test_a_kernel_is_its_variant(executor_named, target, schedule, name) -> None:

@@ -113,58 +113,59 @@ def test_unknown_name_is_refused(run):
     result.stderr.fnmatch_lines(["*WAMNET_REQUIRE names ?'metal'?: it may list only numpy, opencl*"])
 
 
-COSTLY = """
+TIERS = """
 import pytest
-
-@pytest.mark.slow
-def test_slow():
-    assert True
 
 @pytest.mark.nightly
 def test_nightly():
     assert True
+
+@pytest.mark.nightly("2-x", "3-x")
+@pytest.mark.nightly(but=("1-x", "2-x", "3-x"))
+@pytest.mark.parametrize("a", "x")
+@pytest.mark.parametrize("b", [1, 2, 3, 4])
+def test_some(a, b):
+    assert True
+
+@pytest.mark.product
+@pytest.mark.parametrize("a", "xy")
+@pytest.mark.parametrize("b", [1, 2, 3, [4]])
+def test_cases(a, b):
+    print(f"case {b} {a}")
 """
 
 
 @pytest.mark.parametrize(
-    ("profile", "options", "passed"), [("ci", (), 0), ("ci", ("--slow",), 1), ("long", (), 2)]
+    ("profile", "options", "passed"), [("ci", (), 5), ("ci", ("--nightly",), 13), ("long", (), 13)]
 )
-def test_tests_that_take_long_are_left_out_loudly(run, pytester, monkeypatch, profile, options, passed):
-    pytester.makepyfile(COSTLY)
+def test_a_tier_says_what_it_leaves_out(run, pytester, monkeypatch, profile, options, passed):
+    """Each value of each parameter remains in some case of a product."""
+    pytester.makepyfile(TIERS)
     monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
-    result = run("", "-ra", *options)
-    result.assert_outcomes(passed=passed, skipped=2 - passed)
-    said = {
-        "slow": "*: slow: it takes a minute: pytest --slow *",
-        "nightly": "*: nightly: *make long runs it",
-    }
-    for text in list(said.values())[passed:]:
-        result.stdout.fnmatch_lines([f"SKIPPED*{text}"])
-
-
-THINNED = """
-import pytest
-
-@pytest.mark.thinned({every})
-@pytest.mark.parametrize("a", "xy")
-@pytest.mark.parametrize("b", [1, 2, 3, [4]])
-def test_cases(a, b):
-    print(f"case {{b}} {{a}}")
-"""
-
-
-@pytest.mark.parametrize(("profile", "every", "passed"), [("ci", 3, 4), ("ci", 4, 4), ("long", 3, 8)])
-def test_cases_of_a_thinned_test_are_left_out_loudly(run, pytester, monkeypatch, profile, every, passed):
-    """Each value of each parameter remains: three of eight cases leave out a value, two leave out three."""
-    pytester.makepyfile(THINNED.format(every=every))
-    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
-    result = run("", "-ra", "-s", "--slow")
-    result.assert_outcomes(passed=passed, skipped=8 - passed)
+    result = run("", "-s", *options)
+    result.assert_outcomes(passed=passed, deselected=13 - passed)
     ran = [line.split("case ")[1].split()[:2] for line in result.outlines if "case " in line]
     assert {a for _, a in ran} == {"x", "y"}
     assert {b for b, _ in ran} == {"1", "2", "3", "[4]"}
-    if passed < 8:
-        result.stdout.fnmatch_lines(["SKIPPED*: thinned: one of several cases *make long runs all"])
+    if passed < 13:
+        result.stdout.fnmatch_lines(["4 tests left out: nightly: *", "4 tests left out: product: *"])
+
+
+def test_a_case_that_is_named_runs_in_every_tier(run, pytester):
+    file = pytester.makepyfile(TIERS)
+    run("", f"{file.name}::test_nightly").assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(
+    ("budget", "ci", "status"), [("600", "true", 0), ("0.001", "true", 1), ("0.001", "", 0)]
+)
+def test_a_tier_that_takes_too_much_fails_in_ci(run, pytester, monkeypatch, budget, ci, status):
+    pytester.makepyfile("def test():\n    assert True\n")
+    monkeypatch.setenv("CI", ci)
+    result = run("", "--budget", budget)
+    assert result.ret == status
+    result.stdout.fnmatch_lines([f"processor time: * s, budget {budget} s*"])
+    assert ("TOO MUCH" in result.stdout.str()) is (budget == "0.001")
 
 
 APART = """

@@ -87,7 +87,7 @@ def test_wheel_equals_the_tree(house, wheel):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("folder", quick.DISTRIBUTIONS)
 def test_wheels_of_other_distributions_equal_their_folders(house, tmp_path, folder):
     """And have the version of the package."""
@@ -172,7 +172,7 @@ def test_links_of_the_description(house, readme, description):
     assert runpy.run_path(str(house.root / "setup.py"))["described"](readme, "https://x/y") == description
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_source_distribution_builds_the_same_wheel(wheel, from_sdist):
     def contents(archive: zipfile.ZipFile) -> dict[str, int]:
         return {member.filename: member.CRC for member in archive.infolist()}
@@ -228,7 +228,7 @@ def test_base_installation_names_the_extra_in_one_line(wheel, outside):
     assert (status, error) == (2, f"wamnet: error: {line}\n")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_full_installation_runs_outside_the_repository(from_sdist, outside, tmp_path):
     """`demo`, `view` and `bench` needed extras of their own. The wheel is that of both distributions."""
     extras = [each for extra in project()["optional-dependencies"].values() for each in extra]

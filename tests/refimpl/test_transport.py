@@ -49,7 +49,7 @@ STRATEGIES = [
 ]
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.product
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
 @pytest.mark.parametrize(
     "name", [*(pytest.param(n, marks=LONG) for n in ("minicubes", "cornell")), "lone_light"]

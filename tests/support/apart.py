@@ -41,7 +41,7 @@ class Other:
         ours, theirs = socket.socketpair()
         self.said = tempfile.TemporaryFile()  # noqa: SIM115 - it is open as long as the process runs
         command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", f"--apart={theirs.fileno()}"]
-        command += ["--slow"] if item.config.getoption("slow", False) else []
+        command += ["--nightly"] if item.config.getoption("nightly", False) else []
         self.process = subprocess.Popen(
             [*command, str(item.path)],
             cwd=item.config.rootpath,

@@ -231,8 +231,6 @@ SCENES = {
 }
 """Each material by itself, the sky with and without a lamp, walls with materials, and canonical scenes."""
 
-LONG = ("glossy", "hall")
-"""Scenes that take minutes: what others show of one material each, together."""
 
 LEVEL = sidak(SIGNIFICANCE, len(SCENES))
 """Significance of one scene: that of all is SIGNIFICANCE."""
@@ -255,10 +253,8 @@ def picturing(mitsuba, variant):
     return mitsuba
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.nightly] * (name in LONG)) for name in SCENES]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", SCENES)
 def test_mitsuba_shows_the_same_materials(executor_named, picturing, name):
     a = ours(executor_named("opencl"), SCENES[name], Settings())
     assert_all_plausible(p_values(a, theirs(picturing, SCENES[name], Settings())), LEVEL)
@@ -290,7 +286,7 @@ FAULTS = {
 """Small changes of a scene that are other pictures."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("fault", FAULTS)
 def test_small_faults_of_materials_are_caught(executor_named, picturing, fault):
     name, change = FAULTS[fault]
@@ -299,7 +295,7 @@ def test_small_faults_of_materials_are_caught(executor_named, picturing, fault):
         assert_all_plausible(p_values(a, theirs(picturing, SCENES[name], Settings())), LEVEL)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_separable_masking_is_another_picture(executor_named, picturing):
     """Mitsuba's principled metal as it is, of roughness 1, is not ours: the correction is needed."""
     scene = SCENES["metal"]

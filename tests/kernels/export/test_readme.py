@@ -72,7 +72,7 @@ def agrees(made, folder):
     assert ("It reads `denoise/" in told) == reads(path)
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.product
 @pytest.mark.parametrize("variant", ["full", "whole8"])
 @pytest.mark.parametrize(("target", "where", "schedule"), WAYS)
 def test_it_says_what_certify_does(target, where, schedule, variant, tmp_path):

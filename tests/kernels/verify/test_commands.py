@@ -227,7 +227,7 @@ def test_unknown_renderers_are_refused():
         R.known("arnold", "numpy", lambda path: {})
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.apart
 def test_mitsuba(mitsuba):
     """What Mitsuba 3 does differently is what its documentation says: product masking at grazing angles."""

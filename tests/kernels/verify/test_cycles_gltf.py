@@ -33,7 +33,7 @@ def test_the_script_is_python():
     assert "settings(8, 64, 16, True)" in text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs("programs")
 def test_cycles_shows_the_known_answers():
     """The importer makes lamps of two sides; all else is as the file says."""

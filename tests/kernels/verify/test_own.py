@@ -163,14 +163,9 @@ FAULTS = {name: rest for name, *rest in faults()}
 FINE = "Schlick's glass"
 """The fault that only all samples show: its share is a few per cent off."""
 
-LONG = (FINE, "glass that absorbs")
-"""Faults in glass that take more than a minute to find; an inverse index is the quick one of their kind."""
 
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "fault", [pytest.param(name, marks=[pytest.mark.nightly] * (name in LONG)) for name in FAULTS]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("fault", FAULTS)
 def test_faults_in_light(fault, monkeypatch):
     owner, name, wrong, rule = FAULTS[fault]
     monkeypatch.setattr(owner, name, wrong)
@@ -192,8 +187,8 @@ def test_too_few_bounces():
 # ---- no false alarm -------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("runs", "most"), [(20, 3), pytest.param(100, 5, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize(("runs", "most"), [(20, 3), (100, 5)])
 def test_no_false_alarm(executor_named, runs, most):
     """A run has an alarm with probability 0.01 at most: more than 3 of 20, or 5 of 100, with 5e-4 at most.
 

@@ -382,6 +382,7 @@ SOME = (
 """Kinds that every executor is tested with here; the command tests all."""
 
 
+@pytest.mark.nightly(but=("numpy", "opengl-osmesa"))
 def test_executors_pass(executor):
     answers = OnExecutor(executor)
     for kind in (k for k in SOME if k in answers.kinds):

@@ -102,6 +102,7 @@ SCENES = {
 """Hard scenes by what is hard about them."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", SCENES)
 def test_every_step_is_within_its_range(executor, name):
     """Nothing is unexplained; where many decisions lie on their threshold, they are counted, not hidden."""
@@ -111,6 +112,7 @@ def test_every_step_is_within_its_range(executor, name):
     assert sum(depth.unexplained for depth in report.depths) == 0
 
 
+@pytest.mark.nightly(but="numpy")
 def test_a_long_run_of_roulette(executor):
     """Twenty scatterings in a nearly white room, most of them under roulette, on a few paths."""
     settings = Settings(max_depth=20, roulette_depth=2)

@@ -15,6 +15,7 @@ LAST = 2**32 - 1
 """Largest counter."""
 
 
+@pytest.mark.nightly(but="numpy-view0")
 @pytest.mark.product
 @pytest.mark.parametrize(
     "view", [View(3, 2, sample=LAST), View(3, 2, seed=LAST), View(1, 1, sample=LAST, seed=LAST)]

@@ -338,6 +338,7 @@ HOSTILE = ["-Ofast", "-march=native", "-funsafe-math-optimizations"]
 """Options under which floats promise nothing."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize(
     "options",

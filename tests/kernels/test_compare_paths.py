@@ -91,6 +91,7 @@ def test_paths_are_those_of_the_reference(executor, name):
     assert report.depths[-1].parted <= 0.01 * 48 * 32
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     "settings",
     [
@@ -222,6 +223,7 @@ FAULTS = {
 """Faults by name: what is replaced while the kernel is traced, and the quantity in which it must be seen."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("fault", FAULTS)
 def test_wrong_kernels_are_caught(executor, monkeypatch, fault):
     module, name, wrong, quantity = FAULTS[fault]
@@ -357,6 +359,7 @@ def test_views_outside_their_rules_are_refused():
 # ---- pictures ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(but=("lone_light-128", "daylight-128"))
 @pytest.mark.parametrize(
     ("name", "spp"),
     [

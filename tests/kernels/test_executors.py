@@ -68,6 +68,7 @@ def cases(draw):
     }
 
 
+@pytest.mark.product
 @settings(max_examples=EXAMPLES)
 @given(case=cases())
 def test_error_is_within_the_bound(denoiser, kit, case):
@@ -79,6 +80,7 @@ def test_error_is_within_the_bound(denoiser, kit, case):
     assert kit.excess(denoiser, program, case["images"]) <= 1
 
 
+@pytest.mark.nightly(but=("opencl", "c", "numpy"))
 def test_the_paper_s_network(denoiser, kit):
     network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")

@@ -219,6 +219,7 @@ def changes(draw):
     )
 
 
+@pytest.mark.nightly(but=("numpy", "c"))
 @settings(max_examples=EXAMPLES)
 @given(drawn=changes())
 def test_variants_of_variants_agree_within_the_bound(denoiser, kit, drawn):

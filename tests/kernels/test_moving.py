@@ -59,6 +59,7 @@ def constant(executor, model, scene, seed):
         return pipeline.run(seed)
 
 
+@pytest.mark.nightly(but="numpy")
 def test_scenes_that_are_named_compile_one_kernel(executor, model, built):
     """PPL-9: each picture is that of the scene's own kernel, to the bit."""
     shots = [cubes(time) for time in TIMES]
@@ -74,6 +75,7 @@ def test_scenes_that_are_named_compile_one_kernel(executor, model, built):
     assert np.abs(found[1] - found[0]).max() > 1e-3
 
 
+@pytest.mark.nightly(but=("numpy", "opengl-egl"))
 def test_scenes_that_were_not_named_widen_the_inputs(executor, model, built):
     """The first is constants, the second takes the rotation, the third the colours; a fourth no more."""
     shots = [cubes(0.05), cubes(0.6), cubes(3.3, warm=(0.2, 0.9, 0.4)), cubes(1.7, warm=(0.7, 0.1, 0.1))]
@@ -99,6 +101,7 @@ def test_inputs_that_are_given(executor, model, built):
         assert np.array_equal(pipeline.moment.numbers, inputs.values(shots[-1]))
 
 
+@pytest.mark.nightly(but=("numpy",))
 def test_another_layout_is_another_kernel(executor, model, built):
     """The blocks of `glossy` are parallel to the axes at time 0, and turned at all others."""
     shots = [scenes.canonical("glossy", time=time) for time in (0.0, 0.5, 0.0, 1.5)]
@@ -176,6 +179,7 @@ def test_an_animation_keeps_the_memory_of_its_device(executor_named, model, monk
     assert set(counts[1:]) == {counts[1]}
 
 
+@pytest.mark.nightly(but="numpy")
 def test_a_moving_scene_with_features_of_their_own_rays(executor, model, built):
     """One path kernel for all moments, and each picture is that of the kernel of its constants."""
     shots, rays = [cubes(time) for time in TIMES[:3]], {"settings": SETTINGS, "feature_spp": 3}
@@ -187,6 +191,7 @@ def test_a_moving_scene_with_features_of_their_own_rays(executor, model, built):
             assert np.array_equal(picture, pipeline.run(4))
 
 
+@pytest.mark.nightly(but="opencl")
 def test_frames_of_scenes_that_are_known_share_a_kernel(executor, built):
     """Noisy picture and features of more rays have settings of their own, so two kernels in all."""
     shots = [cubes(time) for time in TIMES[:3]]

@@ -124,6 +124,7 @@ def test_operations_without_a_bound_are_tested_without_one():
     assert set(NO_BOUND) <= {*EXACT, "cos"}
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("op", CASES)
 def test_operation_on_executor(denoiser, kit, image, op):
     program = kit.program(CASES[op], {"a": 4})

@@ -35,6 +35,7 @@ def scene(name):
 # ---- pixel by pixel ------------------------------------------------------------------------------------
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", scenes.CANONICAL)
 def test_image_is_the_reference_s(executor, name):
     """Two samples a pixel: at least 99 pixels in 100 have every layer to 1e-5 of the layer's size.
@@ -56,6 +57,7 @@ def test_image_is_the_reference_s(executor, name):
     assert near.all(axis=-1).mean() >= 0.99
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     "settings",
     [

@@ -131,6 +131,13 @@ def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
     assert bound.max() <= 1e-3  # a bound this small tells colours apart; 2^-8 would be one level of a PNG
 
 
+@pytest.mark.nightly(
+    but=(
+        "numpy-minicubes, all features",
+        "opengl-osmesa-cornell, colour and normal",
+        "opencl-cornell, colour and normal",
+    )
+)
 @pytest.mark.parametrize("case", ["minicubes, all features", "cornell, colour and normal"])
 def test_the_whole_separate_way(executor, model_of, case):
     """With the path kernel that writes all planes: where all pixels of a window are the same paths."""
@@ -383,6 +390,7 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(
 # ---- its life ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(but=("numpy",))
 def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
     """The picture of another time is that of a pipeline made for it; encoding and denoiser stay built."""
     model, size = model_of(("color", "normal"), 3, "clamp"), (8, 12)

@@ -14,6 +14,7 @@ from wamnet.refimpl.light.transport import Settings
 SETTINGS = Settings(max_depth=4)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("feature_spp", [0, 5])
 @pytest.mark.parametrize("name", ["glossy", "daylight", "cornell"])
 def test_layers_are_the_reference_s(executor, name, feature_spp):

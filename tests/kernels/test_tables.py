@@ -124,6 +124,7 @@ def shown(executor, scene, trips):
         assert near.all(axis=-1).mean() >= 0.99, layer
 
 
+@pytest.mark.nightly(but=("numpy-0", "numpy-1", "opencl-0"))
 @pytest.mark.parametrize("more", [0, 1])
 def test_loops_begin_above_the_threshold(executor, more):
     """As many spheres, beside a light, as are statements, and one more, for which there is a loop."""
@@ -191,6 +192,7 @@ def test_a_mask_of_lanes_tells_what_the_or_of_their_halves_tells(executor_named,
     assert np.array_equal(executor.trace(kernel, part), executor.trace(plain, part))
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("first", [0, 2])
 def test_of_coincident_faces_a_tree_takes_the_first_listed(executor, first, monkeypatch):
     """Coincident shapes in a tree: as the list does, though leaves are met in another order."""

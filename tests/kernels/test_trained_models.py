@@ -157,6 +157,7 @@ def test_error_is_within_the_bound(executor_named, name, way, schedule, profile)
     assert case.excess(executor, artifact) <= 1
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", MODELS)
 def test_whole_frames_equal_the_definition(denoiser, name):
     """As users run it: encoding and choice of the schedule included, under the bound of the manifest."""

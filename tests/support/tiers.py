@@ -5,8 +5,9 @@
 2. `pytest.mark.product`: the cases of a test are products of parameters. All run nightly; else each value of
    each parameter is in some case [`covering`], as faults are in one of the factors far more often than in a
    pair of them.
-3. What a tier leaves out is deselected and counted in the summary.
-4. `--budget N`: the summary compares the processor time of the run with N seconds. Where CI is set,
+3. A test of `executor` or `denoiser` runs on those of USUAL; as a product, on each of them once.
+4. What a tier leaves out is deselected and counted in the summary.
+5. `--budget N`: the summary compares the processor time of the run with N seconds. Where CI is set,
    a run that takes half as much again fails [`SHARE`]; other machines may be slow.
 """
 
@@ -24,9 +25,13 @@ SHARE = 1.5
 
 MARKERS = {
     "nightly": "it takes long, and a cheaper test protects most of the same: pytest --nightly runs it",
+    "device": "another executor runs it: pytest --nightly runs it on all",
     "product": "all combinations of its parameters: pytest --nightly runs them, pytest a covering selection",
 }
-"""Markers of what a nightly run has in addition, with their reasons."""
+"""What a nightly run has in addition, with the reasons; `nightly` and `product` are markers."""
+
+USUAL = ("numpy", "opencl")
+"""Executors on which every test of executors runs."""
 
 _seconds = pytest.StashKey[float]()
 """Processor time of the workers of a run."""
@@ -42,8 +47,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[_seconds], config.stash[_left_out] = 0.0, Counter()
-    for marker, reason in MARKERS.items():
-        config.addinivalue_line("markers", f"{marker}: {reason}")
+    for marker in ("nightly", "product"):
+        config.addinivalue_line("markers", f"{marker}: {MARKERS[marker]}")
 
 
 def is_nightly(config: pytest.Config) -> bool:
@@ -66,6 +71,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if rest and rest[0].get_closest_marker("product"):
             kept = covering(rest)
             out |= {item: "product" for item in rest if item not in kept}
+        else:
+            out |= {item: "device" for item in rest if not _is_usual(item)}
     config.stash[_left_out].update(out.values())
     config.hook.pytest_deselected(items=list(out))
     items[:] = [item for item in items if item not in out]
@@ -84,6 +91,14 @@ def _nightly(name: str, cases: Sequence[pytest.Item]) -> set[pytest.Item]:
             if not named or (ids[item] in named) is not bool(but):
                 found.add(item)
     return found
+
+
+def _is_usual(item: pytest.Item) -> bool:
+    """Return whether a case is for no executor, or for a usual one."""
+    params = getattr(item, "callspec", None)
+    return params is None or all(
+        params.params.get(name, USUAL[0]) in USUAL for name in ("executor", "denoiser")
+    )
 
 
 def covering(cases: Sequence[pytest.Item]) -> list[pytest.Item]:

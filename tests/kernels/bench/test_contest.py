@@ -70,6 +70,7 @@ def names_on(executor) -> list[Contender]:
     return [*found, contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
 
 
+@pytest.mark.nightly(but="opengl-egl")
 def test_kernels_are_within_their_bound(executor, model) -> None:
     """Rounding is bounded for all; what a rank leaves out counts in the error, and not in the rounding."""
     found = rows(run(model, names_on(executor)))
@@ -288,6 +289,7 @@ def test_turns_are_taken(model) -> None:
     assert order == ["a", "b", "a", "b", "a", "b", "a", "b"]
 
 
+@pytest.mark.nightly(but=("opencl-sine7", "numpy-native"))
 @pytest.mark.parametrize("variant", contenders.VARIANTS, ids=lambda variant: variant.name)
 def test_variants_are_within_their_bound(executor, model, variant) -> None:
     """On this frame, and for all images; a sine that promises nothing has neither bound."""

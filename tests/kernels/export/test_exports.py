@@ -76,6 +76,7 @@ def test_an_export_keeps_its_bound_where_it_is_run(exported):
     assert exported.target == "onnx" or verdict.paths >= check.PATHS_ALIKE
 
 
+@pytest.mark.nightly(but=("c", "wgsl"))
 @pytest.mark.parametrize("target", [name for name, row in targets.TARGETS.items() if not row.single])
 def test_a_path_kernel_traces_the_rays_that_the_model_has_learned_from(target):
     """EXP-15: 16 at random are 4 spread evenly; sums and images of the pair are those of such a frame."""
@@ -118,6 +119,7 @@ PATHS = [name for name, row in targets.TARGETS.items() if not row.single]
 """Targets whose scenes can move."""
 
 
+@pytest.mark.nightly(but=("c", "opencl"))
 @pytest.mark.parametrize("target", PATHS)
 def test_a_scene_that_moves_is_exported_for_all_moments(target):
     """EXP-13: table, formulas and bindings of the numbers; two moments are run, and are not the same."""
@@ -323,6 +325,7 @@ def test_other_places_of_weights_keep_the_bound(target, place):
         )
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     ("target", "schedule"),
     [
@@ -454,6 +457,7 @@ KINDS = {"sine", "random.block", "sampling.cosine_hemisphere", "picture.denoised
 """Kinds that runners are asked here; `wamnet conformance --executor wgsl` asks all."""
 
 
+@pytest.mark.nightly(but=("c99", "wgsl"))
 @pytest.mark.parametrize("name", ["wgsl", "c99", "glsl-es", "metal"])
 def test_runners_answer_the_vectors_of_the_profile(name):
     cases = {kind: some for kind, some in read_vectors(FOLDER).items() if kind in KINDS}

@@ -73,6 +73,7 @@ def test_denoiser_keeps_its_bound(runner, kit, case):
     assert kit.excess(runner, *case, compile_program(case[0], runner.name)) <= 1
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize("schedule", ["tile:4", "group:1", "group:4"])
 def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
@@ -95,6 +96,7 @@ def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
         assert kit.excess(runner, program, images, artifact) <= 1
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize("schedule", ["plain", "group:1", "group:4", "groupdot:4"])
 def test_integers_have_the_reference_s_digest(runner, schedule, border):
@@ -122,6 +124,7 @@ def denoised(runner, schedule, network, window, channels, numbers):
     return found, held.astype(np.float32)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("shape", [(1, 1), (9, 35)])
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 def test_bytes_at_the_ends_of_their_range(runner, shape, border):
@@ -158,6 +161,7 @@ def test_a_group_that_does_not_wait_is_found(runner, kit):
     assert kit.excess(runner, program, images, wrong) > 1
 
 
+@pytest.mark.nightly(but=("cuda", "wgsl", "glsl-compute"))
 def test_a_first_layer_in_two_passes(runner, kit, case):
     """The bound of both passes is against the program that was cut."""
     from wamnet.compiler.core.interpret import interpret
@@ -185,6 +189,7 @@ def test_paths_are_the_interpreter_s(runner, traced):
     assert np.abs(found - sums).max() <= 8000 * 2.0**-24
 
 
+@pytest.mark.nightly(but=("c99", "wgsl", "glsl-vulkan"))
 def test_paths_of_two_moments(runner):
     """PTK-18: each language reads the numbers of the moment that it is given, by one kernel."""
     if runner.name == "godot":
@@ -225,6 +230,7 @@ def test_encoding_keeps_its_bound(runner, traced):
         assert (np.abs(found[name] - held[name]) <= bound[name]).all()
 
 
+@pytest.mark.nightly(but=("c99", "wgsl", "glsl-es"))
 def test_pipelines_are_the_composition_of_the_kernels(runner, kit):
     """PPL-7: what one kernel returns is what the next one is given, to the bit."""
     if runner.name == "godot":
@@ -259,6 +265,7 @@ int main(void)
 """A program that has both headers pasted in, with arrays that are just large enough."""
 
 
+@pytest.mark.nightly
 def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
     programs, part, sums = traced
     encoder = compile_encode(FEATURES, Normalization(), "c")

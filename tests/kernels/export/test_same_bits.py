@@ -71,6 +71,7 @@ def insist(whole, network):
     assert verdict.digest == check.digest_of(held)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(("target", "place", "schedule"), WAYS)
 def test_every_target_place_and_schedule_has_the_reference_s_digest(target, place, schedule):
     network = model()
@@ -79,6 +80,7 @@ def test_every_target_place_and_schedule_has_the_reference_s_digest(target, plac
     insist(whole, network)
 
 
+@pytest.mark.nightly(but=("c", "wgsl"))
 @pytest.mark.parametrize("target", targets.TARGETS)
 def test_with_paths_and_ten_bits(target):
     """The pair's picture is then rendered, and encoded in integers."""

@@ -82,6 +82,7 @@ def test_a_thread_of_128_kib_denoises_in_scratch_memory(tmp_path, schedule):
     assert told == "1 0 0 0"
 
 
+@pytest.mark.nightly("fft:16-gcc", "fft:16-clang")
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("schedule", SCHEDULES)

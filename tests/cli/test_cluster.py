@@ -58,6 +58,7 @@ def test_on_a_scheduler_and_its_refusals(monkeypatch) -> None:
             pass
 
 
+@pytest.mark.nightly
 def test_the_tasks_of_a_lost_worker_are_done_again() -> None:
     """One of two workers is killed while it has tasks; every task still has its result, once."""
     results: dict = {}

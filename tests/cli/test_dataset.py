@@ -77,7 +77,7 @@ def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
     assert wamnet("dataset", "--check", "-o", "a").status == 0
 
 
-@pytest.mark.nightly(but="opencl")
+@pytest.mark.nightly
 @pytest.mark.parametrize("executor", ["opencl", "opengl", "c"])
 def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
     """A worker opens a device of its own, in a thread that is not its first one."""
@@ -185,7 +185,7 @@ def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
     assert content(tmp_path / "two") == content(tmp_path / "one")
 
 
-@pytest.mark.product
+@pytest.mark.nightly
 @pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
 def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
     """The whole group is interrupted, or only the process killed; nothing that was done is redone."""

@@ -161,5 +161,6 @@ class DataSet(RuleBasedStateMachine):
 DataSet.TestCase.settings = settings(max_examples=100, stateful_step_count=12)
 
 
+@pytest.mark.nightly
 class TestDataSet(DataSet.TestCase):
     """The machine, as a test."""

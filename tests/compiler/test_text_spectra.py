@@ -222,7 +222,7 @@ def test_the_operands_of_a_sum_may_be_exchanged(opencl):
     assert run_text(*changed(opencl, "real[t][0] += w0 * a;", "real[t][0] = a * w0 + real[t][0];"))
 
 
-@pytest.mark.product
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("place", "value"),
     [

@@ -167,6 +167,7 @@ def hostile_requests(count: int) -> list[bytes]:
     return lines
 
 
+@pytest.mark.nightly
 def test_damaged_files_and_requests_are_answered(built):
     """Each line has an answer that is JSON, and no sanitizer ends the program."""
     lines = [line for line in [*KNOWN_HARD, *hostile_requests(300)] if line]
@@ -202,6 +203,7 @@ def test_a_mutant_whose_text_is_gone_is_an_error(mutants):
         mutants.mutated(mutant, SOURCE.read_text())
 
 
+@pytest.mark.nightly
 def test_mutants_are_caught_and_blamed_on_the_clause_that_they_break(mutants, compiler, tmp_path):
     cases = run.read_vectors(vectors.FOLDER)
     asked = mutants.read(mutants.TABLE.read_text())[::EVERY]

@@ -361,6 +361,7 @@ def test_a_decision_on_its_threshold_is_accepted_either_way():
 # ---- executors --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["numpy"])
 @pytest.mark.needs("time")
 def test_an_executor_passes_all_that_it_supports(executor_named, name):

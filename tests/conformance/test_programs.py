@@ -96,6 +96,9 @@ WRONG = {
 """By name: what is replaced, by what, chosen cases, the clause blamed, the worst verdict."""
 
 
+@pytest.mark.nightly(
+    but=("a crash", "no JSON", "an id that is a list", "integers of a thousand digits", "another id")
+)
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_program(program, verdicts, name):
     old, new, word, clause, verdict = WRONG[name]

@@ -48,7 +48,7 @@ def answer(body: str) -> str:
     return text.replace(head, f"{head}    {body}\n")
 
 
-@pytest.fixture(scope="module", params=["sandbox", "trusted"])
+@pytest.fixture(scope="module", params=["sandbox", pytest.param("trusted", marks=pytest.mark.nightly)])
 def graded(request, tmp_path_factory):
     """Give the results of a class of such students, by name."""
     if request.param == "sandbox":

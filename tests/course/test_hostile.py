@@ -111,6 +111,7 @@ def graded(tmp_path_factory):
     return {student.name: student.of(LAB) for student in students}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", HOSTILE)
 def test_nothing_is_forged(graded, name):
     """A wrong function may pass the checks that it passes without the rest, and no other."""
@@ -119,6 +120,7 @@ def test_nothing_is_forged(graded, name):
     assert passed <= honest, passed
 
 
+@pytest.mark.nightly
 def test_others_get_what_they_earn(graded):
     for name in ("0_right", "zz_right"):
         assert graded[name].right, graded[name].first
@@ -149,6 +151,7 @@ ANSWERS = (
 """Results of every kind, of which none is right for a whole lab."""
 
 
+@pytest.mark.nightly(but=("lab01_sphere", "extra3_suite"))
 @pytest.mark.parametrize("lab", LABS, ids=[lab.name for lab in LABS])
 def test_data_of_any_kind_is_a_finding(lab, tmp_path, monkeypatch):
     """No result ends a check with something else than a finding, and none makes a lab right."""
@@ -182,6 +185,7 @@ def alive(process: int) -> bool:
         return False
 
 
+@pytest.mark.nightly(but=("9-sandbox", "15-trusted"))
 @pytest.mark.parametrize("option", [[], ["--trusted"]], ids=["sandbox", "trusted"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_no_process_and_no_file_outlives_the_command(option, number, tmp_path):

@@ -16,6 +16,7 @@ WITHOUT = {("extra2_rewrite", "old operands")}
 """What is caught and gets another explanation."""
 
 
+@pytest.mark.nightly(but=("lab01_sphere", "lab04_light", "lab10_emitter", "lab11_bound"))
 @pytest.mark.parametrize("lab", LABS, ids=[lab.name for lab in LABS])
 def test_wrong_answers_are_caught_and_explained(lab, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -9,6 +9,6 @@
 5. Contact sheets and curves are PNG [`figures`].
 6. Every experiment has the same options [`command.parser`], [`command.begin`].
 
-An experiment is a file in experiments/ that is started as `python experiments/presets.py` is, and imports
+An experiment is a file in experiments/ that is started as `python experiments/quality.py` is, and imports
 this as `lab`.
 """

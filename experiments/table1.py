@@ -1,18 +1,16 @@
 """Table 1 of the paper, with what its readers would ask for today: every denoiser on the same frames.
 
     python experiments/table1.py
-    python experiments/table1.py --scale paper --plan
     python experiments/table1.py --scale paper --only wamnet wamnet-own --seeds 0 1 2
 
 1. Frames of `minicubes` at times of the golden-ratio sequence are rendered and kept, each of another
    geometry: to train on, to look at while training, and to judge by [`baselines/rows.py`].
-2. How long what is missing will take is said first [`forecast`].
-3. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
+2. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
    frames [`judged`]. A row without its packages is left out, and said so. DnCNN and pix2pix are trained until
    their error on the validation frames is flat [`baselines/fitting.py`].
-4. Times of a frame, of its input and of a step of training are interleaved, on the same cores, when
+3. Times of a frame, of its input and of a step of training are interleaved, on the same cores, when
    everything else is done [`timed`].
-5. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
+4. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
    pictures of the first test frame, `curves.png` with the validation errors, and `crops.png`: a crop around a
    corner of pix2pix's patches [`drawn`].
 
@@ -367,26 +365,6 @@ def available(rows: Sequence[str]) -> list[str]:
     return kept
 
 
-def forecast(bench: Bench, rows: Sequence[tuple[str, int]]) -> None:
-    """Say on standard error how long what is missing will take."""
-    from baselines import forecast as probes
-
-    parts = {"rendering": probes.rendering(bench, probes.wanted(bench, rows))}
-    for row in dict.fromkeys(row for row, _ in rows):
-        runs = sum(name == row for name, _ in rows)
-        if seconds := runs * probes.training(bench, row):
-            parts[f"training {row}, {runs} x"] = seconds
-    parts["judging"] = probes.judging(bench, rows)
-    total = sum(parts.values())
-    sys.stderr.write(f"table1: {_span(total)} at most, without times of frames\n")
-    sys.stderr.write("".join(f"  {name}: {_span(seconds)}\n" for name, seconds in parts.items()))
-
-
-def _span(seconds: float) -> str:
-    """Return seconds or minutes."""
-    return f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{math.ceil(seconds)} seconds"
-
-
 def left(
     kept: Results, rows: Sequence[str], seeds: Sequence[int] | None, scale: Scale
 ) -> Iterator[tuple[str, int]]:
@@ -414,7 +392,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # Costly rows have fewer seeds than others, unless seeds are given.
     parser.set_defaults(seeds=None)
     parser.add_argument("--only", nargs="+", choices=list(ROWS), default=list(ROWS), help="rows")
-    parser.add_argument("--plan", action="store_true", help="say how long it will take, and stop")
     parser.add_argument("--no-times", action="store_true", help="leave the times of frames for later")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="rounds of the times")
     options = parser.parse_args(arguments)
@@ -438,10 +415,6 @@ def run(options: argparse.Namespace) -> None:
         if kept.get("frames", 0) is None:
             kept.put("frames", 0, compared(bench.split))
         missing = list(left(kept, rows, options.seeds, scale))
-        if missing:
-            forecast(bench, missing)
-        if options.plan:
-            return
         with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
             for row, seed in missing:
                 sys.stderr.write(f"table1: {row}, seed {seed}\n")

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from baselines.blocks import blockiness
 from baselines.rows import ROWS, Bench, Case, Ready, Row, Scale, compared
-from lab import command, figures, results, scores, tables
+from lab import command, figures, plots, results, scores, tables
 from lab.frames import Shot
 from lab.results import PER_FRAME, Results, Summary, Values
 
@@ -50,51 +50,27 @@ from wamnet.refimpl.errors import InputError
 
 SCALES: Mapping[str, Scale] = {
     "toy": Scale(
-        size=128,
-        train=3,
-        validation=1,
-        test=2,
-        train_spp=2,
-        validation_spp=2,
-        test_spp=16,
-        ladder=(1, 4),
-        short_frames=2,
-        paper={"steps": 2, "batch": 64, "n_windows": 128},
-        short={"steps": 2, "batch": 32},
+        size=128, train=3, validation=1, test=2, train_spp=2, validation_spp=2, test_spp=16, ladder=(1, 4),
+        short_frames=2, paper={"steps": 2, "batch": 64, "n_windows": 128}, short={"steps": 2, "batch": 32},
         dncnn={"steps": 1, "batch": 1, "crop": 16, "width": 4},
         shrunk={"steps": 1, "batch": 1, "crop": 8, "width": 4, "shrink": 4},
         pix2pix={"steps": 1, "batch": 1, "crop": 64, "width": 4},
     ),
     "small": Scale(
-        size=256,
-        train=24,
-        validation=2,
-        test=8,
-        train_spp=256,
-        validation_spp=256,
-        test_spp=1024,
-        ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
-        short_frames=24,
+        size=256, train=24, validation=2, test=8, train_spp=256, validation_spp=256, test_spp=1024,
+        ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256), short_frames=24,
         dncnn={"steps": 6000, "batch": 16, "crop": 40, "half": True},
         shrunk={"steps": 6000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 12_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
     "paper": Scale(
-        size=1024,
-        train=4,
-        validation=2,
-        test=4,
-        train_spp=1024,
-        validation_spp=256,
-        test_spp=1024,
-        ladder=(1, 4, 16, 30, 64, 128),
-        short_frames=4,
-        few=(0,),
+        size=1024, train=4, validation=2, test=4, train_spp=1024, validation_spp=256, test_spp=1024,
+        ladder=(1, 4, 16, 30, 64, 128), short_frames=4, few=(0,),
         dncnn={"steps": 30_000, "batch": 16, "crop": 40, "half": True},
         shrunk={"steps": 5000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 80_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
-}
+}  # fmt: skip
 """Sizes by name. `paper` has the paper's pictures, references and training of WAMnet, and fewer frames: the
 paper had 1,000 to train on and 100 to test by."""
 
@@ -330,12 +306,14 @@ def curves(folder: Path, kept: Results) -> None:
     """Draw the validation errors of the rows that have some, over the steps of their training."""
     lines = {}
     for row in ROWS:
-        looks = [(seed, curve) for seed, curve in enumerate(kept.of(row, "curve")) if ROWS[row].timed]
-        for number, curve in looks:
+        looks = kept.of(row, "curve") if ROWS[row].timed else []
+        for number, curve in enumerate(looks):
             name = ROWS[row].text if len(looks) == 1 else f"{ROWS[row].text}, run {number}"
-            lines[name] = [(look["step"], [look["psnr"]]) for look in curve]
+            lines[name] = [(look["step"], *[look["psnr"]] * 3) for look in curve]
     if lines:
-        figures.curves(folder / "curves.png", lines, ("steps", "PSNR of the validation frames, dB"))
+        figure, (axis,) = plots.axes(1, (8.4, 4.0))
+        plots.lines(axis, lines, ("steps", "PSNR of the validation frames, dB"))
+        figures.save(folder / "curves.png", figure)
 
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:

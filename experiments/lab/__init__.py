@@ -1,6 +1,6 @@
 """The common ground of the experiments: frames, scores, results, figures, and how a command begins.
 
-1. Noisy frames and references are rendered once and kept [`frames.render_all`, `frames.pairs`].
+1. Noisy frames and references are rendered once and kept [`frames.render_all`].
 2. Networks are trained once and kept, with their seconds [`training.trained`].
 3. A picture is scored against its reference in both spaces [`scores.score`].
 4. One record per configuration and seed is kept as JSON, so that an interrupted run resumes

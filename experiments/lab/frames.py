@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,7 @@ from wamnet.cli.files import exr
 from wamnet.cli.files.dataset_files import sum_of
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
-from wamnet.models.data.draws import times
 from wamnet.models.data.frame_plan import version
-from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, SUN, Frame
 from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, feature_job, render_info
@@ -169,22 +167,3 @@ def reference(shot: Shot, spp: int) -> Shot:
 def noisy(shot: Shot) -> Shot:
     """Return the noisy shot itself, with an even seed."""
     return replace(shot, spp=NOISY_SPP, seed=2 * shot.seed)
-
-
-def pairs(folder: Path, shots: Sequence[Shot], spp: int, executor: str = "opencl") -> list[Pair]:
-    """Return a noisy frame and a reference of `spp` samples of each shot."""
-    if spp <= NOISY_SPP:
-        raise InputError("samples of a reference", spp, f"more than {NOISY_SPP}", "a thousand are clean")
-    found = frames(folder, [make(shot) for shot in shots for make in (noisy, _with(spp))], executor)
-    return list(zip(found[::2], found[1::2], strict=True))
-
-
-def _with(spp: int) -> Any:
-    """Return what makes a reference of so many samples."""
-    return lambda shot: reference(shot, spp)
-
-
-def split_times(train: int, test: int, seconds: float, start: float = 0.0) -> tuple[list[float], list[float]]:
-    """Return times of training frames and, continuing their sequence, of tests: no two show one pose."""
-    found = times(TIMES_SEED, start, seconds, 0, train + test)
-    return found[:train], found[train:]

@@ -17,7 +17,9 @@ RECIPE = replace(SHORT, features=("color",), window=Window(3), widths=(4,), batc
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
-    return frames.pairs(tmp_path_factory.mktemp("frames"), [Shot("cornell", size=8)], 2, "numpy")
+    shot = Shot("cornell", size=8)
+    made = [frames.noisy(shot), frames.reference(shot, 2)]
+    return [tuple(frames.frames(tmp_path_factory.mktemp("frames"), made, "numpy"))]
 
 
 def test_a_network_is_trained_once(tmp_path, pairs, monkeypatch):

@@ -70,8 +70,6 @@ def test_an_interrupted_run_keeps_what_was_done(tmp_path, monkeypatch):
         {"seed": 4},
         {"scene": "cornell"},
         {"seen": True},
-        {"parameters": {"cool": (0.5, 0.5, 1.0)}},
-        {"parameters": {"warm": (1.0, 0.5, 0.25)}},
     ],
     ids=str,
 )

@@ -64,13 +64,6 @@ def test_what_is_prepared_is_what_is_computed(tmp_path):
             )
 
 
-def test_a_group_may_have_another_size():
-    plan = gpu.planned("minicubes", "opengl", "group:2@8x4s")
-    assert plan.schedule.group == (8, 4)
-    assert not plan.schedule.dialect.wide
-    assert gpu.planned("minicubes", "opengl", "group:2").schedule.dialect.wide
-
-
 def test_an_unknown_language_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"language or network 'hlsl': must be among cuda, opencl"):
         gpu.main(["--only", "hlsl", "-o", str(tmp_path)])

@@ -1,20 +1,18 @@
 """The paper's claims: each holds here, does not hold, is not decided, or is not tested.
 
     python experiments/claims.py
-    python experiments/claims.py --scale paper --table out/table1
+    python experiments/claims.py --table out/table1/table1.json
 
-1. Qualities are those of Table 1 [`experiments/table1.py`], which must be there; what is said of other
-   orientations and other lights is read from `generalisation.py` and `lights.py`, where they have run
-   [`Evidence`].
-2. Two times are measured here, on this machine's cores: a step of the paper's training, and a frame of
-   1024x1024 [`timed`]. They are not a verdict about the paper's GPU.
-3. A claim asks questions; each is decided on the bootstrap interval of its own number [`lab/verdicts.py`]:
+1. Qualities are those of Table 1 [`experiments/table1.py`]; what is said of other orientations, of other
+   lights and of this machine's seconds is read from records in git [`Evidence`].
+2. A claim asks questions; each is decided on the bootstrap interval of its own number [`lab/verdicts.py`]:
    improvements pose by pose [`gain`], ratios of means [`change`]. Of a network whose training was broken off
    before its validation error was flat, nothing is tested [`Evidence.table`].
-4. The noisy frames are judged at several exposures too [`exposures`]. Table 1's MSE of 82.93 for 1 spp is a
+3. The noisy frames are judged at several exposures too [`exposures`]. Table 1's MSE of 82.93 for 1 spp is a
    PSNR that dark frames have; its SSIM of 0.21 is one that so dark frames do not have. What follows is said
    below that table [`follows`]. That squares were taken modulo 256 is a conjecture; no verdict rests on it.
-5. The folder gets `claims.json`, and `claims.md`, which is written from that record [`written`].
+4. The folder gets `claims.json`, of which the record is made. Exposures and times of the record in git are
+   kept: `git show c0740039:experiments/claims.py` measured them.
 """
 
 from __future__ import annotations
@@ -23,37 +21,24 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import table1
-from baselines.rows import ROWS, TEST_SEED, TORCH, Bench
-from lab import command, frames, scores, tables
-from lab.frames import Shot
+from baselines.rows import ROWS, TORCH
+from lab import scores, tables
+from lab.command import begin
 from lab.intervals import Interval, apart, interval, paired, ratio
+from lab.records import FOLDER, Records
 from lab.results import PER_FRAME, Results, Values
-from lab.training import TIMED_STEPS, seconds_a_step
 from lab.verdicts import HOLDS, Answer, Measured, Question, Untested, decide, said, together
 from numpy.typing import NDArray
 
-from wamnet.cli.files.outputs import write_text
-from wamnet.kernels import denoise_on, open_executor
-from wamnet.kernels.bench.workload import noise, paper_model
-from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.measure import in_turns
-from wamnet.refimpl import metrics
-from wamnet.refimpl.encoding import LEVELS, to_display
+from wamnet.refimpl.encoding import LEVELS
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network.train import PAPER
-
-FRAME_PX = 1024
-"""The paper's size of a frame."""
-
-SMALL = {"toy": (64, 2, 2), "small": (FRAME_PX, TIMED_STEPS, 5), "paper": (FRAME_PX, TIMED_STEPS, 5)}
-"""Size of the frame, steps and rounds of the times, by scale."""
 
 STOPS = (0, -2, -4, -6)
 """Exposures that the noisy frames are judged at, in stops: a stop less is half of the light."""
@@ -91,11 +76,10 @@ Table = Mapping[int, Sequence[float]]
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that claims are decided on: records of Table 1 and of two studies, and seconds measured here."""
+    """All that claims are decided on: Table 1, records of studies, and seconds that were measured."""
 
     table1: Results
-    generalisation: Results | None = None
-    lights: Results | None = None
+    records: Mapping[str, Results] | Records = field(default_factory=Records)
     times: Mapping[str, Any] | None = None
 
     def table(self, row: str, name: str) -> Table:
@@ -120,10 +104,10 @@ def by_seed(kept: Results, configuration: str) -> dict[int, Values]:
     return {r["seed"]: r["values"] for r in kept.records() if r["configuration"] == configuration}
 
 
-def numbers(kept: Results | None, configuration: str, name: str, text: str = "") -> dict[int, list[float]]:
+def numbers(kept: Results, configuration: str, name: str, text: str = "") -> dict[int, list[float]]:
     """Return a number by seed: that of each pose where it was kept, else the mean."""
     found: dict[int, list[float]] = {}
-    for seed, values in by_seed(kept, configuration).items() if kept else ():
+    for seed, values in by_seed(kept, configuration).items():
         each = values.get(PER_FRAME, {}).get(name, values.get(name))
         if each is not None:
             row = each if isinstance(each, list) else [each]
@@ -164,10 +148,9 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def size_of(kept: Results | None) -> str:
+def size_of(kept: Results) -> str:
     """Return the size of a study's frames, to be said beside its numbers."""
-    size = kept.settings.get("size") if kept else None
-    return f", {size}x{size}" if size else ""
+    return ", {0}x{0}".format(kept.settings["size"])
 
 
 # ---- questions -------------------------------------------------------------------------------------------
@@ -248,9 +231,6 @@ def _on_these_cores(what: str, name: str, times: int, bound: float, found: Evide
     )
 
 
-ONE_ORIENTATION = re.compile(r"paper's features[:,] one")
-"""The configuration of `generalisation.py` with the paper's input, trained on one orientation, 0."""
-
 AT = re.compile(r"psnr at (-?\d+(?:\.\d+)?)")
 """The name of the PSNR at an orientation, in degrees."""
 
@@ -260,62 +240,38 @@ def orientations(found: Evidence) -> list[Answer]:
 
     Frames at other orientations show other things: so gains are compared, not qualities.
     """
-    kept = found.generalisation
-    row = _first(kept, ONE_ORIENTATION)
-    names = next(iter(by_seed(kept, row).values()), {}) if kept else {}
-    degrees = [float(match[1]) for name in names if (match := AT.fullmatch(name)) and float(match[1])]
-    less = "gain of PSNR over the input at {} degrees, less that at 0"
+    kept, row = found.records["generalisation"], "paper's features: one"
+
+    def gained(degrees: float) -> Table:
+        name = f"psnr at {degrees:g}"
+        after, before = common(numbers(kept, row, name), numbers(kept, "input", name))
+        return dict(enumerate((after - before).tolist()))
 
     def measure(at: float) -> Measured:
-        return of_common(apart, _gained(kept, row, at), _gained(kept, row, 0.0), further=size_of(kept))
+        return of_common(apart, gained(at), gained(0.0), further=size_of(kept))
 
-    return [
-        Question(less.format(f"{at:g}"), -EQUAL_DB, unit="dB").ask(partial(measure, at)) for at in degrees
-    ] or [Question(less.format("other"), -EQUAL_DB).ask(partial(measure, math.nan))]
-
-
-def _first(kept: Results | None, pattern: re.Pattern[str]) -> str:
-    """Return the first configuration of this form, or what none is called."""
-    found = kept.configurations() if kept else []
-    return next((name for name in found if pattern.fullmatch(name)), "other orientations")
+    names = next(iter(by_seed(kept, row).values()))
+    degrees = [float(match[1]) for name in names if (match := AT.fullmatch(name)) and float(match[1])]
+    less = "gain of PSNR over the input at {:g} degrees, less that at 0"
+    return [Question(less.format(at), -EQUAL_DB, unit="dB").ask(partial(measure, at)) for at in degrees]
 
 
-def _gained(kept: Results | None, row: str, degrees: float) -> Table:
-    """Return by how many decibels a network's frames at an orientation are better than its input."""
-    name = f"psnr at {degrees:g}"
-    after, before = common(numbers(kept, row, name), numbers(kept, "input", name))
-    if after.shape != before.shape:
-        raise Untested("network and input have different poses")
-    return dict(enumerate((after - before).tolist()))
-
-
-A_ONLY, SEVERAL = re.compile(r"paper: A only"), re.compile(r"paper: (\d+) sets")
-"""Configurations of `lights.py` with the paper's input, by what they are trained on."""
-
-
-def other_lights(pattern: re.Pattern[str], found: Evidence) -> list[Answer]:
-    """Return whether colours under unseen lights are `LOST` times as far off as those under A, the own ones.
-
-    Of networks of several sets it is that of the most.
-    """
-    kept = found.lights
-    rows = [match for c in (kept.configurations() if kept else []) if (match := pattern.fullmatch(c))]
-    row = max(rows, key=lambda match: int(match[1]) if match.groups() else 0)[0] if rows else "other lights"
-    trained = f", trained on {row.removeprefix('paper: ')}" if rows else ""
+def other_lights(trained: str, found: Evidence) -> list[Answer]:
+    """Return whether colours under unseen lights are `LOST` times as far off as under A, the own ones."""
+    kept = found.records["lights"]
 
     def measure() -> Measured:
-        return of_common(
-            ratio, *(numbers(kept, row, n) for n in ("color", "color on A")), further=size_of(kept)
-        )
+        both = (numbers(kept, f"paper: {trained}", name) for name in ("color", "color on A"))
+        return of_common(ratio, *both, further=size_of(kept))
 
-    return [Question(f"error of colours under unseen lights over that under A{trained}", LOST).ask(measure)]
+    what = f"error of colours under unseen lights over that under A, trained on {trained}"
+    return [Question(what, LOST).ask(measure)]
 
 
 # ---- the claims ------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(NamedTuple):
     """A claim by name, in words, the paper's number, what is asked, and what a reader should know of it."""
 
     name: str
@@ -335,100 +291,41 @@ ALL_THREE = ("mse255", "psnr", "ssim")
 """The scores of the paper's Table 1."""
 
 CLAIMS = (
-    Claim(
-        "noise",
-        "noise falls by 40 %",
-        "MSE 82.93 to 48.04, -42 %",
-        noise_falls,
-        "Read as: by 40 % at least. Squares modulo 256 are a conjecture about the paper's numbers.",
-    ),
-    Claim(
-        "structure",
-        "structure improves by 200 %",
-        "SSIM 0.21 to 0.68, +224 %",
-        lambda found: [change("input", "wamnet", "ssim", 3.0, found)],
-        "Read as: SSIM is three times that of the input, whose own is lower here.",
-    ),
-    Claim(
-        "normals-own",
-        "normals help, on the frame trained on",
-        "seen in pictures",
-        partial(better, "wamnet-color-own", "wamnet-own", ("psnr", "ssim")),
-        "Each seed has a frame of its own.",
-    ),
-    Claim(
-        "normals",
-        "normals help, on other frames",
-        "seen in pictures",
-        partial(better, "wamnet-color", "wamnet", ("psnr", "ssim")),
-    ),
+    Claim("noise", "noise falls by 40 %", "MSE 82.93 to 48.04, -42 %", noise_falls,
+          "Read as: by 40 % at least. Squares modulo 256 are a conjecture about the paper's numbers."),
+    Claim("structure", "structure improves by 200 %", "SSIM 0.21 to 0.68, +224 %",
+          lambda found: [change("input", "wamnet", "ssim", 3.0, found)],
+          "Read as: SSIM is three times that of the input, whose own is lower here."),
+    Claim("normals-own", "normals help, on the frame trained on", "seen in pictures",
+          partial(better, "wamnet-color-own", "wamnet-own", ("psnr", "ssim")),
+          "Each seed has a frame of its own."),
+    Claim("normals", "normals help, on other frames", "seen in pictures",
+          partial(better, "wamnet-color", "wamnet", ("psnr", "ssim"))),
     Claim("training-time", "training takes 90 s", "90 s on a GPU", training_time, NOT_THIS_MACHINE),
     Claim("speed", "11 frames a second", "11 at 1024x1024 on a GPU", frame_time, NOT_THIS_MACHINE),
-    Claim(
-        "worth-own",
-        "worth a render of 30 spp, on the frame trained on",
-        "seen in pictures",
-        partial(better, "render30-own", "wamnet-own", ("mse255",)),
-        "Read as: a smaller MSE than the render's. Each seed has a frame of its own.",
-    ),
-    Claim(
-        "worth",
-        "worth a render of 30 spp, on other frames",
-        "seen in pictures",
-        partial(better, "render30", "wamnet", ("mse255",)),
-        "Read as: a smaller MSE than the render's.",
-    ),
-    Claim(
-        "dncnn",
-        "DnCNN is worse, at full size",
-        "SSIM 0.44 to 0.68",
-        partial(better, "dncnn", "wamnet", ALL_THREE),
-        ITS_TRAINING,
-    ),
-    Claim(
-        "dncnn-resized",
-        "DnCNN is worse, on frames a quarter as wide, enlarged again",
-        "SSIM 0.44 to 0.68",
-        partial(better, "dncnn-shrunk", "wamnet", ALL_THREE),
-        ITS_TRAINING,
-    ),
-    Claim(
-        "dncnn-judged-small",
-        "DnCNN is worse, on frames a quarter as wide, judged there",
-        "SSIM 0.44 to 0.68",
-        partial(better, "dncnn-shrunk-own", "wamnet", ALL_THREE),
-        "Each of its pixels is the mean of 16 noisy ones, before any network: its input is another one.",
-    ),
-    Claim(
-        "pix2pix",
-        "pix2pix is 2 % better",
-        "SSIM 0.68 to 0.70",
-        two_percent,
-        "Read as: 0.02 of SSIM at least. " + ITS_TRAINING,
-    ),
+    Claim("worth-own", "worth a render of 30 spp, on the frame trained on", "seen in pictures",
+          partial(better, "render30-own", "wamnet-own", ("mse255",)),
+          "Read as: a smaller MSE than the render's. Each seed has a frame of its own."),
+    Claim("worth", "worth a render of 30 spp, on other frames", "seen in pictures",
+          partial(better, "render30", "wamnet", ("mse255",)), "Read as: a smaller MSE than the render's."),
+    Claim("dncnn", "DnCNN is worse, at full size", "SSIM 0.44 to 0.68",
+          partial(better, "dncnn", "wamnet", ALL_THREE), ITS_TRAINING),
+    Claim("dncnn-resized", "DnCNN is worse, on frames a quarter as wide, enlarged again",
+          "SSIM 0.44 to 0.68", partial(better, "dncnn-shrunk", "wamnet", ALL_THREE), ITS_TRAINING),
+    Claim("dncnn-judged-small", "DnCNN is worse, on frames a quarter as wide, judged there",
+          "SSIM 0.44 to 0.68", partial(better, "dncnn-shrunk-own", "wamnet", ALL_THREE),
+          "Each of its pixels is the mean of 16 noisy ones, before any network: its input is another one."),
+    Claim("pix2pix", "pix2pix is 2 % better", "SSIM 0.68 to 0.70", two_percent,
+          "Read as: 0.02 of SSIM at least. " + ITS_TRAINING),
     Claim("blocks", "pix2pix leaves blocks, WAMnet does not", "seen in pictures", blocks),
-    Claim(
-        "orientations",
-        "equally good for unknown orientations",
-        "no number",
-        orientations,
-        f"Read as: a gain over the input that is at most {EQUAL_DB:g} dB less.",
-    ),
-    Claim(
-        "lights",
-        "colours of other lights are not reproduced, trained on lights A (6.1)",
-        "seen in pictures",
-        partial(other_lights, A_ONLY),
-        f"Read as: {LOST:g} times as far off, in means over tiles.",
-    ),
-    Claim(
-        "several-lights",
-        "nor when trained on several sets of lights (6.2)",
-        "seen in pictures",
-        partial(other_lights, SEVERAL),
-        f"Read as: {LOST:g} times as far off, in means over tiles.",
-    ),
-)
+    Claim("orientations", "equally good for unknown orientations", "no number", orientations,
+          f"Read as: a gain over the input that is at most {EQUAL_DB:g} dB less."),
+    Claim("lights", "colours of other lights are not reproduced, trained on lights A (6.1)",
+          "seen in pictures", partial(other_lights, "A only"),
+          f"Read as: {LOST:g} times as far off, in means over tiles."),
+    Claim("several-lights", "nor when trained on several sets of lights (6.2)", "seen in pictures",
+          partial(other_lights, "16 sets"), f"Read as: {LOST:g} times as far off, in means over tiles."),
+)  # fmt: skip
 """All claims, in the order of the paper's numbers, then of its further studies."""
 
 
@@ -437,43 +334,6 @@ def decided(claim: Claim, found: Evidence) -> Values:
     answers = [answer.as_data() for answer in claim.ask(found)]
     said_of_it = {"claim": claim.text, "paper": claim.paper, "note": claim.note}
     return {**said_of_it, "verdict": together(answers), "answers": answers}
-
-
-# ---- what is measured here -------------------------------------------------------------------------------
-
-
-def timed(device: Executor, options: argparse.Namespace, kept: Results) -> None:
-    """Take the times of a step of the paper's training on one pair, and of a frame of the paper's network."""
-    if kept.get("times", 0) is not None:
-        return
-    size, steps, rounds = SMALL[options.scale]
-    scale = table1.SCALES[options.scale]
-    shot = Shot(size=scale.size, seed=TEST_SEED)
-    (pair,) = frames.pairs(options.cache / "frames", [shot], scale.train_spp, options.executor)
-    model, frame = paper_model(), noise(size)
-    ways = {
-        "step_s": lambda: seconds_a_step(PAPER, [pair], device, steps),
-        "frame_s": lambda: denoise_on(device, model, frame).seconds_run,
-    }
-    times = {name: list(found.seconds) for name, found in in_turns(ways, rounds).items()}
-    kept.put("times", 0, {**times, "device": device.device, "frame_px": size})
-
-
-def exposed(bench: Bench, kept: Results) -> None:
-    """Judge the noisy test frames of seed 0 at each exposure."""
-    if all(kept.get(_exposure(stops), 0) is not None for stops in STOPS):
-        return
-    found: dict[int, dict[str, list[float]]] = {stops: {} for stops in STOPS}
-    for case in bench.cases(0):
-        for stops, each in found.items():
-            pair = [to_display(f["color"], float(stops)) for f in (case.noisy, case.reference)]
-            error = metrics.mse(*pair)
-            numbers = {"psnr": metrics.psnr(*pair), "ssim": metrics.ssim(*pair), "mse255": error * LEVELS**2}
-            for name, value in {**numbers, "wrapped": scores.wrapped_mse(*pair)}.items():
-                each.setdefault(name, []).append(value)
-    for stops, each in found.items():
-        means = {name: float(np.mean(values)) for name, values in each.items()}
-        kept.put(_exposure(stops), 0, {"stops": stops, **means, PER_FRAME: each})
 
 
 def _exposure(stops: int) -> str:
@@ -528,48 +388,24 @@ def follows(psnr: Sequence[Sequence[float]], ssim: Sequence[Sequence[float]]) ->
     )
 
 
-def written(kept: Results) -> str:
-    """Return all that is said of the claims, from their records."""
-    return "\n".join(filter(None, (verdicts(kept), exposures(kept))))
-
-
-def _read(path: Path) -> Results | None:
-    """Return the results of a study, if it has run."""
-    return Results.read(path) if path.exists() else None
-
-
-def opened(options: argparse.Namespace) -> Results:
-    """Return Table 1's records, or refuse a folder without them."""
-    path = options.table / "table1.json"
-    if not path.exists():
-        way_out = f"python experiments/table1.py --scale {options.scale}, or another --table"
-        raise InputError("folder of Table 1", str(options.table), "has no table1.json", way_out)
-    settings = table1.settings_of(table1.SCALES[options.scale], options.executor)
-    return Results.open(path, "table1", settings)
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure what is missing, decide, and print the claims."""
-    parser = command.parser(__doc__ or "", "claims")
-    parser.add_argument("--table", type=Path, default=Path("out/table1"), help="folder of Table 1's records")
-    for study in ("generalisation", "lights"):
-        place = Path("out") / study / "results.json"
-        parser.add_argument(f"--{study}", type=Path, default=place, help=f"results of {study}.py")
-    parser.add_argument("--as-it-is", action="store_true", help="decide on what is there, measure nothing")
+    """Decide, and print the claims."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--table", type=Path, default=FOLDER / "table1.json", help="Table 1's results")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out/claims"), help="folder of the results")
     options = parser.parse_args(arguments)
-    table = opened(options)
-    kept = Results.open(options.output / "claims.json", "claims", {"scale": options.scale})
-    if not options.as_it_is:
-        with open_executor(options.executor) as device:
-            exposed(Bench.of(table1.SCALES[options.scale], options.cache, device), kept)
-            timed(device, options, kept)
-    found = Evidence(table, _read(options.generalisation), _read(options.lights), kept.get("times", 0))
+    before = Records()["claims"]
+    kept = Results.open(options.output / "claims.json", "claims", before.settings)
+    for record in before.records():
+        if "verdict" not in record["values"]:
+            kept.put(record["configuration"], 0, record["values"])
+    found = Evidence(Results.read(options.table), times=kept.get("times", 0))
     for claim in CLAIMS:
         kept.put(claim.name, 0, decided(claim, found))
-    text = written(kept)
-    write_text(options.output / "claims.md", text)
-    print(text, end="")
+    print("\n".join(filter(None, (verdicts(kept), exposures(kept)))), end="")
 
 
 if __name__ == "__main__":
-    command.begin(main)
+    begin(main)

@@ -18,12 +18,10 @@
 from __future__ import annotations
 
 import argparse
-import copy
 import fcntl
 import hashlib
 import json
 import os
-import re
 import selectors
 import statistics
 import subprocess
@@ -48,7 +46,6 @@ from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.plan import Plan
 from wamnet.compiler.schedules.common import kernel_gather
-from wamnet.compiler.schedules.schedules import Grouped
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.bench.workload import noise, paper_model
 from wamnet.kernels.devices.executor import Executor
@@ -159,10 +156,6 @@ WAYS: Mapping[str, Way] = {
 TORCH = "torch"
 """The peer's name among the languages."""
 
-MADE = re.compile(r"group:(\d+)@(\d+)x(\d+)(s?)")
-"""A grouped schedule: pixels of an item, items (x, y) of a group; s: functions take scalars, not vectors."""
-
-
 # ---- one language and network, in a process of its own ----------------------------------------------------
 
 
@@ -173,16 +166,9 @@ def network(name: str) -> tuple[Model, str]:
 
 
 def planned(name: str, target: str, schedule: str) -> Plan:
-    """Return the plan of a network; a schedule may be one that the target does not have."""
+    """Return the plan of a network."""
     model, variant = network(name)
-    plan = replace(plan_model(model, target, "ieee", schedule, variant), proves=False)
-    if found := MADE.fullmatch(schedule):
-        dialect = copy.copy(next(s for s in plan.target.schedules if isinstance(s, Grouped)).dialect)
-        dialect.wide = dialect.wide and not found[4]
-        size = int(found[2]), int(found[3])
-        made = Grouped(schedule, "a trial", dialect, int(found[1]), size)
-        plan = replace(plan, target=replace(plan.target, schedules=(*plan.target.schedules, made)))
-    return plan
+    return replace(plan_model(model, target, "ieee", schedule, variant), proves=False)
 
 
 def images_for(name: str, size: tuple[int, int]) -> dict[str, Picture]:
@@ -521,7 +507,7 @@ def rows(results: Results) -> str:
     for record in results.records():
         values = record["values"]
         name = next(n for n in MODELS if record["configuration"].endswith(f", {n}"))
-        if "ms" in values and not MADE.fullmatch(values["schedule"]):
+        if "ms" in values and "@" not in values["schedule"]:  # groups of other sizes
             language = record["configuration"].partition(", ")[0]
             found.setdefault((language, values["schedule"]), {})[name] = values
     cells = []
@@ -559,7 +545,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at a time")
     parser.add_argument("--only", type=listed, default=(*WAYS, TORCH), help="languages")
     parser.add_argument("--models", type=lambda t: tuple(t.split(";")), default=tuple(MODELS), help="by ;")
-    parser.add_argument("--schedules", type=listed, default=(), help="others, as group:2@32x4")
+    parser.add_argument("--schedules", type=listed, default=(), help="others, as tile:8")
     parser.add_argument("--prepared", type=Path, help="folder of SPIR-V and references")
     parser.add_argument("--prepare", action="store_true", help="write that folder, and end")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/gpu"), help="folder of the results")

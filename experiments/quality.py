@@ -10,9 +10,9 @@
 3. Each score comes with the number of samples per pixel whose render has the same error [`climbed`].
 4. Networks are certified: how far a kernel may be off, over all pictures [`certified`]. Times of a frame
    are interleaved, and go from frame to picture in display encoding [`timed`].
-5. Records hold every frame's scores. Tables have means and 95 % intervals over frames and seeds, and so have
-   the differences between two rows, frame by frame [`report`]. The folder gets `quality.json`, `times.json`
-   and `quality.md`, and a sheet of pictures for each set.
+5. Records hold every frame's scores. Tables have means and 95 % intervals over frames and seeds; those of
+   documents, and differences between two rows, are in lab/shown.py. The folder gets `quality.json`,
+   `times.json` and `quality.md`, and a sheet of pictures for each set.
 
 Open Image Denoise gets linear radiance with `hdr`, and albedo and normals: noisy ones, such that it has
 denoised first, or such that are declared clean. Its result is linear, and is clipped and sRGB-encoded before
@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lab import command, figures, intervals, results, scores, tables, training
+from lab import command, figures, results, scores, tables, training
 from lab.frames import Pair, Shot, frames, noisy, past_mirrors, reference
 from lab.results import PER_FRAME, Results, Values
 from lab.sets import SETS, Counts, compared
@@ -152,50 +152,28 @@ ROWS: Mapping[str, Row] = {
     "input": Row("input, 1 spp", 1),
     "oidn-color": Row("Open Image Denoise, high, colour only", 1, quality="high"),
     "oidn-1": Row("Open Image Denoise, high, noisy features (1 ray)", 1, quality="high", aux="noisy"),
-    "oidn-prefiltered1": Row(
-        "Open Image Denoise, high, prefiltered features (1 ray)", 1, quality="high", aux="prefiltered"
-    ),
-    "oidn-clean1": Row(
-        "Open Image Denoise, high, noisy features declared clean", 1, quality="high", aux="clean"
-    ),
-    "oidn-clean16": Row(
-        f"Open Image Denoise, high, features of {RAYS} rays", RAYS, quality="high", aux="clean"
-    ),
-    "oidn-fast16": Row(
-        f"Open Image Denoise, fast, features of {RAYS} rays", RAYS, quality="fast", aux="clean"
-    ),
-    "oidn-past-clean16": Row(
-        f"Open Image Denoise, high, specular features of {RAYS} rays",
-        RAYS,
-        "",
-        "high",
-        "clean",
-        past=True,
-    ),
-    "oidn-past-prefiltered16": Row(
-        f"Open Image Denoise, high, prefiltered specular features of {RAYS} rays",
-        RAYS,
-        quality="high",
-        aux="prefiltered",
-        past=True,
-    ),
-    "oidn-past-apart16": Row(
-        "the same, with visible emission subtracted before and added after",
-        RAYS,
-        quality="high",
-        aux="prefiltered",
-        past=True,
-        apart=True,
-    ),
+    "oidn-prefiltered1": Row("Open Image Denoise, high, prefiltered features (1 ray)",
+        1, quality="high", aux="prefiltered"),
+    "oidn-clean1": Row("Open Image Denoise, high, noisy features declared clean",
+        1, quality="high", aux="clean"),
+    "oidn-clean16": Row(f"Open Image Denoise, high, features of {RAYS} rays",
+        RAYS, quality="high", aux="clean"),
+    "oidn-fast16": Row(f"Open Image Denoise, fast, features of {RAYS} rays",
+        RAYS, quality="fast", aux="clean"),
+    "oidn-past-clean16": Row(f"Open Image Denoise, high, specular features of {RAYS} rays",
+        RAYS, quality="high", aux="clean", past=True),
+    "oidn-past-prefiltered16": Row(f"Open Image Denoise, high, prefiltered specular features of {RAYS} rays",
+        RAYS, quality="high", aux="prefiltered", past=True),
+    "oidn-past-apart16": Row("the same, with visible emission subtracted before and added after",
+        RAYS, quality="high", aux="prefiltered", past=True, apart=True),
     "short-1": Row("wamnet, preset `short`, features of 1 ray", 1, "short"),
     "best-1": Row("wamnet, preset `best`, features of 1 ray", 1, "best"),
     "best-16": Row(f"wamnet, preset `best`, features of {RAYS} rays", RAYS, "best"),
     "page-16": Row(f"wamnet, inputs and steps of the web page, {RAYS} rays", RAYS, "page"),
     "basic-16": Row(f"wamnet, colour, normal and albedo alone, {RAYS} rays", RAYS, "basic"),
     "page48-16": Row(f"wamnet, the same with 48 neurons per layer, {RAYS} rays", RAYS, "page48"),
-    "smooth-page-16": Row(
-        "inputs of the web page, filtered colour, 8x8 window, 64 neurons", RAYS, "smooth-page"
-    ),
+    "smooth-page-16": Row("inputs of the web page, filtered colour, 8x8 window, 64 neurons",
+        RAYS, "smooth-page"),
     "past-16": Row(f"wamnet, preset `best`, specular features of {RAYS} rays", RAYS, "past", past=True),
     "bright-16": Row("the same, plus clipped highlights", RAYS, "bright", past=True),
     "narrow-16": Row("the same, 8x8 window, 64 neurons per layer", RAYS, "narrow", past=True),
@@ -210,7 +188,7 @@ ROWS: Mapping[str, Row] = {
     "sun-16": Row("7x7 window, plus sun direction (preset `sky`)", RAYS, "sun", past=True),
     "sun48-16": Row("the same, 48 neurons per layer", RAYS, "sun48", past=True),
     "shipped": Row(f"wamnet, the bundled network, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
-}
+}  # fmt: skip
 """The rows by name."""
 
 TIMED = ("oidn-fast16", "oidn-clean16", "page-16")
@@ -441,65 +419,21 @@ SPLITS = {TEST: "inside the training range", OUTSIDE: "outside it"}
 """The kinds of test frames, in words."""
 
 
-def report(kept: Results, clock: Results | None, names: Sequence[str], rows: Sequence[str]) -> str:
-    """Return all tables as Markdown."""
-    parts = []
-    for name in names:
-        for split, text in SPLITS.items():
-            texts = {configuration(name, split, row): ROWS[row].text for row in rows}
-            found = [key for key in texts if kept.summary(key, "psnr") is not None]
-            if found:
-                shown = {key: texts[key] for key in found}
-                parts += [f"## {name}, {text}\n", tables.table(kept, COLUMNS, shown)]
-                parts.append(ahead(kept, name, split, rows))
-    if clock is not None and (times := clock.get("times", 0)) is not None:
-        cells = [
-            [name, f"{1000 * float(np.median(s)):.1f}", f"{1000 * min(s):.1f} - {1000 * max(s):.1f}"]
-            for name, s in times["seconds"].items()
-        ]
-        heads = ["a frame, interleaved", "ms, median", "ms, range"]
-        parts += [
-            f"## Time ({times['device']}, schedule {times['schedule']})\n",
-            tables.markdown(heads, cells),
-        ]
-    return "\n".join(part for part in parts if part)
+def report(kept: Results, names: Sequence[str], rows: Sequence[str]) -> str:
+    """Return the table of scores as Markdown."""
+    keys = {
+        configuration(name, split, row): f"{name}, {text}: {ROWS[row].text}"
+        for name in names
+        for split, text in SPLITS.items()
+        for row in rows
+    }
+    shown = {key: text for key, text in keys.items() if kept.summary(key, "psnr") is not None}
+    return tables.table(kept, COLUMNS, shown)
 
 
 def configuration(name: str, split: str, row: str) -> str:
     """Return the name of a record's configuration."""
     return f"{name}, {split}: {row}"
-
-
-HARD_ROWS = (
-    *("past-16", "bright-16", "narrow-16", "long-16", "hard-16", "slow-16"),
-    *("smooth-16", "smooth-slow-16", "lit-16", "lit-slow-16"),
-)
-"""Rows for scenes with mirrors, metal and glass: one idea after the other, then longer trainings."""
-
-OURS = {
-    "best-1": (1,),
-    **dict.fromkeys(("best-16", "page-16", "page48-16", "smooth-page-16", "shipped", *HARD_ROWS), (1, RAYS)),
-}
-"""Rows of ours that are compared with Open Image Denoise, and the rays of what it may be given then."""
-
-
-def ahead(kept: Results, name: str, split: str, rows: Sequence[str]) -> str:
-    """Return by how much each of ours is ahead of the best Open Image Denoise with the same features."""
-    lines = []
-    for ours, rays in OURS.items():
-        own = kept.per_pose(configuration(name, split, ours), "psnr")
-        found = {
-            peer: kept.per_pose(configuration(name, split, peer), "psnr")
-            for peer in rows
-            if ROWS[peer].quality and ROWS[peer].rays in rays and (ROWS[ours].past or not ROWS[peer].past)
-        }
-        found = {peer: values for peer, values in found.items() if len(values) == len(own)}
-        if not own or not found:
-            continue
-        peer = max(found, key=lambda name: float(np.mean(found[name])))
-        gap = intervals.paired(own, found[peer])
-        lines.append(f"* {ROWS[ours].text}: {gap.text()} dB ahead of {ROWS[peer].text}.\n")
-    return "".join(lines)
 
 
 def drawn(bench: Bench, path: Path, rows: Sequence[str]) -> None:
@@ -554,7 +488,7 @@ def work(options: argparse.Namespace) -> None:
         drawn(bench, options.output / f"{name}.png", options.only)
     if options.rounds:
         timed(Bench(options.sets[0], plan, options.cache, options.executor), clock, options.rounds)
-    text = report(kept, clock, options.sets, options.only)
+    text = report(kept, options.sets, options.only)
     write_text(options.output / "quality.md", text)
     print(text)
 

@@ -1,18 +1,16 @@
 """Table 1 of the paper, with what its readers would ask for today: every denoiser on the same frames.
 
     python experiments/table1.py
-    python experiments/table1.py --scale paper --plan
     python experiments/table1.py --scale paper --only wamnet wamnet-own --seeds 0 1 2
 
 1. Frames of `minicubes` at times of the golden-ratio sequence are rendered and kept, each of another
    geometry: to train on, to look at while training, and to judge by [`baselines/rows.py`].
-2. How long what is missing will take is said first [`forecast`].
-3. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
+2. Each row is trained, tuned or opened for each seed, which is that of the noise too, and judged on the test
    frames [`judged`]. A row without its packages is left out, and said so. DnCNN and pix2pix are trained until
    their error on the validation frames is flat [`baselines/fitting.py`].
-4. Times of a frame, of its input and of a step of training are interleaved, on the same cores, when
+3. Times of a frame, of its input and of a step of training are interleaved, on the same cores, when
    everything else is done [`timed`].
-5. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
+4. The folder gets `table1.json`, `times.json`, `table1.md` with a table of qualities and one of costs, the
    pictures of the first test frame, `curves.png` with the validation errors, and `crops.png`: a crop around a
    corner of pix2pix's patches [`drawn`].
 
@@ -36,7 +34,7 @@ from typing import Any
 import numpy as np
 from baselines.blocks import blockiness
 from baselines.rows import ROWS, Bench, Case, Ready, Row, Scale, compared
-from lab import command, figures, results, scores, tables
+from lab import command, figures, plots, results, scores, tables
 from lab.frames import Shot
 from lab.results import PER_FRAME, Results, Summary, Values
 
@@ -52,51 +50,27 @@ from wamnet.refimpl.errors import InputError
 
 SCALES: Mapping[str, Scale] = {
     "toy": Scale(
-        size=128,
-        train=3,
-        validation=1,
-        test=2,
-        train_spp=2,
-        validation_spp=2,
-        test_spp=16,
-        ladder=(1, 4),
-        short_frames=2,
-        paper={"steps": 2, "batch": 64, "n_windows": 128},
-        short={"steps": 2, "batch": 32},
+        size=128, train=3, validation=1, test=2, train_spp=2, validation_spp=2, test_spp=16, ladder=(1, 4),
+        short_frames=2, paper={"steps": 2, "batch": 64, "n_windows": 128}, short={"steps": 2, "batch": 32},
         dncnn={"steps": 1, "batch": 1, "crop": 16, "width": 4},
         shrunk={"steps": 1, "batch": 1, "crop": 8, "width": 4, "shrink": 4},
         pix2pix={"steps": 1, "batch": 1, "crop": 64, "width": 4},
     ),
     "small": Scale(
-        size=256,
-        train=24,
-        validation=2,
-        test=8,
-        train_spp=256,
-        validation_spp=256,
-        test_spp=1024,
-        ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256),
-        short_frames=24,
+        size=256, train=24, validation=2, test=8, train_spp=256, validation_spp=256, test_spp=1024,
+        ladder=(1, 2, 4, 8, 16, 32, 64, 128, 256), short_frames=24,
         dncnn={"steps": 6000, "batch": 16, "crop": 40, "half": True},
         shrunk={"steps": 6000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 12_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
     "paper": Scale(
-        size=1024,
-        train=4,
-        validation=2,
-        test=4,
-        train_spp=1024,
-        validation_spp=256,
-        test_spp=1024,
-        ladder=(1, 4, 16, 30, 64, 128),
-        short_frames=4,
-        few=(0,),
+        size=1024, train=4, validation=2, test=4, train_spp=1024, validation_spp=256, test_spp=1024,
+        ladder=(1, 4, 16, 30, 64, 128), short_frames=4, few=(0,),
         dncnn={"steps": 30_000, "batch": 16, "crop": 40, "half": True},
         shrunk={"steps": 5000, "batch": 8, "crop": 40, "half": True, "shrink": 4},
         pix2pix={"steps": 80_000, "batch": 1, "crop": 128, "width": 32, "every": 200},
     ),
-}
+}  # fmt: skip
 """Sizes by name. `paper` has the paper's pictures, references and training of WAMnet, and fewer frames: the
 paper had 1,000 to train on and 100 to test by."""
 
@@ -332,12 +306,14 @@ def curves(folder: Path, kept: Results) -> None:
     """Draw the validation errors of the rows that have some, over the steps of their training."""
     lines = {}
     for row in ROWS:
-        looks = [(seed, curve) for seed, curve in enumerate(kept.of(row, "curve")) if ROWS[row].timed]
-        for number, curve in looks:
+        looks = kept.of(row, "curve") if ROWS[row].timed else []
+        for number, curve in enumerate(looks):
             name = ROWS[row].text if len(looks) == 1 else f"{ROWS[row].text}, run {number}"
-            lines[name] = [(look["step"], [look["psnr"]]) for look in curve]
+            lines[name] = [(look["step"], *[look["psnr"]] * 3) for look in curve]
     if lines:
-        figures.curves(folder / "curves.png", lines, ("steps", "PSNR of the validation frames, dB"))
+        figure, (axis,) = plots.axes(1, (8.4, 4.0))
+        plots.lines(axis, lines, ("steps", "PSNR of the validation frames, dB"))
+        figures.save(folder / "curves.png", figure)
 
 
 def drawn(folder: Path, pictures: Path, size: int, patch: int) -> None:
@@ -367,26 +343,6 @@ def available(rows: Sequence[str]) -> list[str]:
     return kept
 
 
-def forecast(bench: Bench, rows: Sequence[tuple[str, int]]) -> None:
-    """Say on standard error how long what is missing will take."""
-    from baselines import forecast as probes
-
-    parts = {"rendering": probes.rendering(bench, probes.wanted(bench, rows))}
-    for row in dict.fromkeys(row for row, _ in rows):
-        runs = sum(name == row for name, _ in rows)
-        if seconds := runs * probes.training(bench, row):
-            parts[f"training {row}, {runs} x"] = seconds
-    parts["judging"] = probes.judging(bench, rows)
-    total = sum(parts.values())
-    sys.stderr.write(f"table1: {_span(total)} at most, without times of frames\n")
-    sys.stderr.write("".join(f"  {name}: {_span(seconds)}\n" for name, seconds in parts.items()))
-
-
-def _span(seconds: float) -> str:
-    """Return seconds or minutes."""
-    return f"{seconds / 60:.0f} minutes" if seconds >= 100 else f"{math.ceil(seconds)} seconds"
-
-
 def left(
     kept: Results, rows: Sequence[str], seeds: Sequence[int] | None, scale: Scale
 ) -> Iterator[tuple[str, int]]:
@@ -414,7 +370,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # Costly rows have fewer seeds than others, unless seeds are given.
     parser.set_defaults(seeds=None)
     parser.add_argument("--only", nargs="+", choices=list(ROWS), default=list(ROWS), help="rows")
-    parser.add_argument("--plan", action="store_true", help="say how long it will take, and stop")
     parser.add_argument("--no-times", action="store_true", help="leave the times of frames for later")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="rounds of the times")
     options = parser.parse_args(arguments)
@@ -438,10 +393,6 @@ def run(options: argparse.Namespace) -> None:
         if kept.get("frames", 0) is None:
             kept.put("frames", 0, compared(bench.split))
         missing = list(left(kept, rows, options.seeds, scale))
-        if missing:
-            forecast(bench, missing)
-        if options.plan:
-            return
         with hint_on_interrupt(lambda: f"the same command resumes where it was, in {folder}"):
             for row, seed in missing:
                 sys.stderr.write(f"table1: {row}, seed {seed}\n")

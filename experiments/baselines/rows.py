@@ -466,54 +466,33 @@ TORCH, OIDN = ("torch",), ("pyoidn",)
 ROWS: Mapping[str, Row] = {
     "input": Row("input, 1 spp", as_it_is, timed=False),
     "dncnn": Row("DnCNN", dncnn, TORCH, "dncnn", few=True),
-    "dncnn-shrunk": Row(
-        "DnCNN on frames a quarter as large, enlarged", partial(shrunk_dncnn, False), TORCH, "shrunk", True
-    ),
-    "dncnn-shrunk-own": Row(
-        "the same, judged at that size", partial(shrunk_dncnn, True), TORCH, "shrunk", True, timed=False
-    ),
-    "wamnet-color": Row(
-        "WAMnet without normals, preset `paper`", partial(wamnet, COLOR, "paper"), trains="paper"
-    ),
-    "wamnet-color-own": Row(
-        "the same, on the frame it was trained on",
-        partial(on_its_own_frame, COLOR),
-        trains="paper",
-        timed=False,
-    ),
+    "dncnn-shrunk": Row("DnCNN on frames a quarter as large, enlarged",
+        partial(shrunk_dncnn, False), TORCH, "shrunk", True),
+    "dncnn-shrunk-own": Row("the same, judged at that size",
+        partial(shrunk_dncnn, True), TORCH, "shrunk", True, timed=False),
+    "wamnet-color": Row("WAMnet without normals, preset `paper`",
+        partial(wamnet, COLOR, "paper"), trains="paper"),
+    "wamnet-color-own": Row("the same, on the frame it was trained on",
+        partial(on_its_own_frame, COLOR), trains="paper", timed=False),
     "wamnet": Row("WAMnet, preset `paper`", partial(wamnet, PAPER, "paper"), trains="paper"),
-    "wamnet-own": Row(
-        "the same, on the frame it was trained on",
-        partial(on_its_own_frame, PAPER),
-        trains="paper",
-        timed=False,
-    ),
+    "wamnet-own": Row("the same, on the frame it was trained on",
+        partial(on_its_own_frame, PAPER), trains="paper", timed=False),
     "wamnet-short": Row("WAMnet, preset `short`", partial(wamnet, SHORT, "short"), trains="short"),
-    "wamnet-best": Row(
-        "WAMnet, preset `best`, features of 16 camera rays",
-        partial(wamnet, BEST, "short", rays=EQUAL_RAYS),
-        trains="short",
-    ),
+    "wamnet-best": Row("WAMnet, preset `best`, features of 16 camera rays",
+        partial(wamnet, BEST, "short", rays=EQUAL_RAYS), trains="short"),
     "pix2pix": Row("pix2pix", pix2pix, TORCH, "pix2pix", few=True),
     "oidn": Row("Open Image Denoise, colour only", partial(open_image_denoise, "none"), OIDN),
     "oidn-noisy": Row("the same, with albedo and normal", partial(open_image_denoise, "noisy"), OIDN),
-    "oidn-prefiltered": Row(
-        "the same, with prefiltered ones", partial(open_image_denoise, "prefiltered"), OIDN
-    ),
-    "oidn-rays": Row(
-        "the same, with prefiltered ones of 16 camera rays",
-        partial(open_image_denoise, "prefiltered", rays=EQUAL_RAYS),
-        OIDN,
-    ),
-    "oidn-spp": Row(
-        "the same, with prefiltered ones, 3 spp",
-        partial(open_image_denoise, "prefiltered", spp=EQUAL_SPP),
-        OIDN,
-    ),
+    "oidn-prefiltered": Row("the same, with prefiltered ones",
+        partial(open_image_denoise, "prefiltered"), OIDN),
+    "oidn-rays": Row("the same, with prefiltered ones of 16 camera rays",
+        partial(open_image_denoise, "prefiltered", rays=EQUAL_RAYS), OIDN),
+    "oidn-spp": Row("the same, with prefiltered ones, 3 spp",
+        partial(open_image_denoise, "prefiltered", spp=EQUAL_SPP), OIDN),
     "oidn-clean": Row("the same, with clean ones", partial(open_image_denoise, "clean"), OIDN),
     "svgf": Row("SVGF's spatial filter (a-trous)", svgf, few=True),
     "nlm": Row("non-local means", non_local_means, ("skimage",), few=True),
     "render30": Row("render, 30 spp", partial(more_samples, 30, False)),
     "render30-own": Row("the same, of the frames trained on", partial(more_samples, 30, True), timed=False),
-}
+}  # fmt: skip
 """All rows by name, in the order of the table: a new one is a function and a line here."""

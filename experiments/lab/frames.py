@@ -1,6 +1,6 @@
 """Frames of canonical scenes, rendered once: a folder keeps them, each under the checksum of its file.
 
-1. What is wanted is data: a scene at a time with its parameters, a size, samples, a seed [`Shot`].
+1. What is wanted is data: a scene at a time, a size, samples, a seed [`Shot`].
 2. Its file is named after all that determines its pixels, and ends in the SHA-256 of its bytes, so that file
    and checksum appear in one step [`path_of`]. One that was damaged is rendered again [`find`].
 3. Whatever is missing is rendered by a device or by the reference, with progress [`render_all`]. Shots of one
@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,7 @@ from wamnet.cli.files import exr
 from wamnet.cli.files.dataset_files import sum_of
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
-from wamnet.models.data.draws import times
 from wamnet.models.data.frame_plan import version
-from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, SUN, Frame
 from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, feature_job, render_info
@@ -41,22 +39,16 @@ NOISY_SPP = 1
 DIGITS = 16
 """Hexadecimal digits of a shot's digest in a file's name: two shots never share them."""
 
-TIMES_SEED = 0
-"""Seed of the sequence of times of all experiments."""
-
-RANDOM = Settings().sampler
-"""Source of camera rays that are independent of each other."""
-
 Pair = tuple[Frame, Frame]
 """A noisy frame and its reference."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture to be rendered; `parameters` are those of the canonical scene, without its time.
+    """A picture to be rendered.
 
-    Its features are means over `feature_spp` camera rays of `feature_sampler`; 0: over the colour's. Records
-    were made with rays at random. `seen`: features are also of what is seen past mirrors and glass.
+    Its features are means over `feature_spp` camera rays at random; 0: over the colour's. `seen`: features
+    are also of what is seen past mirrors and glass.
     """
 
     scene: str = "minicubes"
@@ -64,21 +56,19 @@ class Shot:
     size: int = 128
     spp: int = NOISY_SPP
     seed: int = 0
-    parameters: Mapping[str, Any] = field(default_factory=dict)
     feature_spp: int = 0
     variation: Variation = AT_REST
     seen: bool = False
-    feature_sampler: str = RANDOM
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        rays = {"feature_spp": self.feature_spp, "feature_sampler": self.feature_sampler}
+        rays = {"feature_spp": self.feature_spp, "feature_sampler": Settings().sampler}
         return Job(self.size, self.size, self.spp, self.seed, seen=self.seen, **rays)  # type: ignore[arg-type]
 
     def build(self) -> Scene:
         """Return the scene at its time, from its side and under its lamps."""
-        scene = canonical(self.scene, **{**self.parameters, "time": self.time})
+        scene = canonical(self.scene, time=self.time)
         return scene if self.variation == AT_REST else varied(scene, self.variation)
 
 
@@ -87,8 +77,7 @@ def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     job = shot.job.facts()
     if not shot.feature_spp:
         del job["feature_spp"]  # these files are older than it is
-    if not shot.feature_spp or shot.feature_sampler == RANDOM:
-        del job["feature_sampler"]  # and so are these
+    del job["feature_sampler"]  # the same for all
     scene = shot.build()
     layers = sorted([*shot.job.layers, *([SUN] if sun_of(scene) is not None else [])])
     made_from = [scene_digest(scene), job, executor, layers, version()]
@@ -169,22 +158,3 @@ def reference(shot: Shot, spp: int) -> Shot:
 def noisy(shot: Shot) -> Shot:
     """Return the noisy shot itself, with an even seed."""
     return replace(shot, spp=NOISY_SPP, seed=2 * shot.seed)
-
-
-def pairs(folder: Path, shots: Sequence[Shot], spp: int, executor: str = "opencl") -> list[Pair]:
-    """Return a noisy frame and a reference of `spp` samples of each shot."""
-    if spp <= NOISY_SPP:
-        raise InputError("samples of a reference", spp, f"more than {NOISY_SPP}", "a thousand are clean")
-    found = frames(folder, [make(shot) for shot in shots for make in (noisy, _with(spp))], executor)
-    return list(zip(found[::2], found[1::2], strict=True))
-
-
-def _with(spp: int) -> Any:
-    """Return what makes a reference of so many samples."""
-    return lambda shot: reference(shot, spp)
-
-
-def split_times(train: int, test: int, seconds: float, start: float = 0.0) -> tuple[list[float], list[float]]:
-    """Return times of training frames and, continuing their sequence, of tests: no two show one pose."""
-    found = times(TIMES_SEED, start, seconds, 0, train + test)
-    return found[:train], found[train:]

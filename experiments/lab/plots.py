@@ -17,7 +17,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from .figures import MARKERS, STYLES
 from .records import FOLDER, ROOT, Records, pending
 from .results import Results
 
@@ -26,6 +25,9 @@ IMAGES = "docs/images"
 
 LINE = "<!-- records and code: {} -->\n"
 """The last line of a plot."""
+
+STYLES, MARKERS = ("-", "--", "-.", ":"), "osv^Dx*P"
+"""Lines and points can be told apart in grey too."""
 
 Line = Sequence[tuple[float, float, float, float]]
 """Points (x, mean, low, high)."""

@@ -38,15 +38,13 @@ LOWER_IS_BETTER = ("mse", "mse255", "wrapped", "flip", "relmse", "smape")
 """The scores that fall as a picture gets better."""
 
 
-def score(
-    picture: Floats, reference: Floats, linear: Floats | None = None, exposure_stops: float = 0.0
-) -> dict[str, float]:
+def score(picture: Floats, reference: Floats, linear: Floats | None = None) -> dict[str, float]:
     """Return every score of a display-encoded picture (H, W, 3) against linear radiance (H, W, 3).
 
     `linear`: the picture's radiance, where it is known; else its colours are decoded.
     """
-    target = to_display(reference, exposure_stops)
-    radiance = from_display(picture, exposure_stops) if linear is None else linear
+    target = to_display(reference)
+    radiance = from_display(picture) if linear is None else linear
     error = metrics.mse(picture, target)
     return {
         "mse": error,
@@ -127,11 +125,11 @@ class Ladder:
         return float(np.exp(np.interp(math.log(spp), np.log(self.spp), np.log(self.mse))))
 
 
-def ladder(renders: Mapping[int, Sequence[tuple[Floats, Floats]]], exposure_stops: float = 0.0) -> Ladder:
+def ladder(renders: Mapping[int, Sequence[tuple[Floats, Floats]]]) -> Ladder:
     """Return the ladder of (render, reference) pairs of linear radiance, by samples per pixel."""
     rungs: dict[int, Any] = {}
     for spp, found in sorted(renders.items()):
-        errors = [metrics.mse(*(to_display(image, exposure_stops) for image in pair)) for pair in found]
+        errors = [metrics.mse(*(to_display(image) for image in pair)) for pair in found]
         rungs[spp] = float(np.mean(errors))
     values = tuple(rungs.values())
     if any(not a > b for a, b in pairwise(values)):

@@ -1,7 +1,7 @@
 """What texts show of the records: tables, figures in sentences, and plots, by name.
 
 1. A table is a function of the records in `TABLES` [`lab/texts.py`]; most are made by [`study`], from the
-   columns that the experiment itself prints, or by [`as_printed`], from what a program has printed.
+   columns that the record names, or by [`as_printed`], from what a program has printed.
 2. A figure that is computed from several values is a function in `FIGURES`; one that is a value needs none.
 3. Plots are in lab/gallery.py.
 """
@@ -18,18 +18,18 @@ from typing import Any
 from wamnet.refimpl.errors import InputError
 
 from . import printed, same, support, tables
-from .intervals import paired
+from .intervals import interval, paired
 from .records import Records
-from .results import PER_FRAME, Results, number
+from .results import PER_FRAME, Results, number, summary
 from .speeds import TableOf, speed_against_error, speed_short
 from .tables import Column
 
 
-def study(name: str, first: str = "", columns: str = "COLUMNS") -> TableOf:
-    """Return the table of a study: all its configurations, under the columns of its module [`intervals`]."""
+def study(name: str, first: str = "") -> TableOf:
+    """Return the table of a study: all its configurations, under the columns of its record [`intervals`]."""
 
     def made(records: Records) -> str:
-        shown = getattr(importlib.import_module(name), columns)
+        shown = [Column(*column) for column in records[name].data()["columns"]]
         return tables.table(records[name], intervals(records[name], shown), first=first)
 
     return made
@@ -59,11 +59,6 @@ def whole_pictures(records: Records) -> str:
 
 TIMES = ("s", "ms", "schedule")
 """Columns of programs that measure quality, whose times say nothing: other work ran beside them."""
-
-
-def chosen(record: str, columns: Sequence[Column], rows: Mapping[str, str], first: str = "") -> TableOf:
-    """Return a table of some configurations, by what a reader calls them, and some values."""
-    return lambda records: tables.table(records[record], columns, rows, first)
 
 
 # ---- the presets beside Open Image Denoise --------------------------------------------------------------
@@ -242,9 +237,8 @@ def _mean(found: Results, configuration: str, value: str) -> float:
 
 def departures(records: Records) -> str:
     """Return the PSNR of each choice that the paper leaves open."""
-    choices = importlib.import_module("departures").CHOICES
-    names = {name: choice.text for name, choice in choices.items()}
-    return tables.table(records["departures"], [Column("psnr", "PSNR, dB")], names, "choice")
+    found = records["departures"]
+    return tables.table(found, [Column("psnr", "PSNR, dB")], found.data()["rows"], "choice")
 
 
 def departure(name: str, sign: float = 1.0) -> Callable[[Records], str]:
@@ -258,20 +252,52 @@ def departure(name: str, sign: float = 1.0) -> Callable[[Records], str]:
     return made
 
 
+MARKS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 90.0)
+"""Seconds of training at which the table gives the quality; the last is the paper's."""
+
+
 def learning_curve(records: Records) -> str:
-    """Return the quality after so many seconds."""
-    module = importlib.import_module("learning_curve")
+    """Return the quality after so many seconds, where no seed had been at its end or not looked at yet."""
     found = records["learning_curve"]
-    heads = ["preset", *(f"after {mark:g} s" for mark in module.MARKS_S), "at the end, dB", "s"]
+    heads = ["preset", *(f"after {mark:g} s" for mark in MARKS_S), "at the end, dB", "s"]
     rows = []
     for name in found.configurations():
-        curves = found.of(name, "curve")
-        cells = [
-            module._cell([module.at(curve, mark, "psnr") for curve in curves]) for mark in module.MARKS_S
-        ]
-        ends = [module._cell([c[-1][what] for c in curves], n) for what, n in (("psnr", 2), ("seconds", 0))]
-        rows.append([name, *cells, *ends])
+        curves, cells = found.of(name, "curve"), []
+        for mark in MARKS_S:
+            seen = [[point["psnr"] for point in curve if point["seconds"] <= mark] for curve in curves]
+            inside = all(0 < len(mine) < len(curve) for mine, curve in zip(seen, curves, strict=True))
+            cells.append(summary([mine[-1] for mine in seen]).text() if inside else "")
+        cells += [summary([c[-1][what] for c in curves]).text(n) for what, n in (("psnr", 2), ("seconds", 0))]
+        rows.append([name, *cells])
     return tables.markdown(heads, rows)
+
+
+def domain(records: Records) -> str:
+    """Return frames outside of a domain, distance and threshold, what is farthest off, and the loss."""
+    found = []
+    for record in records["domain"].records():
+        values = record["values"]
+        if "distance" in values:
+            lost = f"{values['lost']:.2f}" if "lost" in values else "–"
+            far = f"{values['distance']:.1f} ({values['threshold']:.1f})"
+            count = f"{values['outside']} of {values['frames']}"
+            found.append([record["configuration"], count, far, values["farthest"], lost])
+    heads = ["model: frames", "outside", "median distance (threshold)", "farthest off", "lost, dB"]
+    return tables.markdown(heads, found)
+
+
+def blender(records: Records) -> str:
+    """Return PSNR of the noisy frame, of Open Image Denoise and of the network, and its gain."""
+    found, rows = records["blender"], []
+    for name in found.configurations():
+        if found.of(name, "gain"):
+            means = [found.summary(name, score) for score in ("noisy", "oidn", "network")]
+            gain = paired(found.per_pose(name, "network"), found.per_pose(name, "oidn"))
+            flat = interval(found.per_pose(name, "flat gain"))
+            seconds = f"{max(found.of(name, 'seconds')):.0f}"
+            rows.append([name, *(f"{s.mean:.2f}" for s in means if s), gain.text(), flat.text(), seconds])
+    heads = ["noisy, dB", "Open Image Denoise, dB", "network, dB", "gain, dB", "away from edges, dB"]
+    return tables.markdown(["frames", *heads, "training, s"], rows)
 
 
 def generalisation(records: Records) -> str:
@@ -440,10 +466,11 @@ AS_PRINTED = (
     "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
-SHOWN_BY_MODULE = ("blender", "domain", "gpu", "house3")
+SHOWN_BY_MODULE = ("gpu", "house3")
 """Records whose module has a function `rows` that makes the table."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
+    "blender": blender,
     "bench-pipeline": whole_pictures,
     "bench-c-pipeline": as_printed("bench-c-pipeline"),
     "ablations": study("ablations", "all else as `short`"),
@@ -460,6 +487,7 @@ TABLES: Mapping[str, TableOf] = {
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
     "departures": departures,
+    "domain": domain,
     "fig-prediction": study("fig_prediction"),
     **{name: study(name) for name in ("flicker", "lights")},
     "generalisation": generalisation,

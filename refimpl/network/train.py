@@ -126,7 +126,7 @@ SHORT = Recipe(
     learning_rate=1e-3,
     schedule="cosine",
 )
-"""Better than the paper's protocol on unseen frames in about a minute; chosen by `experiments/presets.py`."""
+"""Better than the paper's protocol on unseen frames in a minute: `experiments/records/presets.json`."""
 
 BEST = replace(SHORT, steps=30_000)
 """The same for longer, which pays with many frames; chosen by `experiments/quality.py`."""

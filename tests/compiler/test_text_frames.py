@@ -4,6 +4,7 @@ import functools
 import json
 
 import pytest
+import text_classes
 import text_faults
 from texts import kernel, parts, planned
 
@@ -16,7 +17,7 @@ from wamnet.compiler.reading.languages import TITLES
 from wamnet.compiler.reading.limits import limited
 from wamnet.refimpl.errors import InputError
 
-CASES = [(what, target, old, new) for what, targets, old, new in text_faults.CLASSES for target in targets]
+CASES = [(what, target, old, new) for what, targets, old, new in text_classes.CLASSES for target in targets]
 """Every class of faults, in every language that it is one of."""
 
 
@@ -38,8 +39,8 @@ def test_faults_of_the_language_are_rejected(plain, what, target, old, new):
 
 @pytest.mark.parametrize(
     ("what", "of", "old", "new"),
-    text_faults.OF_SCHEDULES,
-    ids=[" ".join(c[:2]) for c in text_faults.OF_SCHEDULES],
+    text_classes.OF_SCHEDULES,
+    ids=[" ".join(c[:2]) for c in text_classes.OF_SCHEDULES],
 )
 def test_faults_of_the_language_of_schedules_are_rejected(what, of, old, new, tmp_path):
     source, *others = parts(planned(tmp_path, *of.split()))

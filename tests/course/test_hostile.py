@@ -9,10 +9,10 @@ import sys
 import time
 from pathlib import Path
 
+import answers
 import packages
 import pytest
 
-import course as measured
 from wamnet_course.grading import Limits, grade_class
 from wamnet_course.labs import LABS, lab_named
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.needs("programs")
 
 LAB = lab_named("1")
 
-RIGHT = (measured.COURSE / "solutions" / LAB.file).read_text()
+RIGHT = (answers.COURSE / "solutions" / LAB.file).read_text()
 
 LINES = "".join(f'{{"check": "{check.name}", "wrong": null}}\\n' for check in LAB.checks) + '{"end": true}\\n'
 """What an earlier grader took for the results of all checks."""
@@ -130,7 +130,7 @@ def test_a_large_answer_does_not_fill_the_machine_s_memory(tmp_path):
     """An answer of a megabyte is broadcast by the grader to gigabytes."""
     packages.needed_sandbox()
     lab = lab_named("5")
-    right = (measured.COURSE / "solutions" / lab.file).read_text()
+    right = (answers.COURSE / "solutions" / lab.file).read_text()
     bomb = "def picture(*a):\n    return np.zeros((2**20, 1, 1, 1), bool), np.zeros(3)\n"
     for name, text in {"ada": bomb, "bob": ""}.items():
         (tmp_path / name).mkdir()
@@ -160,7 +160,7 @@ def test_data_of_any_kind_is_a_finding(lab, tmp_path, monkeypatch):
     # A lab that asks the reference thousands of times gets some of them.
     for result in ANSWERS[:: 5 if lab.name == "extra3_suite" else 1]:
         text = "import numpy as np\n" + "".join(f"def {name}(*a):\n    return {result}\n" for name in names)
-        wrong = measured.finding(lab, text, tmp_path)
+        wrong = answers.finding(lab, text, tmp_path)
         assert wrong is not None, result
         assert "something else than an answer" not in str(wrong), result
 

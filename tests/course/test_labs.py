@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import answers
 import pytest
 
-import course as measured
 from wamnet.refimpl.errors import InputError
 from wamnet_course.frame import Wrong
 from wamnet_course.labs import LABS, lab_named
@@ -25,7 +25,7 @@ EVERY = [pytest.param(lab, id=lab.name) for lab in LABS]
 
 def first_wrong(lab, folder, here):
     """Return the first finding about a lab's file in a folder, or None."""
-    return measured.finding(lab, (folder / lab.file).read_text(), here)
+    return answers.finding(lab, (folder / lab.file).read_text(), here)
 
 
 @pytest.fixture

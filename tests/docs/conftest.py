@@ -1,4 +1,4 @@
-"""The web site, built once for all tests of a session."""
+"""The web site, built once for all tests of a session; it takes a minute, so that these tests are nightly."""
 
 from __future__ import annotations
 
@@ -15,6 +15,12 @@ BUILD = Path(__file__).resolve().parents[2] / "docs/site/build.py"
 
 LONGEST_WAIT_S = 600
 """After so many seconds another process that builds the site counts as gone."""
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark what needs the built site; tests of its parts run always."""
+    if "site" in getattr(item, "fixturenames", ()):
+        item.add_marker(pytest.mark.nightly)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,8 @@ from lab.results import Results
 
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
+pytestmark = pytest.mark.nightly  # it runs with the experiments
+
 NETWORK = "paper's layers"
 
 
@@ -62,13 +64,6 @@ def test_what_is_prepared_is_what_is_computed(tmp_path):
                 np.array_equal(*pair)
                 for pair in zip(getattr(kept, name), getattr(computed, name), strict=True)
             )
-
-
-def test_a_group_may_have_another_size():
-    plan = gpu.planned("minicubes", "opengl", "group:2@8x4s")
-    assert plan.schedule.group == (8, 4)
-    assert not plan.schedule.dialect.wide
-    assert gpu.planned("minicubes", "opengl", "group:2").schedule.dialect.wide
 
 
 def test_an_unknown_language_is_refused(tmp_path):

@@ -15,6 +15,8 @@ from wamnet.spec.conformance import vectors
 from wamnet.spec.conformance.kinds import KINDS
 from wamnet.spec.conformance.protocol import Session
 
+pytestmark = pytest.mark.nightly  # it runs with the experiments
+
 FAULTS = [
     {
         "file": "random.mjs",

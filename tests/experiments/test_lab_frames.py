@@ -13,12 +13,13 @@ from lab.frames import Shot
 
 from wamnet.kernels.run import render_on
 from wamnet.models.data.frame_plan import version
-from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, USUAL
 from wamnet.refimpl.light import render as driver
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import scene_digest
 from wamnet.refimpl.light.scenes import canonical
+
+pytestmark = pytest.mark.nightly  # it runs with the experiments
 
 SHOT = Shot("minicubes", time=1.0, size=8, spp=2, seed=3)
 
@@ -71,8 +72,6 @@ def test_an_interrupted_run_keeps_what_was_done(tmp_path, monkeypatch):
         {"seed": 4},
         {"scene": "cornell"},
         {"seen": True},
-        {"parameters": {"cool": (0.5, 0.5, 1.0)}},
-        {"parameters": {"warm": (1.0, 0.5, 0.25)}},
     ],
     ids=str,
 )
@@ -92,24 +91,8 @@ def test_noisy_frame_and_reference_share_no_random_numbers(tmp_path):
     shots = [replace(SHOT, seed=seed) for seed in range(4)]
     seeds = [make.seed for shot in shots for make in (frames.noisy(shot), frames.reference(shot, 8))]
     assert len(set(seeds)) == len(seeds)
-    ((dirty, clean),) = frames.pairs(tmp_path, [SHOT], 4, "numpy")
+    dirty, clean = frames.frames(tmp_path, [frames.noisy(SHOT), frames.reference(SHOT, 4)], "numpy")
     assert (dirty.info["spp"], clean.info["spp"]) == ("1", "4")
-
-
-def test_a_reference_of_one_sample_is_refused(tmp_path):
-    with pytest.raises(InputError, match="samples of a reference 1: more than 1"):
-        frames.pairs(tmp_path, [SHOT], 1, "numpy")
-
-
-def test_times_continue_one_sequence_and_repeat_no_pose():
-    """Modulo a quarter turn, after which the lattice of cubes repeats, no two of 28 are within a degree.
-
-    28 golden steps have gaps of 1/34 or more of what they divide: 90 / 34 degrees.
-    """
-    train, test = frames.split_times(24, 4, 8.0, start=1.0)
-    assert [*train, *test] == frames.split_times(28, 0, 8.0, start=1.0)[0]
-    poses = np.sort(np.array([*train, *test]) % 2.0) * 45.0
-    assert np.diff([*poses, poses[0] + 90.0]).min() >= 1.0
 
 
 def test_shots_that_differ_in_numbers_share_a_kernel(tmp_path, executor_named, monkeypatch):

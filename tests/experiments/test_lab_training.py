@@ -12,12 +12,16 @@ from lab.frames import Shot
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.train import SHORT, train
 
+pytestmark = pytest.mark.nightly  # it runs with the experiments
+
 RECIPE = replace(SHORT, features=("color",), window=Window(3), widths=(4,), batch=16, steps=6, log_every=2)
 
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
-    return frames.pairs(tmp_path_factory.mktemp("frames"), [Shot("cornell", size=8)], 2, "numpy")
+    shot = Shot("cornell", size=8)
+    made = [frames.noisy(shot), frames.reference(shot, 2)]
+    return [tuple(frames.frames(tmp_path_factory.mktemp("frames"), made, "numpy"))]
 
 
 def test_a_network_is_trained_once(tmp_path, pairs, monkeypatch):

@@ -9,6 +9,8 @@ from lab import printed
 from wamnet.models.data.frame_plan import TRAIN
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
+pytestmark = pytest.mark.nightly  # it runs with the experiments
+
 
 def test_a_row_for_each_kind_of_picture(tmp_path, capsys, executor_named, monkeypatch):
     """Ours by two networks, one with more rays; a peer that is missing has no rows, and says why."""

@@ -13,6 +13,8 @@ from lab.blame import Clauses
 from lab.trial import Outcome
 from lab.users import Users
 
+pytestmark = pytest.mark.nightly  # it runs with the experiments
+
 SOURCE = '''"""Words."""
 
 LIMIT = 0.5
@@ -138,7 +140,6 @@ def test_a_table_counts_what_came(monkeypatch):
     assert last == "| all | 3 | 2 | 1 | 0 | 0 | 1 | 50.0 | 100.0 | 100.0 |"
 
 
-@pytest.mark.nightly
 @pytest.mark.needs("programs")
 def test_a_sample_of_mutants_of_the_reference_is_caught():
     cases = [(kind, case) for kind, case in trial.in_order() if kind.startswith(ELEMENTARY)]
@@ -151,7 +152,6 @@ def test_a_sample_of_mutants_of_the_reference_is_caught():
     assert len(missed) <= mutants.MOST_MISSED * len(asked), missed
 
 
-@pytest.mark.nightly
 @pytest.mark.needs("programs")
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not there")
 def test_a_mutant_of_the_c_program_is_caught(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 
 import pytest
 import rewrite
@@ -41,6 +42,18 @@ def test_records_can_be_trusted():
     for name in Records().names():
         data = Records()[name].data()
         assert checked(data, partial=True) == {**data}, f"{name}: publish it again"
+
+
+def test_code_of_records_is_here_or_in_the_commit_that_they_name():
+    readme = (records.ROOT / "experiments/README.md").read_text()
+    for name in Records().names():
+        data = Records()[name].data()
+        programs = set(re.findall(r"python (experiments/\w+\.py)", " ".join(data["commands"])))
+        if gone := {program for program in programs if not (records.ROOT / program).exists()}:
+            assert re.fullmatch(rf"git show \w+:{gone.pop()}", data.get("code", "")), f"{name}: no such code"
+            assert f"`{name}`" in readme, f"experiments/README.md: what did {name} decide?"
+        else:
+            assert "code" not in data, f"{name}: its code is here"
 
 
 def test_what_is_pending_is_not_there_and_is_waited_for():

@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 
-import claims
 import numpy as np
 import pytest
 import table1
@@ -20,6 +19,8 @@ from wamnet.kernels import open_executor
 from wamnet.models.data import geometry
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
+
+pytestmark = pytest.mark.nightly  # it runs with the experiments
 
 PLAIN = ["input", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own", "wamnet-short", "wamnet-best"]
 PLAIN += ["svgf", "nlm", "render30", "render30-own"]
@@ -177,18 +178,6 @@ def test_a_training_that_was_not_flat_may_go_on(tmp_path):
             assert list(table1.left(kept, ["dncnn"], [0], longer)) == expected
 
 
-def test_the_time_that_it_takes_is_said_before(tmp_path, executor_named, capsys):
-    executor_named("opencl")
-    arguments = ["--scale", "toy", "-o", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
-    table1.main([*arguments, "--plan", "--seeds", "0", "--only", "wamnet", "render30"])
-    told = capsys.readouterr()
-    assert re.search("table1: [0-9]+ (seconds|minutes) at most, without times of frames", told.err)
-    for part in ("rendering", "training wamnet, 1 x", "judging"):
-        assert re.search(f"  {part}: [0-9]+ (seconds|minutes)", told.err), part
-    assert not told.out
-    assert not (tmp_path / "cache").exists()
-
-
 def test_costly_rows_have_their_own_seeds(tmp_path):
     scale = replace(TINY, few=(7,))
     kept = Results.open(tmp_path / "t.json", "table1", {})
@@ -245,28 +234,3 @@ def test_small_frames_are_means_of_shown_colours():
     expected = shown.reshape(2, 2, 2, 2, 3).mean(axis=(1, 3))
     # Encoded, decoded and encoded again, in float32; the slope of the encoding is at most 12.92.
     assert np.max(np.abs(rows.to_display(found["color"]) - expected)) <= 16 * 12.92 * 2.0**-24
-
-
-# ---- claims ----------------------------------------------------------------------------------------------
-
-
-def test_claims_read_the_table_s_records(made, capsys):
-    folder, arguments = made
-    studies = [f"--{name}={folder / 'none.json'}" for name in ("generalisation", "lights")]
-    place = ["-o", str(folder / "claims"), "--table", str(folder / "out"), *studies, *arguments[4:]]
-    claims.main(["--scale", "toy", *place])
-    printed = capsys.readouterr().out
-    assert printed == (folder / "claims/claims.md").read_text()
-    assert "| noise falls by 40 % | MSE 82.93 to 48.04, -42 % | **" in printed
-    assert re.search(
-        r"\| pix2pix is 2 % better \|.*\| \*\*not tested\*\* \|.*no record of row pix2pix", printed
-    )
-    kept = Results.read(folder / "claims/claims.json")
-    # As it is, the noisy frames are the row of Table 1.
-    (per_frame,) = kept.of("input as it is", "per_frame")
-    (of_table, _) = Results.read(folder / "out/table1.json").of("input", "per_frame")
-    assert per_frame == {name: of_table[name] for name in per_frame}
-    assert len(kept.get("times", 0)["step_s"]) == 2
-    # Times and frames are not measured again.
-    claims.main(["--scale", "toy", "--as-it-is", *place])
-    assert capsys.readouterr().out == printed

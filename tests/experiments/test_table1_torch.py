@@ -13,7 +13,7 @@ from packages import needed
 
 from wamnet.kernels import open_executor
 
-pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
+pytestmark = [pytest.mark.nightly, pytest.mark.apart, pytest.mark.needs("packages")]
 
 TINY = replace(table1.SCALES["toy"], size=48, pix2pix={**table1.SCALES["toy"].pix2pix, "crop": 24})
 """A scale for rows that train no pix2pix: its measure of blocks wants patches."""

@@ -10,6 +10,7 @@ import pytest
 pytestmark = pytest.mark.needs("programs")
 
 
+@pytest.mark.nightly(but=("KILL", "full"))
 @pytest.mark.parametrize("kind", faults.FAULTS)
 def test_a_fault_loses_nothing(tmp_path, kind) -> None:
     """A kill, a full disk, a folder that cannot be written, a lost worker, two: the next run resumes."""
@@ -30,6 +31,7 @@ def open_to_all(tmp_path) -> Path:
     return tmp_path
 
 
+@pytest.mark.nightly
 def test_a_fault_of_another_user_loses_nothing(open_to_all) -> None:
     """Who is not root has a folder and a home of its own."""
     tmp_path = open_to_all

@@ -376,6 +376,7 @@ def test_kernel_estimates_the_reference_s_image(executor_named, name, spp):
     assert report.passed, report
 
 
+@pytest.mark.nightly
 @pytest.mark.needs("time")
 def test_a_picture_that_is_brighter_is_refused(executor_named, monkeypatch):
     """5 % more light from the kernel: 12 blocks of 8192 samples show 1 %."""

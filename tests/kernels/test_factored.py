@@ -79,6 +79,9 @@ def excess(kit, executor, artifact, program, images, of_cut):
     return float(np.max(difference / bound))
 
 
+@pytest.mark.nightly(
+    "opengl-inlined", "opencl-group:1", "opencl-group:2", "opencl-tile:8", "opencl-vector:16"
+)
 @pytest.mark.product
 @pytest.mark.parametrize(("target", "schedule"), WAYS)
 @settings(max_examples=EXAMPLES)
@@ -114,6 +117,7 @@ def paper_s(kit, border="clamp", rank=0):
     return kit.denoiser(network, {"color": 3, "normal": 3}, 12, border)
 
 
+@pytest.mark.nightly(but=("numpy-plain-clamp", "c-tile:16-clamp"))
 @pytest.mark.product
 @pytest.mark.parametrize("border", dataset.BORDERS)
 @pytest.mark.parametrize(("target", "schedule"), [way for way in WAYS if way not in ONE_IMAGE])

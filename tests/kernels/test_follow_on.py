@@ -58,6 +58,7 @@ def by_definition(past: History | None, *picture) -> History:
     return H.begin(*picture[:3]) if past is None else H.follow(past, *picture)
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", ["minicubes", "glossy", "cornell", "daylight", "empty"])
 def test_a_film_has_the_history_of_the_definition(device, name):
     """Five pictures, the last at rest. Decisions aside, two histories of the same samples are each within
@@ -81,6 +82,7 @@ def test_a_film_has_the_history_of_the_definition(device, name):
     assert past.count.min() < 5 or name == "empty"
 
 
+@pytest.mark.nightly(but=("numpy", "opengl"))
 def test_who_begins_a_history_may_leave_it_to_another(device):
     scenes = [moment("glossy", k) for k in range(3)]
     past = H.begin(scenes[0], job(), color_of(0))
@@ -92,6 +94,7 @@ def test_who_begins_a_history_may_leave_it_to_another(device):
     assert np.mean(~near) <= DECIDED_OTHERWISE
 
 
+@pytest.mark.nightly(but=("numpy", "opencl"))
 def test_limits_are_those_given(device):
     scene, limits = canonical("cornell"), Limits(3, 2, 4)
     past = None
@@ -235,6 +238,7 @@ def test_first_hits_are_the_reference_s(device):
     assert np.abs(found.direction - wanted.direction).max() <= 40 * np.finfo(np.float32).eps
 
 
+@pytest.mark.nightly(but="numpy")
 def test_features_of_other_rays_do_not_matter(device):
     """The history is of the colour's own first sample, also where features have rays of their own."""
     scene, plain = moment("cornell", 1), job(7)
@@ -267,6 +271,7 @@ def test_a_film_is_followed_by_whom_it_names(monkeypatch, executor_named, name):
     assert asked == ([name] * 2 if name != "numpy" else [])
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("wrong", ["size", "nan", "primitives"])
 def test_what_the_definition_refuses_is_refused(device, wrong):
     past = follow_on(device, None, canonical("cornell"), job(), color_of(0))

@@ -155,6 +155,7 @@ def test_an_image_that_is_read_later_is_of_its_own_picture(executor, model):
             pipeline.later("depth")
 
 
+@pytest.mark.nightly
 def test_an_animation_keeps_the_memory_of_its_device(executor_named, model, monkeypatch):
     """Fifty pictures: as many buffers are alive as after the second one."""
     executor = executor_named("opencl")

@@ -159,6 +159,7 @@ def test_the_whole_separate_way(executor, model_of, case):
     assert np.all((np.abs(found - separate) <= difference_bound(model, executor, wanted, errors))[whole])
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("lanes", [1, 4, 8, 16])
 @pytest.mark.parametrize("size", [(1, 1), (5, 15), (4, 16), (3, 17), (9, 33)])
 def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, lanes, size):
@@ -222,6 +223,7 @@ def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, c
     assert near.mean() >= (1.0 if executor.name in ("numpy", "c") else 0.99)
 
 
+@pytest.mark.nightly(but="16")
 @pytest.mark.parametrize("lanes", [1, 4, 8, 16])
 def test_sums_of_features_are_over_their_rays(executor_named, lanes):
     """PTK-21: the interpreter adds the bits of single rays; kernels write its sums, deviations too."""
@@ -353,6 +355,7 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, m
         assert uploaded == []
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", ["opengl-egl", "opengl-osmesa"])
 @pytest.mark.parametrize("rank", [0, 5])
 def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(

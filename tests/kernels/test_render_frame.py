@@ -32,6 +32,7 @@ def test_bands_are_the_frame(executor_named, name) -> None:
     assert all((parts.frame[layer] == values).all() for layer, values in whole.frame.layers.items())
 
 
+@pytest.mark.nightly(but="numpy")
 @pytest.mark.parametrize("name", ["numpy", "opencl"])
 def test_a_frame_says_where_the_sun_is(executor_named, name) -> None:
     """ENV-6: in bands too, and beside features of their own rays; the scene of above has no sun."""

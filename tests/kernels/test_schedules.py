@@ -91,6 +91,15 @@ def executor_of(executor_named, target):
     return executor_named({"opengl": "opengl-egl"}.get(target, target))
 
 
+@pytest.mark.nightly(
+    "opencl-fft:8",
+    "opencl-fft:4",
+    "opencl-group:1",
+    "opencl-group:2",
+    "opencl-tile:4",
+    "opencl-tile:8",
+    "opencl-vector:16",
+)
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @settings(max_examples=EXAMPLES)
 @given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))

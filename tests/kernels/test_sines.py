@@ -1,10 +1,6 @@
-"""The emitted sines on each executor: at hard points, beyond their domain; the command that measures."""
+"""The emitted sines on each executor: at hard points, and beyond their domain."""
 
 from __future__ import annotations
-
-import importlib.util
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,23 +19,6 @@ NUMPY = 2.0**-50
 
 KINDS = {"sine": (np.sin, sine.DOMAIN, "error"), "cosine": (np.cos, sine.COSINE_DOMAIN, "cosine_error")}
 """Each function with its domain, and the name of its bound."""
-
-
-@pytest.fixture(scope="module")
-def patch_of_module():
-    with pytest.MonkeyPatch.context() as patch:
-        yield patch
-
-
-@pytest.fixture(scope="module")
-def script(patch_of_module):
-    """The command that measures sines."""
-    path = Path(__file__).parents[2] / "experiments" / "sines.py"
-    spec = importlib.util.spec_from_file_location("sines", path)
-    module = importlib.util.module_from_spec(spec)
-    patch_of_module.setitem(sys.modules, "sines", module)  # dataclasses look there
-    spec.loader.exec_module(module)
-    return module
 
 
 def values(executor, kind, degree, x):
@@ -126,42 +105,3 @@ def test_beyond_the_domain_in_vectors(executor_named, kit, name):
 def test_zeros_on_executor(executor, degree):
     found = values(executor, "sine", degree, [0.0, -0.0])
     assert np.array_equal(found.view(np.uint32), [0, 0])
-
-
-# ---- the command that measures -----------------------------------------------------------------------------
-
-
-def test_batches_hold_every_number_of_the_domain_once(script):
-    """The last one is filled up with the domain's end."""
-    found = list(script.batches(0.0, 2.0**-130, 1.0))
-    bits = np.unique(np.concatenate([x.view(np.uint32) for x in found]))
-    assert np.array_equal(bits, np.arange(int(np.float32(2.0**-130).view(np.uint32)) + 1))
-    few = list(script.batches(1.0, sine.DOMAIN, 0.01))
-    assert len(few) <= 10
-    assert min(x.min() for x in few) >= 1.0
-    assert few[-1][-1] == np.float32(sine.DOMAIN)
-
-
-def test_every_number_is_compared(script, executor_named, capsys, monkeypatch):
-    monkeypatch.setattr(script, "BATCH", 2**14)
-    monkeypatch.setattr(script, "WIDTH", 64)
-    executor = executor_named("opencl")
-    assert script.every(executor, False, 0.00005)
-    assert "BROKEN" not in capsys.readouterr().out
-    monkeypatch.setattr(script, "NUMPY", 1.0)
-    assert not script.every(executor, True, 0.00005)
-    assert "BROKEN" in capsys.readouterr().out
-
-
-def test_table_of_sines(script, executor_named, monkeypatch):
-    monkeypatch.setattr(script, "COUNT", 2**10)
-    monkeypatch.setattr(script, "WIDTH", 16)
-    lines = list(script.tables({place: executor_named(place) for place in ("numpy", "opencl")}))
-    assert any(line.startswith("| opencl | native_sin | none") for line in lines)
-    assert any(line.startswith("| numpy | emitted, degree 13 | 2.03e-07 | ") for line in lines)
-    assert any(line.startswith("| 8192 to 12800 | ") for line in lines)
-
-
-def test_kernel_without_sin_has_no_native_one(script):
-    with pytest.raises(ValueError, match="calls no sin"):
-        script.native_sin(script.kernel("opencl", "ieee"))

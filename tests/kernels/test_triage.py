@@ -101,6 +101,7 @@ def test_picked_schedules_run(executor_named, model, images):
     assert not triage.odd_ones(found)
 
 
+@pytest.mark.nightly
 def test_all_agree(executor_named, model, images):
     """Every executor, every schedule: a kernel for each one that is not replaced by another."""
     found = verdicts_of(runners(executor_named, *WAYS), model, images, which=triage.EVERY)
@@ -130,6 +131,7 @@ def test_executor_stage_and_neuron_are_named(executor_named, model, images, way)
     assert text in stage.text
 
 
+@pytest.mark.nightly(but="opencl")
 @pytest.mark.parametrize("way", COMPILED)
 def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, images, way):
     """One number of one pixel: the part keeps what is above and left of it; no stage by itself has it."""
@@ -385,6 +387,7 @@ def test_lines_have_no_line_ends():
 # ---- integers ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_integers_are_within_a_bound_of_0_and_a_wrong_weight_is_named(executor_named, model, images):
     """No error is within it, any error is not; stages are those of the network of integers."""
     whole = replace(model, siren=rounded(model.siren, 3))

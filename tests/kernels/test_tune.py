@@ -65,6 +65,7 @@ def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     assert found.reason.startswith(f"tuned on this device on {table.day}: {best.ms:.3g} ms at 20x12, ")
 
 
+@pytest.mark.nightly(but="opengl-egl")
 @pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
 def test_a_rank_is_tuned_by_itself(executor_named, name):
     """A compute shader's first pass is a fragment shader where it writes more than four channels."""

@@ -94,7 +94,7 @@ def test_missing_package_has_the_same_policy(run, pytester, before, asserted, re
 
 @pytest.mark.parametrize("options", [(), ("-n", "1")])
 def test_missing_executor_is_skipped_and_told(run, options):
-    result = run("", *options)
+    result = run("", "--nightly", *options)
     result.assert_outcomes(passed=1, skipped=3)
     result.stdout.fnmatch_lines(
         ["numpy: ok (this processor)", "opengl-osmesa: MISSING: no opengl with {'context': 'osmesa'}"]
@@ -102,7 +102,7 @@ def test_missing_executor_is_skipped_and_told(run, options):
 
 
 def test_missing_executor_that_is_required_fails(run):
-    result = run("opencl")
+    result = run("opencl", "--nightly")
     result.assert_outcomes(passed=1, skipped=2, errors=1)
     result.stdout.fnmatch_lines(["executor opencl is required and MISSING: no opencl with {}; *"])
 

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 import pytest
 
 NAMED = re.compile(
-    r"(?<![\w/.<>{}*-])((?:refimpl|compiler|kernels|cli|tests|spec|experiments|examples|docs|models|\.ci)/[\w/.*<>{}-]*[\w>}*/])"
+    r"(?<![\w/.<>{}*:-])((?:refimpl|compiler|kernels|cli|tests|spec|experiments|examples|docs|models|\.ci)/[\w/.*<>{}-]*[\w>}*/])"
 )
-"""A path from the repository's root: it begins with one of its folders."""
+"""A path from the repository's root: it begins with one of its folders. What follows a colon is of
+another commit."""
 
 
 def named_paths(text: str) -> list[str]:
@@ -48,6 +49,7 @@ def test_named_paths_exist(house):
         ("see `compiler/core/ops.py`, and tests/kernels.", ["compiler/core/ops.py", "tests/kernels"]),
         ("spec/<stem>.md and compiler/{target}.py and tests/*.py", []),
         ("out/cli/x, ./spec/none", []),
+        ("git show c0740039:experiments/heads.py", []),
         (".ci/run runs it; the folder tests/meta/", [".ci/run", "tests/meta"]),
     ],
 )

@@ -180,6 +180,7 @@ def test_missing_mitsuba_is_told(monkeypatch):
         peer_mitsuba.open_mitsuba("scalar_rgb")
 
 
+@pytest.mark.nightly("-1-none")
 @pytest.mark.parametrize(("version", "found"), [(16, "LLVM 16"), (-1, "none")])
 def test_missing_or_old_llvm_is_told(monkeypatch, version, found):
     library = SimpleNamespace(detail=SimpleNamespace(llvm_version=lambda: (version, 0, 6)))

@@ -134,6 +134,7 @@ SKY = Sky((0.16, 0.3, 0.62), (0.62, 0.7, 0.8), (0.18, 0.16, 0.14), (0.5, 0.6, -0
 """A sky whose sun is on no axis."""
 
 
+@pytest.mark.nightly
 def test_the_table_shows_the_sky(mitsuba):
     """Mitsuba's lookup in the table is the sky's formula: directions, poles and seam are in their places.
 

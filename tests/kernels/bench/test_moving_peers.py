@@ -140,6 +140,7 @@ def test_a_kept_filter_is_the_filter(quality) -> None:
     kept.close()
 
 
+@pytest.mark.nightly
 def test_every_peer_can_be_named() -> None:
     assert set(measure_pipeline.PEERS) == set(table.makers)
     assert set(measure_primitives.PEERS) == set(table.renderers)

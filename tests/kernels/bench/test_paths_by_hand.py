@@ -126,6 +126,7 @@ def test_without_numba_it_says_so(monkeypatch):
         BY_HAND["numba"](SCENES["cornell"], WIDTH, HEIGHT)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [

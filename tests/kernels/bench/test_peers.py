@@ -111,6 +111,7 @@ def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
         raise KeyboardInterrupt
 
 
+@pytest.mark.nightly
 @pytest.mark.needs("programs")
 def test_first_runs_are_those_of_another_process(monkeypatch) -> None:
     """The interpreter's has two; one that fails has none."""

@@ -151,6 +151,7 @@ OPENED = {
 """What runs a target here."""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found(fault):
     target, before, after = FAULTS[fault]

@@ -54,6 +54,7 @@ def compiled(made, folder, compiler, *options):
     return set(re.findall(r"^#define (\w+)", told, re.MULTILINE))
 
 
+@pytest.mark.product
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize(("compiler", "standard"), [("cc", "-std=c99"), ("c++", "-std=c++17")])
 @pytest.mark.parametrize(

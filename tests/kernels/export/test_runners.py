@@ -309,6 +309,7 @@ int main(void)
 """A program that has a scene that moves pasted in, and plays two rows of its table."""
 
 
+@pytest.mark.nightly
 def test_a_host_in_c_plays_two_moments(tmp_path):
     """PTK-18, EXP-13: nothing is compiled, or read from outside of the arrays, between them."""
     programs, rows, part, wanted = moments()

@@ -69,6 +69,7 @@ def written(folder, schedule):
     return made
 
 
+@pytest.mark.nightly("fft:16")
 @pytest.mark.needs("devices")
 @pytest.mark.parametrize("schedule", SCHEDULES)
 def test_a_thread_of_128_kib_denoises_in_scratch_memory(tmp_path, schedule):

@@ -84,6 +84,7 @@ def test_a_missing_package_is_told(monkeypatch, tmp_path):
         TintRunner()
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly("cuda")
 @pytest.mark.parametrize("target", ["wgsl", "metal", "glsl-es", "cuda"])
 def test_what_a_bound_rests_on_is_said(kit, target):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 import statistics
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -460,6 +461,22 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "paper-hours": paper_hours,
 }
 """Figures in sentences that are computed from several values."""
+RESULTS = ("detected", "missed", "unreached", "stale")
+"""What comes of a planted fault (tests/planted/plant.py)."""
+
+
+def planted_faults(records: Records) -> str:
+    """Return how many planted faults of each package the tests detect, and how many a golden file."""
+    counts: dict[str, Counter[str]] = {}
+    for values in (record["values"] for record in records["planted-faults"].records()):
+        package = "/".join(values["file"].split("/")[:-1][:2])
+        for name in (package, "all"):
+            counts.setdefault(name, Counter()).update([values["result"], values["how"], "faults"])
+    order = [*sorted(set(counts) - {"all"}), "all"]
+    cells = [[n, *(str(counts[n][key]) for key in ("faults", *RESULTS, "golden"))] for n in order]
+    return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
+
+
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
     "course", "gpu-pipeline", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults",
@@ -496,6 +513,7 @@ TABLES: Mapping[str, TableOf] = {
     "lamps": study("lamps", "`minicubes`, camera at rest"),
     "learning-curve": learning_curve,
     "losses": study("losses", "loss"),
+    "planted-faults": planted_faults,
     "presets": as_printed("presets", without=TIMES),
     "quality-ahead": differences,
     "quality-lamps": quality("minicubes-page"),

@@ -69,7 +69,7 @@ class Metal(Buffers):
     group_place = ("group_place.x", "group_place.y")
     wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
     wide = False
-    casts = True
+    casts = numbered = True
     said_numbers = NUMBERS_SAID
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -95,13 +95,6 @@ class Metal(Buffers):
             height="rows",
         )
         + "; thread (x, y) follows pixel x of row first_row + y",
-        ENCODE: CALLED.format(
-            sizes="width, height, sample_count",
-            buffers="1 the sums, one plane of\nwidth * height floats for each of:\n"
-            "{planes};\n3 and on the images in this order",
-            width="width",
-            height="height",
-        ),
     }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:

@@ -57,7 +57,6 @@ class WGSL(Declared):
     define = "const {name}: i32 = {value};"
     choice = "select({2}, {1}, {0})"
     table = "const {name} = array<{type}, {count}>({values});"
-    load = "let {name}: f32 = sums[{plane} * plane + at];"
     operations = {
         **Dialect.operations,
         "absolute": "abs({0})",

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from ..kernel.interface import BLOCK, DENOISE, PATH, WRITE, Array, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
@@ -49,8 +49,7 @@ class Metal(Buffers):
     threads: Sequence[str] = ("uint2 thread_place [[thread_position_in_grid]]",)
     item = ("thread_place.x", "thread_place.y")
     size = "size."
-    early = dict.fromkeys((DENOISE, PATH, ENCODE), ("width",))
-    late = {DENOISE: ("height",), PATH: ("samples",)}
+    early, late = {PATH: ("width",)}, {PATH: ("samples",)}
     max_output_channels = 2**16
     group = (16, 8)
     grouped = {

@@ -141,6 +141,7 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
         return load(array, number, row, inside, kind=kind)
 
     def there(array: str, number: int) -> Expr:
+        """Return a plane at the pixels of a tap."""
         return plane(array, number, name("line"), name("column"))
 
     half = len(smoothing.SPLINE) // 2

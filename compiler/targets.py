@@ -13,8 +13,8 @@ from typing import Any
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
-from .kernel.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
-from .languages import opencl_path, planes
+from .kernel.interface import BLOCK, DENOISE, PATH, TABLE
+from .languages import opencl_path
 from .languages.c import C
 from .languages.c_path import CPath
 from .languages.cuda import CUDA
@@ -48,8 +48,8 @@ class Target:
 
     `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
     number of paths that they follow at once, none where there are no path kernels, and `forms` says what
-    becomes of a scene's primitives. `planes` are the dialects of kernels on planes, the edge-avoiding
-    filter and the history, by the number of pixels in a work item. `widest`: most channels of an image that a
+    becomes of a scene's primitives. `planes`: for how many pixels in a work item there are kernels of the
+    edge-avoiding filter; with 1 there is a history. `widest`: most channels of an image that a
     kernel reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the
     language does not promise.
     """
@@ -62,7 +62,7 @@ class Target:
     schedules: tuple[Schedule, ...]
     dialect: Dialect | None = None
     paths: Mapping[int, Dialect | None] = field(default_factory=dict)
-    planes: Mapping[int, Dialect | None] = field(default_factory=dict)
+    planes: tuple[int, ...] = ()
     forms: Forms = USUAL
     widest: int | None = None
     most: int | None = None
@@ -71,7 +71,7 @@ class Target:
     @property
     def encodes(self) -> bool:
         """Return whether there are kernels that encode features."""
-        return self.dialect is None or ENCODE in self.dialect.said
+        return self.dialect is None or PATH in self.dialect.said
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
@@ -196,12 +196,12 @@ TARGETS: Mapping[str, Target] = {
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
             paths={1: None},
-            planes={1: None},
+            planes=(1,),
         ),
         replace(
             processor(OpenCL()),
             paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
-            planes={lanes: planes.of_lanes(lanes) for lanes in opencl_path.LANES},
+            planes=opencl_path.LANES,
             forms=Forms(trees=True),
         ),
         replace(
@@ -211,7 +211,7 @@ TARGETS: Mapping[str, Target] = {
                 FourierPasses("fftpasses:32", PASSES_IDEA, GLSLCompute(), 32),
                 *groups(GLSLCompute()),
             ),
-            planes={1: planes.GLSLPlanes()},
+            planes=(1,),
             forms=MESA,
         ),
     )
@@ -222,7 +222,7 @@ DENOISERS: Mapping[str, Target] = {
     **TARGETS,
     "c": replace(
         processor(C()),
-        planes={1: planes.CPlanes()},
+        planes=(1,),
         forms=Forms(trees=True),
     ),
 }

@@ -86,9 +86,9 @@ class Array:
 
     @property
     def planes(self) -> int:
-        """Return how many planes of whole pictures it has, for a kernel on planes, or 0."""
-        count, *size = self.shape
-        return int(count) if size == ["height", "row_stride"] else 0
+        """Return how many planes of images it has, or 0."""
+        count = self.shape[0]
+        return count if len(self.shape) == 3 and isinstance(count, int) else 0
 
     @property
     def quads(self) -> int:

@@ -10,7 +10,8 @@
 
 Indices count elements of an array's own type. An array of vectors may also be read as single components: then
 the one index counts components. An image has the indices (row, column, channel), or (row, position) where a
-position counts the components of a row.
+position counts the components of a row. Planes have (plane, row, column); several elements of a row are
+accessed from the index of the first one on, or read at an index with as many lanes.
 """
 
 from __future__ import annotations
@@ -44,8 +45,9 @@ class Expr:
     """A value without effect.
 
     `const` and `name` have a `value`; `load` has an array's name and its index as arguments; `component` has
-    the lane, `convert` the kind, `call` a function's name; `splat` repeats a value in all lanes. All others
-    are rows of core/ops.py.
+    the lane, `convert` the kind, `call` a function's name; `splat` repeats a value in all lanes.
+    `clamp` limits an index, or several that follow each other, one per lane. All others are rows of
+    core/ops.py.
     """
 
     op: str
@@ -420,6 +422,11 @@ def parts(value: Expr) -> list[Expr]:
     for each in value.args:
         found += parts(each)
     return found
+
+
+def operations(kernel: Kernel) -> set[str]:
+    """Return the names of all operations of a kernel's body."""
+    return {each.op for statement in walk(kernel.body) for v in values(statement) for each in parts(v)}
 
 
 def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:

@@ -19,6 +19,11 @@ NOBODY, SEVERAL = -1, -2
 """Instead of the number of an item that has used an element since the last barrier."""
 
 
+def spread(place: Any, count: int) -> Any:
+    """Return the places of so many elements from one on, or those of a row that are known one by one."""
+    return place if np.ndim(place) == 2 else place + np.arange(count)[:, None]
+
+
 class Items:
     """The work items: first pixels, groups, and which of them are active."""
 
@@ -51,8 +56,8 @@ class Items:
         wrong = (index < 0) | (index >= size)
         if not np.any(wrong):
             return index
-        where = np.broadcast_to(wrong, (self.count,)) & self.mask
-        number = np.broadcast_to(index, (self.count,))[np.argmax(where)]
+        where = wrong & self.mask
+        number = np.broadcast_to(index, where.shape).ravel()[np.argmax(where)]
         self.refuse(wrong, f"index {number} is beyond {array}, which has {size}")
         return np.where(wrong, 0, index)
 
@@ -72,10 +77,9 @@ class Memory:
             self.reader = np.full(data.shape, NOBODY, np.int64)
 
     @classmethod
-    def of_image(cls, name: str, image: NDArray[Any]) -> Memory:
-        """Return the memory of an image."""
-        height, width, channels = image.shape
-        return cls(name, image.reshape(-1, 1), FLOAT, (height, width, channels), "read")
+    def of(cls, name: str, values: NDArray[Any], space: str) -> Memory:
+        """Return the memory of an array that a kernel is given."""
+        return cls(name, values.reshape(-1, 1), FLOAT, values.shape, space)
 
     def columns(self, items: Items) -> Any:
         """Return the column of each item."""
@@ -92,6 +96,9 @@ class Memory:
             height, width, channels = self.sizes
             sizes = (height, width) if lanes > 1 else (height, width * channels)
             return self, self._element(items, index, sizes) * (channels if lanes > 1 else 1)
+        if len(index) == 3:  # elements of a row of a plane
+            column = index[-1] if np.ndim(index[-1]) == 2 else spread(index[-1], lanes)
+            return self, self._element(items, (*index[:-1], column), self.sizes)
         if self.kind.lanes == 1:  # elements side by side, from any one on
             return self, self._element(items, index, (len(self.data) - lanes + 1,))
         return self, self._element(items, index, (len(self.data) // lanes,)) * lanes
@@ -117,7 +124,7 @@ class Memory:
             written = self.written if self.written is None else self.written[rows]
             written = written[:, columns] if self.space == "group" and written is not None else written
         else:
-            each = place + np.arange(count)[:, None]
+            each = spread(place, count)
             there = data[each, columns]
             written = self.written if self.written is None else self.written[each, columns]
         if written is not None and not written.all():
@@ -140,7 +147,7 @@ class Memory:
         if self.space in ("group", "device", "result"):
             self._writes(items, place, count)
         active = np.flatnonzero(items.mask)
-        each = np.broadcast_to(place + np.arange(count)[:, None], (count, items.count))[:, active]
+        each = np.broadcast_to(spread(place, count), (count, items.count))[:, active]
         columns = np.broadcast_to(self.columns(items), (items.count,))[active]
         self.data[each, columns] = value[:, active]
         assert self.written is not None, "what is only read is not written"
@@ -159,7 +166,7 @@ class Memory:
     def _used(self, items: Items, place: Any, count: int) -> tuple[Any, Any, Any]:
         """Return the components, columns and numbers of the active items of an access."""
         active = np.flatnonzero(items.mask)
-        each = np.broadcast_to(place + np.arange(count)[:, None], (count, items.count))[:, active]
+        each = np.broadcast_to(spread(place, count), (count, items.count))[:, active]
         columns = np.broadcast_to(self.columns(items), (items.count,))[active]
         return each, columns, np.broadcast_to(active, each.shape)
 
@@ -193,11 +200,13 @@ class Memory:
             self.writer[:, groups] = NOBODY
             self.reader[:, groups] = NOBODY
 
-    def image(self) -> NDArray[Any]:
-        """Return the result (H, W, C), all of which must be written."""
+    def image(self, planes: bool, width: int) -> NDArray[Any]:
+        """Return the result (H, W, C), or planes (C, H, stride); all of the image must be written."""
         assert self.written is not None, "a result is written"
-        if not self.written.all():
-            row, column, channel = np.unravel_index(int(np.argmin(self.written[:, 0])), self.sizes)
+        written = self.written.reshape(self.sizes)
+        written = np.moveaxis(written[..., :width], 0, -1) if planes else written
+        if not written.all():
+            row, column, channel = np.unravel_index(int(np.argmin(written)), written.shape)
             raise KernelError(f"channel {channel} of pixel ({column}, {row}) of the result is never written")
         return self.data.reshape(self.sizes)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.ops import OPS
 from .domain import STORED, Domain, computed
-from .interface import IMAGE, RESULT, WEIGHTS
+from .interface import IMAGE, READ, RESULT, WEIGHTS, WRITE
 from .kernel import (
     BATCH,
     FLOAT,
@@ -53,35 +53,55 @@ def run(
     kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain | None = None
 ) -> NDArray[Any]:
     """Return the result (H, W, C) for images (H, W, channels) by name, or raise a KernelError."""
+    arrays = {f"{IMAGE}{key}": image for key, image in images.items()}
+    height, width = next(iter(images.values())).shape[:2]
+    return run_on(kernel, arrays, {"width": width, "height": height}, weights, domain)[RESULT]
+
+
+def run_on(
+    kernel: Kernel,
+    arrays: Mapping[str, NDArray[Any]],
+    integers: Mapping[str, int],
+    weights: NDArray[Any] | None = None,
+    domain: Domain | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a kernel writes, by name, for those that it reads and for its integers."""
     verify(kernel)
     with np.errstate(all="ignore"):
-        runner = Runner(kernel, images, weights, domain or Domain())
+        runner = Runner(kernel, arrays, integers, weights, domain or Domain())
         runner.body(kernel.body)
-        return runner.result.image()
+    written = [each for each in kernel.interface.arrays if each.access == WRITE]
+    return {a.name: runner.given[a.name].image(bool(a.planes), integers["width"]) for a in written}
 
 
 class Runner:
     """One run: the items, what they name, and the memory that they see."""
 
     def __init__(
-        self, kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain
+        self,
+        kernel: Kernel,
+        arrays: Mapping[str, NDArray[Any]],
+        integers: Mapping[str, int],
+        weights: NDArray[Any] | None,
+        domain: Domain,
     ) -> None:
         self.kernel, self.domain = kernel, domain
         self.functions = {each.name: each for each in kernel.functions}
         self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
         self.numbers: dict[int, Values] = {}
-        height, width = next(iter(images.values())).shape[:2]
-        self.items, places = self._items(width, height)
-        self.names: dict[str, Values] = {**self.constants, "width": width, "height": height, **places}
-        self.memory: dict[str, Memory | Part] = {WEIGHTS: self._weights(weights)}
-        for key, image in images.items():
-            self.memory[f"{IMAGE}{key}"] = Memory.of_image(f"{IMAGE}{key}", domain.lift(image))
-        result = kernel.interface.named(RESULT)
-        assert result is not None, "a kernel that runs has a result"
-        sizes = (height, width, int(result.shape[-1]))
-        self.result = Memory(RESULT, np.zeros((int(np.prod(sizes)), 1), domain.dtype), FLOAT, sizes, "result")
-        self.memory[RESULT] = self.result
+        self.items, places = self._items(integers["width"], integers["height"])
+        self.names: dict[str, Values] = {**self.constants, **integers, **places}
+        self.given: dict[str, Memory] = {}
+        for array in kernel.interface.arrays:
+            if array.access == READ and array.name != WEIGHTS:
+                self.given[array.name] = Memory.of(array.name, domain.lift(arrays[array.name]), "read")
+            elif array.access == WRITE:
+                shape = [integers[each] if isinstance(each, str) else each for each in array.shape]
+                self.given[array.name] = Memory.of(array.name, np.zeros(shape, domain.dtype), "result")
+        self.memory: dict[str, Memory | Part] = {**self.given}
+        if weights is not None:
+            self.memory[WEIGHTS] = self._weights(weights)
         self.evaluators = self._evaluators()
         if kernel.batch is not None:
             self.names |= dict(zip(BATCH, (0, self.value(kernel.batch)), strict=True))
@@ -327,6 +347,8 @@ class Runner:
     def _value_clamp(self, value: Expr) -> Values:
         """Return an index within limits."""
         index, low, high = map(self.value, value.args)
+        if value.type.lanes > 1:
+            index = index + np.arange(value.type.lanes)[:, None]
         if isinstance(index, int) and isinstance(low, int) and isinstance(high, int):
             return min(max(index, low), high)
         return np.where(index < low, low, np.where(index > high, high, index))

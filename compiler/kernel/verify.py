@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import ir
 from ..core.ops import OPS, TypeRuleError
-from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
+from .interface import DENOISE, IMAGE, RESULT, UNSIGNED, WEIGHTS, WRITE
 from .kernel import (
     BATCH,
     BOOL,
@@ -109,11 +109,11 @@ class Verifier:
         for each, kind in integers.items():
             self.declare(each, Declared(kind))
         for array in kernel.interface.arrays:
-            if array.is_image or array.name == RESULT:
-                self.declare(
-                    array.name, Declared(FLOAT, (None, None, int(array.shape[-1])), array.name == RESULT)
-                )
-        self.declare(WEIGHTS, Declared(kernel.weights, (None,), False))
+            if array.name != WEIGHTS:
+                sizes = tuple(each if isinstance(each, int) else None for each in array.shape)
+                self.declare(array.name, Declared(FLOAT, sizes, array.access == WRITE))
+        if kernel.interface.role == DENOISE:
+            self.declare(WEIGHTS, Declared(kernel.weights, (None,), False))
 
     # ---- names -------------------------------------------------------------------------------------------
 
@@ -326,8 +326,10 @@ class Verifier:
     def element(self, name: str, index: Sequence[Expr], kind: Type) -> None:
         """Check an access to an element of an array."""
         declared = self.array(name)
+        row = len(index) == 3 and kind.lanes > 1  # several elements of a row
         for each in index:
-            self.check(each, INT, f"an index of {name}")
+            several = row and each is index[-1] and each.op == "clamp"
+            self.check(each, INT.of(kind.lanes) if several else INT, f"an index of {name}")
         if name == WEIGHTS and kind.dtype in ("float32", "int32"):  # words, bit by bit
             declared = Declared(Type(kind.dtype, declared.type.lanes), declared.sizes)
         sizes, whole = declared.sizes, kind == declared.type
@@ -335,6 +337,8 @@ class Verifier:
         if name.startswith(IMAGE) and len(index) == 2:
             if kind not in (FLOAT, FLOAT.of(sizes[-1] or 1)):
                 raise KernelError(f"{name} is read as {shown(kind)}")
+            return
+        if row and len(sizes) == 3 and kind.dtype == declared.type.dtype:
             return
         if not whole and (len(index) != 1 or not reads_as(declared.type, kind) or len(sizes) != 1):
             raise KernelError(f"{name} has elements of type {shown(declared.type)}, not {shown(kind)}")
@@ -366,8 +370,11 @@ class Verifier:
 
     def _type_load(self, value: Expr) -> Type:
         """Return the type of an element."""
-        if value.value == RESULT:
-            raise KernelError("the result is read")
+        array = self.kernel.interface.named(value.value)
+        if array is not None and array.access == WRITE:
+            raise KernelError(
+                f"the {value.value} is read" if value.value == RESULT else f"{value.value} is read"
+            )
         self.element(value.value, value.args, value.type)
         return value.type
 
@@ -390,11 +397,11 @@ class Verifier:
         return value.type.of(len(value.args))
 
     def _type_clamp(self, value: Expr) -> Type:
-        """Return the type of an index within limits."""
+        """Return the type of an index within limits, or of several."""
         self.arity(value, 3)
         for each in value.args:
             self.check(each, INT, "an operand of clamp")
-        return INT
+        return INT.of(value.type.lanes)
 
     def _type_convert(self, value: Expr) -> Type:
         """Return the type of a value of another kind."""

@@ -25,8 +25,8 @@ from ..kernel.instructions import (
     VECTORS,
     gnu_vectors,
 )
-from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
-from ..kernel.kernel import Kernel
+from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Interface
+from ..kernel.kernel import Kernel, operations
 from .dialect import Dialect, Parts
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
@@ -107,12 +107,13 @@ class C(Arguments):
     target = "c"
     language = "C99"
     suffix = ".h"
-    entries = {DENOISE: "wamnet_pixel", PATH: "wamnet_trace_pixel", ENCODE: "wamnet_encode"}
-    ends = {
-        DENOISE: POPPED,
-        PATH: f"{RESTORED}{POPPED[1:]}",
-        ENCODE: f"    }}\n{POPPED}",
+    entries = {
+        **{role: f"wamnet_{role}_pixel" for role in INTEGERS},
+        DENOISE: "wamnet_pixel",
+        PATH: "wamnet_trace_pixel",
+        ENCODE: "wamnet_encode",
     }
+    ends = {**dict.fromkeys(INTEGERS, POPPED), PATH: f"{RESTORED}{POPPED[1:]}"}
     steps = ("++x", "++y")
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
@@ -133,11 +134,6 @@ class C(Arguments):
             f"part: {NUMBERS}; seed_number.\n"
             "wamnet_trace does all pixels, wamnet_trace_pixel WAMNET_PATHS of a row from a column on, or\n"
             "fewer at its end: call that from your own loops"
-        ),
-        ENCODE: (
-            "sums: float, one plane of width * height numbers for each of:\n"
-            "{planes};\n"
-            f"{IMAGES};\nwidth; height; sample_count"
         ),
     }
     max_output_channels = 2**16
@@ -203,8 +199,6 @@ class C(Arguments):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the functions."""
         head = [*includes(kernel.role, "float", "math", "stdbool", "stddef", "stdint"), PRAGMAS]
-        if kernel.role == ENCODE:
-            return [*head, "", "/* All pixels. */"]
         fields = [f"    {self.typed(name)};" for name in kernel.integers]
         said = "/* What all pixels of a launch share. */"
         part = [said, "typedef struct {", *fields, "} wamnet_part;", ""]
@@ -216,12 +210,12 @@ class C(Arguments):
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the functions: of paths one for some pixels, and one that calls it for all."""
-        return super().head(kernel) if kernel.role == ENCODE else self._of_paths(kernel)
+        return self._of_paths(kernel)
 
     def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
         """Return the lines of a kernel that is data, up to its first statement."""
-        names = ("float", "math", "stdbool", "stdint")
-        head = [*includes(DENOISE, *names), self.unordered[parts.bounded]]
+        names = ("float", "math", "stdbool", *(["stddef"] if interface.role != DENOISE else []), "stdint")
+        head = [*includes(interface.role, *names), self.unordered[parts.bounded]]
         sizes, functions = parts.top.split("\nstatic void", 1) if kernel.functions else (parts.top, "")
         functions = f"static void{functions}" if functions else ""
         if kernel.weights.dtype == "int32":
@@ -234,23 +228,27 @@ class C(Arguments):
         else:
             top = [*head, FUSED, sizes, STRAIGHT, VECTORS]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
+        said = said if interface.role == DENOISE else "One pixel (x, y)."
         if kernel.step[0].value != 1:
             said = (
                 "Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are "
                 "written\n   to `result`, the whole image's array."
             )
         unused = "    (void)weights;" if interface.named("weights") else ""
-        return [*top, *self.functions(interface, said, kernel), unused]
+        return [*top, *self.functions(interface, said, kernel), unused, *self.strides(interface)]
 
     def functions(self, interface: Interface, said: str, kernel: Kernel) -> list[str]:
         """Return the function of all pixels, and the head of that of a work item's."""
         along, down = (self.step(each).removeprefix(" * ") for each in kernel.step)
         steps = (f"x += {along}" if along else "++x", f"y += {down}" if down else "++y")
-        listed, name = super().listed(interface), self.entries[DENOISE]
+        listed, denoises = super().listed(interface), interface.role == DENOISE
+        name = f"{self.entries[interface.role].removesuffix('_pixel')}_pixel"
         one = self.signature(name, [*listed, *(f"int {place}" for place in kernel.place)])
         given = ", ".join([*(array.name for array in interface.arrays), *interface.integers, "x", "y"])
         call = loops(("x", "y"), ("width", "height"), steps, f"{name}({given});")
-        return self.around(said, one, self.signature("wamnet_image", listed), call, CLAMP)
+        every = self.signature("wamnet_image" if denoises else name.removesuffix("_pixel"), listed)
+        limit = [CLAMP.replace(C.clamp, self.clamp)] if denoises or "clamp" in operations(kernel) else []
+        return self.around(said, one, every, call, *limit)
 
     def around(
         self, said: str, one: Sequence[str], all_pixels: Sequence[str], calls: Sequence[str], *more: str
@@ -259,10 +257,19 @@ class C(Arguments):
         declared = [f"/* {said} */", *one[:-1], f"{one[-1]};", "", ALL_PIXELS]
         return [*declared, *all_pixels, "{", *calls, "}", "", *more, *one, "{"]
 
+    def launch(self, kernel: Kernel) -> str:
+        """Return which function does what."""
+        name = self.entries[kernel.interface.role].removesuffix("_pixel")
+        return f"{name} does all pixels, {name}_pixel one: call that from your own loops"
+
     def fitted(self, kernel: Kernel) -> Dialect:
-        """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have."""
-        found = super().fitted(kernel)
+        """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have.
+
+        Headers of several roles may be in one source, and share no name.
+        """
+        found, role = super().fitted(kernel), kernel.interface.role
         found.calls_vectors = not kernel.functions
+        found.clamp = self.clamp if role == DENOISE else f"wamnet_{role}_clamp"
         return found
 
     def transform_head(self, name: str, kind: str) -> str:
@@ -310,22 +317,12 @@ class C(Arguments):
 
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the functions have the place of a pixel already."""
-        if kernel.role == PATH:
-            return [
-                "    const int samples = part->samples;",
-                "    const int left = part->width - column;",
-                "    const size_t line = (size_t)(row + part->first_row);",
-                "    const size_t place = line * (size_t)part->width + (size_t)column;",
-                *self.path_start(kernel),
-            ]
-        return self.encode_start(kernel)
-
-    def encode_start(self, kernel: Interface) -> list[str]:
-        """Return the loop over all pixels."""
         return [
-            "    const size_t plane = (size_t)width * (size_t)height;",
-            "    const float samples = (float)sample_count;",
-            "    for (size_t at = 0; at < plane; ++at) {",
+            "    const int samples = part->samples;",
+            "    const int left = part->width - column;",
+            "    const size_t line = (size_t)(row + part->first_row);",
+            "    const size_t place = line * (size_t)part->width + (size_t)column;",
+            *self.path_start(kernel),
         ]
 
 

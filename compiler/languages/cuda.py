@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import CUDA_SINE
 from ..kernel.instructions import CUDA_GROUP, CUDA_VECTOR
-from ..kernel.interface import DENOISE, ENCODE, PATH, Interface
+from ..kernel.interface import DENOISE, PATH, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .dialect import Dialect, Parts
@@ -91,10 +91,6 @@ class CUDA(Arguments):
             "sums: float, one plane of rows * width numbers for each of:\n"
             f"{{planes}};\n{NUMBERS}; seed.\n"
             f"{LAUNCH.format(rows='rows')}; thread (x, y) follows pixel x of row first_row + y"
-        ),
-        ENCODE: (
-            "sums: float, one plane of width * height numbers for each of:\n"
-            f"{{planes}};\n{IMAGES};\nwidth; height; sample_count.\n{LAUNCH.format(rows='height')}"
         ),
     }
 

@@ -15,6 +15,7 @@ A dialect is all that the emitters know of a language, for every role of a kerne
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -29,7 +30,19 @@ from ..core.profiles import SineContract
 if TYPE_CHECKING:
     from ..kernel.kernel import Kernel, Type
 
-from ..kernel.interface import BUFFER, DENOISE, ENCODE, INTEGERS, PATH, SCENE_NUMBERS, Interface
+from ..kernel.interface import (
+    BUFFER,
+    DENOISE,
+    ENCODE,
+    FOLLOW,
+    GUIDE,
+    INTEGERS,
+    PATH,
+    SCENE_NUMBERS,
+    SMOOTH,
+    Array,
+    Interface,
+)
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
@@ -69,10 +82,13 @@ class Dialect:
     target: str
     language: str
     suffix: str
-    entries: Mapping[str, str] = {DENOISE: "wamnet_denoise", PATH: "wamnet_trace", ENCODE: "wamnet_encode"}
+    entries: Mapping[str, str] = {
+        **{role: f"wamnet_{role}" for role in (DENOISE, ENCODE, GUIDE, SMOOTH, FOLLOW)},
+        PATH: "wamnet_trace",
+    }
     integers: Mapping[str, tuple[str, ...]] = INTEGERS
     said: Mapping[str, str]
-    ends: Mapping[str, str] = dict.fromkeys((DENOISE, PATH, ENCODE), "}")
+    ends: Mapping[str, str] = dict.fromkeys(INTEGERS, "}")
     home: str = BUFFER
     pixel: str
     weight: str
@@ -108,12 +124,11 @@ class Dialect:
     max_planes: int = 2**16
     max_images: int = 2**16
     sum_store: str = "sums[{plane} * plane + at] = {value};"
-    load: str = "float {name} = sums[{plane} * plane + at];"
-    image_store: str = "image_{image}[at * {channels} + {channel}] = {value};"
     painted: str = ""
     painter: str = ""
     unroll: str = ""
     casts: bool = False
+    numbered: bool = False
     dot_of_bytes: str = ""
     instructions: str = ""
     own: str = ""
@@ -127,6 +142,7 @@ class Dialect:
     weight_vector: str = "w[{index}]"
     wait: str = ""
     texel: str = ""
+    row_reader: str = ""
     pixel_begin: tuple[str, ...] = ()
     pixel_end: tuple[str, ...] = ()
     shared_array: str = ""
@@ -269,6 +285,40 @@ class Dialect:
         return self.let_value(self.scalars["float32"], name, value)
 
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
+
+    def arguments(self, kernel: Kernel, lists: Mapping[str, str], notes: Mapping[str, str]) -> str:
+        """Return how a kernel on images and planes is called.
+
+        `lists`: what the planes or columns of arrays are; `notes`: what else callers must know of arguments.
+        """
+        numbers = kernel.interface.numbers() if self.numbered else {}
+        said = [f"0 32-bit integers: {', '.join(kernel.interface.integers)}"] if self.numbered else []
+        for array in kernel.interface.by_number() if self.numbered else kernel.interface.arrays:
+            number = f"{numbers[array.name]} " if self.numbered else ""
+            note = f", {notes[array.name]}" if array.name in notes else ""
+            listed = f":\n{lists[array.name]}" if array.name in lists else ""
+            said.append(textwrap.fill(f"{number}{self.about(array)}{note}", 98) + listed)
+        names = [name for name in kernel.interface.integers if name in notes or not self.numbered]
+        said.append("; ".join(f"{n}: {notes[n]}" if n in notes else n for n in names))
+        return ";\n".join(filter(None, said)) + f".\n{self.launch(kernel)}"
+
+    def about(self, array: Array) -> str:
+        """Return what an array is that a kernel is given, by its name."""
+        raise NotImplementedError
+
+    def launch(self, kernel: Kernel) -> str:
+        """Return how many items of such a kernel are started."""
+        columns = kernel.step[0].value
+        said = self.launches[columns > 1].format(columns=columns, rows=1)
+        return said.replace("ceil(height / 1)", "height")
+
+    def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
+        """Return an element of an array that a kernel is given, or several of a row [`row_reader`]."""
+        raise NotImplementedError
+
+    def written(self, array: Array, index: Sequence[str], value: str, lanes: int) -> str:
+        """Return the statement that writes such elements."""
+        return f"{self.read(array, index, 1)} = {value};"
 
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: with other words where it has work groups."""

@@ -15,14 +15,19 @@ from ..kernel.interface import (
     BLOCK,
     DENOISE,
     ENCODE,
+    FOLLOW,
+    GUIDE,
+    INTEGERS,
     PATH,
     RESULT,
     SCENE_NUMBERS,
+    SMOOTH,
     UNSIGNED,
     WEIGHTS,
     WRITE,
     Interface,
 )
+from ..kernel.interface import Array as Given
 from ..kernel.kernel import BATCH, Array, Kernel, values, walk
 from ..kernel.kernel import parts as inside
 from .dialect import Dialect, Parts
@@ -95,11 +100,14 @@ class GLSL(Dialect):
     target = "opengl"
     language = "GLSL 3.30, fragment shader"
     suffix = ".frag"
-    entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
+    entries = dict.fromkeys(INTEGERS, "main")
     integers = {
         DENOISE: (),
         PATH: ("width", "height", "first_row", "first_sample", "samples", "seed_number"),
         ENCODE: ("sample_count",),
+        GUIDE: (),
+        SMOOTH: ("width", "height", "gap"),
+        FOLLOW: ("width", "height"),
     }
     preamble = PREAMBLE
     pixel = "texelFetch(image_{image}, ivec2({column}, {row}), 0)[{c}]"
@@ -128,13 +136,6 @@ class GLSL(Dialect):
             "{planes}.\n"
             "Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y"
         ),
-        ENCODE: (
-            "sums_0, sums_1, ...: RGBA textures of 32-bit floats; component c of sums_k is number 4 k + c "
-            "of\n{planes};\n"
-            "sample_count;\n"
-            "each image: a float colour buffer of the same size (RGBA; channels that a feature lacks mean\n"
-            "nothing). Draw one triangle that covers them: row 0 stays row 0"
-        ),
     }
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result: int | None = 4
@@ -145,8 +146,6 @@ class GLSL(Dialect):
     said_numbers = f"uniform vec4 {SCENE_NUMBERS}[]: {{count}} floats, four to a vector, the last one padded"
     scene_number = f"{SCENE_NUMBERS}[{{vector}}].{{component}}"
     sum_store = "sums_{buffer}[{component}] = {value};"
-    load = "PRECISE float {name} = texelFetch(sums_{buffer}, at, 0)[{component}];"
-    image_store = "image_{image}[{channel}] = {value};"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"
@@ -178,7 +177,9 @@ class GLSL(Dialect):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
-        of_role = {DENOISE: self.denoise_begin, PATH: self.path_begin, ENCODE: self.encode_begin}[kernel.role]
+        of_role = {DENOISE: self.denoise_begin, PATH: self.path_begin}.get(
+            kernel.role, self.begin_on_textures
+        )
         return "\n".join(
             [self.preamble.format(unordered=self.unordered[parts.bounded]), *of_role(kernel, parts)]
         )
@@ -250,20 +251,55 @@ class GLSL(Dialect):
         kinds = {name: "uint" if name in UNSIGNED else "int" for name in kernel.integers}
         return [f"uniform {kind} {name};" for name, kind in kinds.items()]
 
-    def encode_begin(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of an encoding."""
-        inputs = range(-(-int(kernel.arrays[0].shape[0]) // self.planes_per_buffer))
-        written = [image for image in kernel.images if image.access == WRITE]
+    def begin_on_textures(self, kernel: Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a kernel whose arrays are textures and colour buffers."""
+        read = [name for array in kernel.arrays if array.access != WRITE for name in self.textures(array)]
+        written = [name for array in kernel.arrays if array.access == WRITE for name in self.textures(array)]
         return [
-            *(f"uniform sampler2D sums_{number};" for number in inputs),
-            *(f"layout(location = {number}) out vec4 {image.name};" for number, image in enumerate(written)),
+            *([parts.top] if parts.top else []),
+            *(f"uniform sampler2D {name};" for name in read),
+            *(f"layout(location = {number}) out vec4 {name};" for number, name in enumerate(written)),
             *self.uniforms(kernel),
             "",
             "void main()",
             "{",
-            "    ivec2 at = ivec2(gl_FragCoord.xy);",
-            "    PRECISE float samples = float(sample_count);",
+            "    int x = int(gl_FragCoord.x);",
+            "    int y = int(gl_FragCoord.y);",
+            *(f"    {name} = vec4(0.0);" for name in written),
         ]
+
+    def about(self, array: Given) -> str:
+        """Return what an array is that a kernel is given, by the names of its textures."""
+        name, written = ", ".join(self.textures(array)), array.access == WRITE
+        if array.planes:
+            kind = "float colour buffers" if written else "textures of 32-bit floats"
+            return f"{name}: RGBA {kind}, plane 4 k + c in component c of number k"
+        if array.is_image:
+            buffer = f"a float colour buffer, RGBA, of which {array.shape[-1]} components are written"
+            return f"{name}: {buffer if written else 'a texture of 32-bit floats'}"
+        rows = "rows" if len(array.shape) > 1 else "a row"
+        return f"{name}: an R32F texture, {rows} of {array.shape[-1]} texels"
+
+    def launch(self, kernel: Kernel) -> str:
+        """Return what is drawn."""
+        return "Draw one triangle that covers what is written: row 0 is the TOP row of all images"
+
+    def textures(self, array: Given) -> list[str]:
+        """Return the names of an array's textures: planes are four to each."""
+        count = -(-array.planes // self.planes_per_buffer)
+        return [f"{array.name}_{number}" for number in range(count)] or [array.name]
+
+    def read(self, array: Given, index: Sequence[str], lanes: int) -> str:
+        """Return an element of a texture, or a component of a colour buffer."""
+        name, part = array.name, "[0]"
+        row, column = ("0", *index)[-2:]
+        if array.planes:
+            number, component = divmod(int(index[0]), self.planes_per_buffer)
+            name, part = f"{name}_{number}", f"[{component}]"
+        elif array.is_image:
+            row, column, part = index[0], index[1], f"[{index[2]}]"
+        written = array.access == WRITE
+        return f"{name}{part}" if written else f"texelFetch({name}, ivec2({column}, {row}), 0){part}"
 
     def place(self, kernel: Interface) -> tuple[str, str]:
         """Return the texts of a fragment's column and row."""

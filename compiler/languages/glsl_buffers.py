@@ -47,12 +47,6 @@ SAID = {
         "{planes}.\n"
         f"{GROUPS.format(rows='rows')}; invocation (x, y) follows pixel x of row first_row + y"
     ),
-    ENCODE: (
-        f"{BUFFERS.format(sizes='width, height, sample_count')}"
-        "1 the sums, one plane of width * height floats for each of:\n"
-        "{planes};\n"
-        f"3 and on the images in this order. {GROUPS.format(rows='height')}"
-    ),
 }
 """How a kernel of each role is called."""
 
@@ -64,6 +58,7 @@ NUMBERS_SAID = f"1 {SCENE_NUMBERS}: {{count}} floats"
 class Declared(Buffers):
     """Languages whose buffers are declared with numbers, above a function without arguments."""
 
+    numbered = True
     group = (8, 8)
     largest_shared = LEAST_SHARED
     launches = (
@@ -129,8 +124,6 @@ class Vulkan(Declared):
     instructions = VULKAN_GROUP
     vector_kind = GLSL.vector_kind
     item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
-    word = "precise "
-    load = f"{word}float {{name}} = sums[{{plane}} * plane + at];"
 
     def declared(self, kernel: Interface) -> list[str]:
         """Return the declarations of a group's size, of the integers and of all arrays."""

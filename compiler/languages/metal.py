@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, WRITE, Array, Interface
+from ..kernel.interface import BLOCK, DENOISE, PATH, WRITE, Array, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
@@ -49,8 +49,7 @@ class Metal(Buffers):
     threads: Sequence[str] = ("uint2 thread_place [[thread_position_in_grid]]",)
     item = ("thread_place.x", "thread_place.y")
     size = "size."
-    early = dict.fromkeys((DENOISE, PATH, ENCODE), ("width",))
-    late = {DENOISE: ("height",), PATH: ("samples",)}
+    early, late = {PATH: ("width",)}, {PATH: ("samples",)}
     max_output_channels = 2**16
     group = (16, 8)
     grouped = {
@@ -69,7 +68,7 @@ class Metal(Buffers):
     group_place = ("group_place.x", "group_place.y")
     wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
     wide = False
-    casts = True
+    casts = numbered = True
     said_numbers = NUMBERS_SAID
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -95,13 +94,6 @@ class Metal(Buffers):
             height="rows",
         )
         + "; thread (x, y) follows pixel x of row first_row + y",
-        ENCODE: CALLED.format(
-            sizes="width, height, sample_count",
-            buffers="1 the sums, one plane of\nwidth * height floats for each of:\n"
-            "{planes};\n3 and on the images in this order",
-            width="width",
-            height="height",
-        ),
     }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:

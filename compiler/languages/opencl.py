@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.profiles import OPENCL_SINE
-from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_TILE
+from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
 from ..kernel.kernel import Type
 from .dialect import Dialect, Parts
@@ -30,11 +30,12 @@ class OpenCL(Arguments):
     heading = "__kernel void {entry}"
     reads = "__global const float *restrict {name}"
     writes = "__global float *restrict {name}"
+    long = "size_t"
+    row_reader = OPENCL_ROW
     item = ("get_global_id(0)", "get_global_id(1)")
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    image_store = "image_{image}[pixel * {channels} + {channel}] = {value};"
     painted = "image_{image}[place * {channels} + {channel}] = {value}"
     said = {
         DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
@@ -43,13 +44,6 @@ class OpenCL(Arguments):
             "{planes};\n"
             "width, height of the image; first_row; first_sample; samples to add up; seed.\n"
             "Work item (i, j) follows the pixels from {lanes} * i of row first_row + j on"
-        ),
-        ENCODE: (
-            "sums: float, one plane of plane_stride numbers for each of:\n"
-            "{planes};\n"
-            f"{IMAGES};\n"
-            "width; height; row_stride: numbers from row to row of a plane; plane_stride; sample_count.\n"
-            "Global size: at least (width, height)"
         ),
     }
     max_output_channels = 2**16
@@ -159,14 +153,19 @@ class OpenCL(Arguments):
         """Return the first statements of a path kernel: pixel and seed."""
         return Dialect.path_start(self, kernel)
 
-    def encode_start(self, kernel: Interface) -> list[str]:
-        """Return the first statements of an encoding: its places in planes and images, and the samples."""
-        return [
-            "    size_t at = (size_t)y * (size_t)row_stride + (size_t)x;",
-            "    size_t plane = (size_t)plane_stride;",
-            "    size_t pixel = (size_t)y * (size_t)width + (size_t)x;",
-            f"    {self.samples(kernel)}",
-        ]
+    def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
+        """Return an element of an array that a kernel is given, or several of a row."""
+        if lanes == 1:
+            return super().read(array, index, lanes)
+        plane, row, column = index
+        return f"row_at({array.name} + {plane} * plane + {self.factor(row)} * stride, {column}, width)"
+
+    def written(self, array: Array, index: Sequence[str], value: str, lanes: int) -> str:
+        """Return the statement that writes such elements."""
+        if lanes == 1:
+            return super().written(array, index, value, lanes)
+        place = super().read(array, index, lanes).removesuffix("]").replace("[", " + ", 1)
+        return f"vstore{lanes}({value}, 0, {place});"
 
     def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
         """Return the last statements of a path kernel: whole groups are larger than the picture."""

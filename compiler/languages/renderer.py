@@ -93,25 +93,35 @@ def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
             yield from ((each.value, each.type) for each in parts(value) if each.op == "load")
 
 
-def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32]) -> Kernel:
+NO_WEIGHTS = np.zeros(0, np.float32)
+"""The weights of a kernel that is no denoiser."""
+
+
+def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32] = NO_WEIGHTS) -> Kernel:
     """Return a kernel whose weights and integers are where a language has them."""
+    integers = tuple(dialect.integers[kernel.interface.role])
+    if kernel.interface.role != DENOISE:
+        return replace(kernel, interface=replace(kernel.interface, integers=integers))
     images = [array for array in kernel.interface.arrays if array.is_image]
     result = kernel.interface.named(RESULT)
     assert result is not None
     weights = [] if dialect.home == TABLE else [Memory(WEIGHTS, READ, (packed.size,), dialect.home)]
     tables = kernel.tables if weights else (*kernel.tables, (WEIGHTS, packed))
-    interface = Interface(DENOISE, (*images, *weights, result), tuple(dialect.integers[DENOISE]))
+    interface = Interface(DENOISE, (*images, *weights, result), integers)
     return replace(kernel, interface=interface, tables=tables)
 
 
 class Renderer(Lines):
     """Prints one kernel in one language."""
 
-    def __init__(self, dialect: Dialect, kernel: Kernel, bounded: bool, packed: NDArray[np.float32]) -> None:
+    def __init__(
+        self, dialect: Dialect, kernel: Kernel, bounded: bool, packed: NDArray[np.float32] = NO_WEIGHTS
+    ) -> None:
         self.dialect, self.bounded = dialect.fitted(kernel), bounded
         kernel = self.kernel = housed(kernel, dialect, packed)
         self.lines: list[str] = []
         self.depth = 1
+        self.readers: dict[str, None] = {}
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
         self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
         self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
@@ -129,7 +139,7 @@ class Renderer(Lines):
         if kernel.launches:
             self.depth = 0
         self.body(kernel.body)
-        top = [*map(self.constant, kernel.constants), *self.tables(), *functions]
+        top = [*map(self.constant, kernel.constants), *self.tables(), *self.readers, *functions]
         begin = dialect.begin(kernel.interface, Parts("\n".join(top), self.bounded, kernel=kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         end = "#endif" if kernel.launches else dialect.ends[kernel.interface.role]
@@ -256,6 +266,12 @@ class Renderer(Lines):
     def _load(self, value: Expr) -> tuple[str, int]:
         """Return an element of an image, of the weights, or of an array."""
         array, index = str(value.value), value.args
+        if (given := self.given(array)) is not None:
+            lanes = value.type.lanes
+            if lanes > 1:
+                index = (*index[:-1], index[-1].args[0])
+                self.readers[self.dialect.row_reader.format(lanes=lanes)] = None
+            return self.dialect.read(given, [self.text(each, UNARY) for each in index], lanes), ATOM
         if array.startswith(IMAGE):
             return self._pixel(array, index, value.type.lanes), ATOM
         if array == WEIGHTS:
@@ -265,6 +281,11 @@ class Renderer(Lines):
                 index=place, kind=self.kind(value.type)
             ), ATOM
         return self.element(array, index, value.type.lanes), ATOM
+
+    def given(self, array: str) -> Memory | None:
+        """Return an array of the interface, unless it is a denoiser's, which has words of its own."""
+        interface = self.kernel.interface
+        return None if interface.role == DENOISE else interface.named(array)
 
     def _pixel(self, array: str, index: Sequence[Expr], lanes: int) -> str:
         """Return a channel of an image's pixel, all of its channels, or the value at a position of a row."""
@@ -342,6 +363,10 @@ class Renderer(Lines):
     def _write_store(self, statement: Store) -> None:
         """Write a change of memory."""
         value, index = statement.value, statement.index
+        if (given := self.given(statement.array)) is not None:
+            place = [self.text(each, UNARY) for each in index]
+            self._line(self.dialect.written(given, place, self.text(value), value.type.lanes))
+            return
         if statement.array == RESULT:
             self._result(index, value)
             return
@@ -456,8 +481,8 @@ class Renderer(Lines):
         """Return whether a loop chooses among results that no variable may choose of."""
         dialect = self.dialect
         stores = all(isinstance(each, Store) and each.array == RESULT for each in statement.body)
-        several = dialect.channels_per_result and self.channels > dialect.channels_per_result
-        return stores and bool(several or not dialect.indexes_results)
+        most = dialect.channels_per_result
+        return stores and bool((most and self.channels > most) or not dialect.indexes_results)
 
     def _write_if(self, statement: If) -> None:
         """Write a branch."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
+from ..kernel.interface import BLOCK, PATH, UNSIGNED, WRITE, Array, Interface
 from .dialect import Dialect, Parts
 from .glsl_buffers import GROUP, SAID, Declared
 
@@ -47,17 +47,12 @@ class WGSL(Declared):
     instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
-    early = {
-        DENOISE: ("width", "height"),
-        PATH: ("width", "samples"),
-        ENCODE: ("width", "height"),
-    }
+    early = {PATH: ("width", "samples")}
     types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
     define = "const {name}: i32 = {value};"
     choice = "select({2}, {1}, {0})"
     table = "const {name} = array<{type}, {count}>({values});"
-    load = "let {name}: f32 = sums[{plane} * plane + at];"
     operations = {
         **Dialect.operations,
         "absolute": "abs({0})",

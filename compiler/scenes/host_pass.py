@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...refimpl.network.dataset import Normalization
-from ..kernel.interface import PATH, Interface
+from ..kernel.interface import PATH, Array, Interface
 from ..languages.dialect import Parts
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise
@@ -30,8 +30,10 @@ class _ShadertoyPath(GLSLES):
     max_planes = 4
     most_numbers = 0
     said = {PATH: "{planes}"}
-    load = "float {name} = sums_0[{component}];"
-    image_store = "image[{channel}] = {value};"
+
+    def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
+        """Return a plane of the sums, or a channel of the image."""
+        return f"sums_0[{index[0]}]" if array.planes else f"image[{index[-1]}]"
 
     def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return what follows the first lines of a path kernel."""
@@ -99,7 +101,7 @@ void mainImage(out vec4 fragColor, in vec2 fragCoord)
 {{
     wamnet_trace(ivec2(fragCoord), int(iResolution.x), int(iResolution.y), uint(iFrame));
     vec4 image = vec4(0.0, 0.0, 0.0, 1.0);
-    float samples = 1.0f;
+    const int sample_count = 1;
 {statements}
     fragColor = image;
 }}
@@ -113,7 +115,7 @@ void fragment()
     ivec2 at = ivec2(UV * vec2(float(width), float(height)));
     vec4 sums_0 = wamnet_trace(at, uint(seed_number));
     vec4 image = vec4(0.0, 0.0, 0.0, 1.0);
-    float samples = 1.0f;
+    const int sample_count = 1;
 {statements}
     COLOR = image;
 }}

@@ -1,134 +1,166 @@
-"""Kernels on planes of numbers: the edge-avoiding filter's, and that of the history; source and manifest.
+"""Kernels of one pixel, or several of a row, on images and planes: the filter, the history, the encoding.
 
-A kernel has a role, programs that were traced, and statements around them, which smooth_kernel.py and
-history_kernel.py write in the words of a dialect. What is left is the same for all [`put_together`].
+1. A builder makes a kernel [kernel/kernel.py] of traced programs: each is a statement an operation [`lets`],
+   between reads of what its inputs are and stores of its outputs.
+2. The kernel is printed in a language, or its programs are; a manifest says what was made [`compiled`].
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from ...refimpl.errors import CompileError
 from ...refimpl.reading import SIZES
 from ..artifact import OneSource
 from ..core import ir, profiles
-from ..core.ir import Program
-from ..kernel import interface
+from ..core.ir import Image, Program
 from ..kernel.interface import Interface
-from ..languages.dialect import Dialect, Parts
-from ..languages.renderer import framed
+from ..kernel.kernel import Expr, Kernel, Let, Type, apply, const, name, splat
+from ..languages.renderer import Renderer, housed
 from ..schedules.schedules import PRINTED
 from ..targets import target_named
 
 
 @dataclass(frozen=True)
 class PlaneArtifact(OneSource):
-    """A kernel on planes, by its role; `lanes` pixels in a work item, `programs` what was emitted."""
+    """A kernel on images and planes; `programs`: what was emitted, for what interprets them."""
 
-    role: str
     target: str
     profile: str
     entry_point: str
     source: str
     source_name: str
     programs: Any
-    lanes: int
+    kernel: Kernel
     interface: Interface
     manifest: Mapping[str, Any]
+    images: tuple[Image, ...] = ()
+
+    @property
+    def role(self) -> str:
+        """Return the role."""
+        return self.interface.role
+
+    @property
+    def lanes(self) -> int:
+        """Return how many pixels of a row a work item computes."""
+        return int(self.kernel.step[0].value)
+
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """Return what the planes of sums are, in order, of an encoding."""
+        return tuple(self.manifest["planes"])
 
 
 @dataclass(frozen=True)
 class Draft:
-    """What is particular to a kernel: its title, programs, interface, statements, bound in words, and facts.
+    """What is particular to a role: title, programs, kernel, lines of the header, and facts of the manifest.
 
-    `said` are names of planes by what they fill in the words on arguments. `written` are all programs, for
-    what interprets them, `used` those whose text this kernel is.
+    `used` are the programs of this kernel, `programs` what is kept for an interpreter. `lists` says what the
+    planes or columns of arrays are, `notes` what else callers must know of arrays and integers.
     """
 
-    role: str
     title: str
     used: Sequence[Program]
-    written: Any
-    interface: Interface
-    lines: Sequence[str]
-    top: str
-    said: Mapping[str, Sequence[str]]
-    bound: str
+    programs: Any
+    kernel: Kernel
     facts: Mapping[str, Any]
+    bound: str
+    lists: Mapping[str, Sequence[str]]
+    notes: Mapping[str, str] = field(default_factory=dict)
+    images: Sequence[Image] = ()
 
 
-def dialect_of(target: str, lanes: int, what: str, way_out: str) -> Any:
-    """Return the dialect of a target's kernels on planes, None for the interpreter's, or refuse."""
-    planes = target_named(target).planes
-    if lanes not in planes:
+def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = "") -> list[Let]:
+    """Return the reads of elements, by name."""
+    return [Let(f"{prefix}{each}", element(number)) for number, each in enumerate(names)]
+
+
+def lets(
+    program: Program, known: Mapping[str, Expr] | None = None, lanes: int = 1, prefix: str = "t"
+) -> tuple[list[Let], dict[str, Expr]]:
+    """Return a statement for each operation of a program, and its outputs.
+
+    Inputs are values of their names unless `known` has others.
+    """
+    values: list[Expr] = []
+    lines = []
+    for index, node in enumerate(program.nodes):
+        kind = Type(node.type.dtype)
+        if node.op == "input":
+            key = str(node["name"])
+            values.append((known or {}).get(key) or name(key, kind.of(lanes)))
+        elif node.op == "constant":
+            number: Any = node["value"]
+            values.append(splat(const(float(number) if kind == Type() else number, kind), lanes))
+        else:
+            value = apply(node.op, *(values[arg] for arg in node.args), value=node.get("dtype"))
+            lines.append(Let(f"{prefix}{index}", value, kept=True))
+            values.append(name(lines[-1].name, value.type))
+    return lines, {key: values[index] for key, index in program.outputs}
+
+
+def check_lanes(target: str, lanes: int, what: str, remedy: str) -> None:
+    """Refuse a target that has no kernels of so many pixels in a work item."""
+    if lanes not in (planes := target_named(target).planes):
         known = ", ".join(map(str, planes)) or "none"
         raise CompileError(
             f"target {target}, {lanes} pixels in a work item: there are kernels of {what} for {known}; "
-            f"{way_out}"
+            f"{remedy}"
         )
-    return planes[lanes]
 
 
-PLANES_A_BUFFER = 4
-"""Planes of a texture, where planes are textures."""
-
-
-def place_of(array: str, plane: int) -> dict[str, Any]:
-    """Return what fills a dialect's words for a plane: where planes are textures, four to each."""
-    buffer, component = divmod(plane, PLANES_A_BUFFER)
-    return {"array": array, "plane": plane, "buffer": buffer, "component": component}
-
-
-def integers_of(dialect: Dialect | None, role: str) -> Sequence[str]:
-    """Return the integers of a role."""
-    return (dialect.integers if dialect else interface.INTEGERS)[role]
-
-
-def put_together(draft: Draft, target: str, profile: str, lanes: int) -> PlaneArtifact:
+def compiled(draft: Draft, target: str, profile: str) -> PlaneArtifact:
     """Return a kernel with its source and its manifest."""
-    chosen, promised = target_named(target), profiles.profile_named(profile)
-    dialect = chosen.planes[lanes]
-    arguments = dialect.said[draft.role] if dialect else PRINTED
-    listed = {what: "\n".join(textwrap.wrap(", ".join(names), 98)) for what, names in draft.said.items()}
-    arguments = arguments.format(**listed, lanes=lanes)
+    chosen, promised, kernel = target_named(target), profiles.profile_named(profile), draft.kernel
+    dialect, role, arguments, entry = chosen.dialect, kernel.interface.role, PRINTED, chosen.entry
+    if dialect is not None:
+        kernel, entry = housed(kernel, dialect), dialect.entries[role]
+        lists = {key: "\n".join(textwrap.wrap(", ".join(names), 98)) for key, names in draft.lists.items()}
+        arguments = dialect.arguments(kernel, lists, draft.notes)
     header = _header(draft, dialect.language if dialect else chosen.language, arguments)
     if dialect is None:
         text = "".join(f"# {line}".rstrip() + "\n" for line in header) + "".join(map(ir.text, draft.used))
     else:
-        parts = Parts(draft.top, promised.sine is not None)
-        text = framed(dialect, draft.interface, parts, header, [f"    {line}" for line in draft.lines])
-    name = f"{draft.role}{chosen.suffix}"
-    entry = dialect.entries[draft.role] if dialect else chosen.entry
+        text = Renderer(dialect, kernel, promised.sine is not None).source(header)
+    source = f"{role}{chosen.suffix}"
     manifest = {
-        "schema": draft.facts["schema"],
         "digest": ir.sha256(text.encode()),
-        "role": draft.role,
-        "programs": [ir.digest(each) for each in draft.used],
         "target": target,
         "language": chosen.language,
         "entry_point": entry,
         "profile": {"name": promised.name, "text": promised.text},
         **draft.facts,
-        "lanes": lanes,
         "arguments": arguments,
         "bound": None,
-        "files": {name: ir.sha256(text.encode())},
-        SIZES: {name: len(text.encode())},
+        "files": {source: ir.sha256(text.encode())},
+        SIZES: {source: len(text.encode())},
     }
-    names = draft.role, target, profile, entry, text, name
-    return PlaneArtifact(*names, draft.written, lanes, draft.interface, manifest)
+    made = target, profile, entry, text, source, draft.programs, kernel, kernel.interface, manifest
+    return PlaneArtifact(*made, tuple(draft.images))
+
+
+def role_facts(kernel: Kernel, used: Sequence[Program]) -> dict[str, Any]:
+    """Return what manifests of the filter and the history say of the role and the programs."""
+    digests = [ir.digest(each) for each in used]
+    return {"role": kernel.interface.role, "programs": digests, "lanes": kernel.step[0].value}
 
 
 def _header(draft: Draft, language: str, arguments: str) -> list[str]:
     """Return the lines of the comment at the top of the source."""
-    first, *others = arguments.split("\n")
+    images = [f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in draft.images]
     return [
         f"wamnet {draft.title}, {language}. Generated: change the compiler, not this text.",
         *(f"program   {ir.digest(each)[:32]}" for each in draft.used),
-        f"bound     {draft.bound}",
-        f"arguments {first}",
-        *(f"          {line}" for line in others),
+        *_entry("images", images),
+        *_entry("bound", [draft.bound]),
+        *_entry("arguments", arguments.split("\n")),
     ]
+
+
+def _entry(title: str, lines: Sequence[str]) -> list[str]:
+    """Return an entry of the comment, with its title in front of the first line."""
+    return [f"{'' if number else title:10}{line}" for number, line in enumerate(lines)]

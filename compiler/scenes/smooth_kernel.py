@@ -3,8 +3,8 @@
     layers -> guide -> planes of guides and light -> smooth, once a level -> encode -> feature image
 
 1. Trace the filter [lower_smooth.py], and run the passes of the profile.
-2. Emit `guide` as one statement an operation, `smooth` as two loops over taps around those of a tap
-   [`_smooth_body`].
+2. `guide` is one statement an operation [`guide_kernel`], `smooth` two loops over taps around those of a tap
+   [`smooth_kernel`]; a tap beyond the image reads its nearest pixel.
 3. Put both together with manifests, and with the encoding that exists for sums [`compile_smoothing`].
 
 Guides may have any size, so there is no bound over all layers; at given ones the rules of bounds.py, tap by
@@ -26,13 +26,13 @@ from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
 from ..kernel import interface
-from ..kernel.interface import GUIDE, LIGHT, RESULT, SMOOTH
-from ..languages.dialect import Dialect
+from ..kernel.interface import GUIDE, GUIDES, IMAGE, INTEGERS, LIGHT, RESULT, SMOOTH
+from ..kernel.kernel import FLOAT, INT, Array, Expr, Kernel, Let, Store, const, load, name, splat
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from . import plane_kernel
-from .encode_kernel import EncodeArtifact, compile_encode, statements
+from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, loop
+from .encode_kernel import compile_encode
 from .lower_encode import SAMPLES, channel_name
 from .lower_smooth import (
     GUIDED,
@@ -47,19 +47,19 @@ from .lower_smooth import (
     lower_smooth,
 )
 from .lower_smooth import LIGHT as LIGHT_PLANES
-from .plane_kernel import Draft, PlaneArtifact, place_of
+from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, lets, reads, role_facts
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""
-
-SAID = "the filter", "smooth by refimpl/network/smoothing.py"
-"""What is said where a target has no such kernels."""
 
 TITLES = {GUIDE: "a frame's light and guides", SMOOTH: "one level of means"}
 """What both kernels do, by role."""
 
 FEATURE = "color"
 """The feature as which light is encoded after the filter, and the name of its image."""
+
+TABLE = "SPLINE"
+"""Name of the table of the spline along an axis."""
 
 
 @dataclass(frozen=True)
@@ -68,19 +68,44 @@ class SmoothKernels:
 
     guide: PlaneArtifact
     smooth: PlaneArtifact
-    encode: EncodeArtifact
+    encode: PlaneArtifact
 
 
 def compile_smoothing(
     normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    promised = profiles.profile_named(profile)
-    plane_kernel.dialect_of(target, lanes, *SAID)
-    programs = _of_profile(lower_smooth(normalization), promised.passes)
-    pair = [_compiled(programs, role, target, profile, lanes) for role in (GUIDE, SMOOTH)]
-    encode = compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES)
-    return SmoothKernels(pair[0], pair[1], encode)
+    passes = profiles.profile_named(profile).passes
+    check_lanes(target, lanes, "the filter", "smooth by refimpl/network/smoothing.py")
+    programs = _of_profile(lower_smooth(normalization), passes)
+    facts = {
+        "schema": SCHEMA,
+        "passes": [*PASSES, *passes],
+        "layers": [layer.name for layer in LAYERS_READ],
+        "guides": list(programs.guides),
+        "light": list(LIGHT_PLANES),
+    }
+    notes = dict.fromkeys((f"{IMAGE}{layer.name}" for layer in LAYERS_READ), "not encoded, without NaN")
+    several = f", a multiple of {lanes}" if lanes > 1 else ""
+    notes |= {"row_stride": "at least width" + several, "gap": "pixels between taps"}
+    lists = {GUIDES: programs.guides, LIGHT: LIGHT_PLANES, RESULT: LIGHT_PLANES}
+    made = []
+    for kernel, used in (
+        (guide_kernel(programs), [programs.guide]),
+        (smooth_kernel(programs, lanes), [programs.tap, programs.mean]),
+    ):
+        draft = Draft(
+            f"edge-avoiding filter: {TITLES[kernel.interface.role]}",
+            used,
+            programs,
+            kernel,
+            {**facts, **role_facts(kernel, used)},
+            "at given layers: see the rules for each operation",
+            lists,
+            notes,
+        )
+        made.append(compiled(draft, target, profile))
+    return SmoothKernels(*made, compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES))
 
 
 def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothPrograms:
@@ -89,95 +114,59 @@ def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothProgra
     return SmoothPrograms(guide, tap, mean, programs.guides)
 
 
-def _compiled(programs: SmoothPrograms, role: str, target: str, profile: str, lanes: int) -> PlaneArtifact:
-    """Return one of both kernels."""
-    lanes = lanes if role == SMOOTH else 1
-    dialect = plane_kernel.dialect_of(target, lanes, *SAID)
-    names, counts = plane_kernel.integers_of(dialect, role), (len(programs.guides), len(LIGHT_PLANES))
-    made = (
-        interface.smoothing(*counts, names)
-        if role == SMOOTH
-        else interface.guiding(LAYERS_READ, *counts, names)
-    )
-    body = _guide_body if role == GUIDE else _smooth_body
-    draft = Draft(
-        role,
-        f"edge-avoiding filter: {TITLES[role]}",
-        [programs.guide] if role == GUIDE else [programs.tap, programs.mean],
-        programs,
-        made,
-        body(programs, dialect) if dialect else (),
-        _table(dialect) if dialect else "",
-        {"guides": programs.guides, "light": LIGHT_PLANES},
-        "at given layers: see the rules for each operation",
-        {
-            "schema": SCHEMA,
-            "passes": [*PASSES, *profiles.profile_named(profile).passes],
-            "layers": [layer.name for layer in LAYERS_READ],
-            "guides": list(programs.guides),
-            "light": list(LIGHT_PLANES),
-        },
-    )
-    return plane_kernel.put_together(draft, target, profile, lanes)
+# ---- kernels ------------------------------------------------------------------------------------------
 
 
-# ---- text ---------------------------------------------------------------------------------------------
+def guide_kernel(programs: SmoothPrograms) -> Kernel:
+    """Return the kernel of a pixel's light and guides."""
+    body: list[Let | Store] = []
+    for layer in LAYERS_READ:
+        names = [f"{layer.name}_{c}" for c in range(layer.channels)]
+        body += reads(names, lambda c, image=f"{IMAGE}{layer.name}": load(image, Y, X, c))  # type: ignore[misc]
+    lines, outputs = lets(programs.guide)
+    body += lines
+    for array, names in ((LIGHT, LIGHT_PLANES), (GUIDES, programs.guides)):
+        body += [Store(array, (const(i), Y, X), outputs[each]) for i, each in enumerate(names)]
+    counts = len(programs.guides), len(LIGHT_PLANES)
+    return Kernel(interface.guiding(LAYERS_READ, *counts, INTEGERS[GUIDE]), tuple(body))
 
 
-def _table(dialect: Dialect) -> str:
-    """Return the declaration of the spline along an axis."""
-    return dialect.table_declaration("SPLINE", np.array(smoothing.SPLINE, np.float32))
+def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
+    """Return the kernel of one level, for so many pixels of a row."""
+    kind, gap, dy, dx = FLOAT.of(lanes), name("gap"), name("dy"), name("dx")
 
+    def plane(array: str, number: int, row: Expr, column: Expr) -> Expr:
+        """Return a plane at some pixels of a row, each within the image."""
+        inside = Expr("clamp", (column, const(0), WIDTH - 1), INT.of(lanes))
+        return load(array, number, row, inside, kind=kind)
 
-def _guide_body(programs: SmoothPrograms, dialect: Any) -> list[str]:
-    """Return the statements of `guide`: loads of layers, operations, stores of planes."""
-    lines = [
-        dialect.load.format(name=f"{layer.name}_{c}", image=layer.name, channels=layer.channels, channel=c)
-        for layer in LAYERS_READ
-        for c in range(layer.channels)
-    ]
-    texts = statements(programs.guide, dialect, lines)
-    places = {name: (LIGHT, i) for i, name in enumerate(LIGHT_PLANES)}
-    places |= {name: (interface.GUIDES, i) for i, name in enumerate(programs.guides)}
-    for name, index in programs.guide.outputs:
-        array, plane = places[name]
-        # Of one pixel, also where a level computes several.
-        lines.append(dialect.own_store.format(**place_of(array, plane), value=texts[index]))
-    return lines
+    def there(array: str, number: int) -> Expr:
+        """Return a plane at the pixels of a tap."""
+        return plane(array, number, name("line"), name("column"))
 
-
-def _smooth_body(programs: SmoothPrograms, dialect: Any) -> list[str]:
-    """Return the statements of `smooth`: the pixel's guides, loops over taps, means."""
-
-    def read(name: str, array: str, plane: int, row: str, column: str) -> str:
-        text = dialect.plane_load.format(**place_of(array, plane), row=row, column=column)
-        return str(dialect.let("float32", name, text))
-
-    guides = list(enumerate(programs.guides))
-    lines = [dialect.own_row]
-    lines += [read(f"{HERE}{name}", interface.GUIDES, i, "own", "x") for i, name in guides]
-    lines += [dialect.var("float32", name, dialect.number(0.0, "float32")) for name in (*SUMS, WEIGHTS)]
+    half = len(smoothing.SPLINE) // 2
+    spline = [Expr("take", (each,), FLOAT, TABLE) for each in (dy, dx)]
+    sums, after = lets(programs.tap, lanes=lanes)
     tap = [
-        read(f"{THERE}{name}", interface.GUIDES, i, "line", "column") for i, name in guides if name in GUIDED
+        Let("column", X + gap * (dx - half)),
+        *reads(GUIDED, lambda i: there(GUIDES, programs.guides.index(GUIDED[i])), THERE),
+        *reads(LIGHT_PLANES, lambda i: there(LIGHT, i)),
+        Let(SPLINE, splat(spline[0] * spline[1], lanes)),
+        *sums,
+        *(Store(each, (), value) for each, value in after.items()),
     ]
-    tap += [read(name, LIGHT, i, "line", "column") for i, name in enumerate(LIGHT_PLANES)]
-    share = dialect.splat("SPLINE[dy + 2] * SPLINE[dx + 2]", "float32")
-    tap.append(dialect.let("float32", SPLINE, share))
-    texts = statements(programs.tap, dialect, tap)
-    tap += [f"{name} = {texts[index]};" for name, index in programs.tap.outputs]
-    lines += [
-        dialect.loop("dy", 3, -2),
-        f"    {dialect.tap_row()}",
-        f"    {dialect.loop('dx', 3, -2)}",
-        f"        {dialect.index('column', 'x + gap * dx')}",
-        *(f"        {line}" for line in tap),
-        "    }",
-        "}",
-    ]
-    texts = statements(programs.mean, dialect, lines)
-    for plane, (_, index) in enumerate(programs.mean.outputs):
-        lines.append(dialect.plane_store.format(**place_of(RESULT, plane), value=texts[index]))
-    return lines
+    means, mean = lets(programs.mean, lanes=lanes)
+    line = Let("line", clamp(Y + gap * (dy - half), HEIGHT))
+    body = (
+        *reads(programs.guides, lambda i: plane(GUIDES, i, Y, X), HERE),
+        *(Array(each, kind, value=splat(const(0.0), lanes)) for each in (*SUMS, WEIGHTS)),
+        loop("dy", 2 * half + 1, line, loop("dx", 2 * half + 1, *tap)),
+        *means,
+        *(Store(RESULT, (const(i), Y, X), mean[each]) for i, each in enumerate(LIGHT_PLANES)),
+    )
+    made = interface.smoothing(len(programs.guides), len(LIGHT_PLANES), INTEGERS[SMOOTH])
+    tables = ((TABLE, np.array(smoothing.SPLINE, np.float32)),)
+    return Kernel(made, body, step=(const(lanes), const(1)), tables=tables)
 
 
 # ---- errors -------------------------------------------------------------------------------------------
@@ -205,7 +194,7 @@ def error_at(kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDAr
             sums = _enclosed(kernels, programs.tap, {**here, **seen, **lit, **share, **sums})
         light = _enclosed(kernels, programs.mean, sums)
     one = {SAMPLES: _exactly(np.ones((height, width)))}
-    found = _enclosed(kernels, kernels.encode.program, {**light, **one})
+    found = _enclosed(kernels, kernels.encode.programs, {**light, **one})
     return np.stack([found[channel_name(FEATURE, c)].read for c in range(len(LIGHT_PLANES))], axis=-1)
 
 

@@ -48,7 +48,6 @@ from .images import Images, black, checked
 from .kernel import Denoiser, Kernel, Memory, Part, Size, numbers_for, plane_integers, plane_shape, shapes
 
 if TYPE_CHECKING:
-    from ...compiler.scenes.encode_kernel import EncodeArtifact
     from ...compiler.scenes.path_kernel import PathArtifact
     from ...compiler.scenes.plane_kernel import PlaneArtifact
     from ...compiler.training.step_kernel import StepKernel
@@ -357,7 +356,7 @@ class Executor(ABC):
         """Start a built kernel, whose sums go to memory of [`sums_shape`], or its images to theirs."""
         self._start(kernel, self._built[kernel.digest].prepared, arrays, part.integers)
 
-    def encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+    def encode(self, kernel: PlaneArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
         self._check_target(kernel)
         wanted = len(kernel.planes)
@@ -371,7 +370,7 @@ class Executor(ABC):
         self.build(kernel)
         return self._encode(kernel, np.ascontiguousarray(sums), samples)
 
-    def _encode(self, kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+    def _encode(self, kernel: PlaneArtifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Run a built kernel."""
         size = sums.shape[1:]
         with self._session((size[0], size[1])), ExitStack() as made:
@@ -380,9 +379,7 @@ class Executor(ABC):
             self._turn(kernel, given, written, samples)
             return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
 
-    def _turn(
-        self, kernel: EncodeArtifact, sums: Memory, written: Mapping[str, Memory], samples: int
-    ) -> None:
+    def _turn(self, kernel: PlaneArtifact, sums: Memory, written: Mapping[str, Memory], samples: int) -> None:
         """Start a built encoding of sums that may be larger than the images."""
         height, width = next(iter(written.values())).shape[:2]
         _, rows, stride = sums.shape

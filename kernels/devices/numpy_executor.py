@@ -16,15 +16,12 @@ from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
 from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS
 from ...compiler.kernel.interface import SUMS as PATH_SUMS
-from ...compiler.scenes.encode_kernel import EncodeArtifact
-from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
 from .executor import Executor
-from .images import Images
 from .kernel import Kernel, Memory
 from .numpy_planes import INTERPRETED
 
@@ -55,9 +52,6 @@ class NumpyExecutor(Executor):
         held = {name: memory.held for name, memory in arrays.items()}
         if isinstance(kernel, PathArtifact):
             held[PATH_SUMS][:] = _traced(kernel, integers, held.get(SCENE_NUMBERS, NONE))
-        elif isinstance(kernel, EncodeArtifact):
-            for name, image in _encoded(kernel, held[PATH_SUMS], integers["sample_count"]).items():
-                held[f"{IMAGE}{name}"][:] = image
         elif isinstance(kernel, PlaneArtifact):
             INTERPRETED[kernel.role](kernel, held, integers)
         elif isinstance(kernel, Artifact):
@@ -95,16 +89,6 @@ def _traced(
                 if plane in sums:
                     sums[plane] += value
     return np.stack(list(sums.values()))
-
-
-def _encoded(kernel: EncodeArtifact, sums: NDArray[np.float32], samples: int) -> Images:
-    """Interpret the encoding, all pixels at once."""
-    given = dict(zip(kernel.planes, sums, strict=True))
-    found = interpret(kernel.program, {**given, SAMPLES: np.full(sums.shape[1:], samples, np.float32)})
-    return {
-        image.name: np.stack([found[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
-        for image in kernel.images
-    }
 
 
 def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np.float32]) -> None:

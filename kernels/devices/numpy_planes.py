@@ -11,6 +11,7 @@ import numpy as np
 from ...compiler.core.interpret import interpret
 from ...compiler.kernel.interface import (
     CAMERAS,
+    ENCODE,
     FIRST,
     FOLLOW,
     GUIDE,
@@ -22,7 +23,9 @@ from ...compiler.kernel.interface import (
     RESULT,
     SMOOTH,
 )
+from ...compiler.kernel.interface import SUMS as SUMS_ARRAY
 from ...compiler.scenes import lower_history
+from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_history import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
 from ...compiler.scenes.lower_smooth import GUIDED, HERE, LAYERS_READ, SPLINE, SUMS, THERE, WEIGHTS
 from ...compiler.scenes.lower_smooth import LIGHT as LIGHT_PLANES
@@ -40,6 +43,16 @@ def _guided(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[st
     found = interpret(kernel.programs.guide, given)
     for array, names in ((GUIDES, kernel.programs.guides), (LIGHT, LIGHT_PLANES)):
         held[array][:] = [found[name] for name in names]
+
+
+def _encoded(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+    """Fill the images (H, W, C) of sums (P, H, W)."""
+    sums = dict(zip(kernel.planes, held[SUMS_ARRAY], strict=True))
+    samples = np.full(held[SUMS_ARRAY].shape[1:], integers["sample_count"], np.float32)
+    found = interpret(kernel.programs, {**sums, SAMPLES: samples})
+    for image in kernel.images:
+        channels = [found[channel_name(image.name, c)] for c in range(image.channels)]
+        held[f"{IMAGE}{image.name}"][:] = np.stack(channels, axis=-1)
 
 
 def _smoothed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
@@ -89,6 +102,7 @@ def _followed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[
 
 
 INTERPRETED: Mapping[str, Callable[[PlaneArtifact, Mapping[str, Any], Mapping[str, int]], None]] = {
+    ENCODE: _encoded,
     GUIDE: _guided,
     SMOOTH: _smoothed,
     FOLLOW: _followed,

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
-from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.path_kernel import PathArtifact
+from ...compiler.scenes.plane_kernel import PlaneArtifact
 from .executor import Executor
 from .images import images_of
 from .kernel import Denoiser, Memory, Part, Size, numbers_for, shapes
@@ -29,7 +29,7 @@ PICTURE = "picture"
 class Passes:
     """Kernels with their images on a device; a context manager that gives the images back."""
 
-    def __init__(self, executor: Executor, encode: EncodeArtifact, denoise: Denoiser, size: Size) -> None:
+    def __init__(self, executor: Executor, encode: PlaneArtifact, denoise: Denoiser, size: Size) -> None:
         """Keep images of `size` (height, width) on the device for these kernels."""
         for artifact in (encode, denoise):
             executor._check_target(artifact)

@@ -15,7 +15,6 @@ from ...compiler.artifact import MANIFEST_NAME, Artifact, manifest_text
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
 from ...compiler.kernel.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
-from ...compiler.scenes.encode_kernel import EncodeArtifact
 from ...compiler.scenes.history_kernel import compile_history
 from ...compiler.scenes.path_kernel import PathArtifact
 from ...compiler.scenes.plane_kernel import PlaneArtifact
@@ -47,7 +46,7 @@ def kernels(
     row: Row,
     denoiser: Artifact,
     path: PathArtifact | None,
-    encoder: EncodeArtifact | None,
+    encoder: PlaneArtifact | None,
     passes: Mapping[str, str],
 ) -> list[dict[str, Any]]:
     """Return what a manifest says about each kernel, in the order in which they run."""
@@ -76,7 +75,7 @@ def _bound(interface: Interface) -> list[Binding]:
     ]
 
 
-def _kernel(row: Row, role: str, kernel: Artifact | PathArtifact | EncodeArtifact) -> dict[str, Any]:
+def _kernel(row: Row, role: str, kernel: Artifact | PathArtifact | PlaneArtifact) -> dict[str, Any]:
     """Return what a manifest says about one kernel."""
     files = sorted(row.files("denoise" if role == "horizontal" else role, kernel.source))
     return {
@@ -192,7 +191,7 @@ GAPS = ", ".join(str(2**level) for level in range(LEVELS))
 class Input:
     """A kernel, its folder's name, what it does, and the features whose images it is for."""
 
-    kernel: PlaneArtifact | EncodeArtifact
+    kernel: PlaneArtifact
     name: str
     does: str
     features: tuple[str, ...]

@@ -27,11 +27,12 @@ from ...compiler.core import weights as weight_layout
 from ...compiler.core.ir import sha256
 from ...compiler.core.lower import lower
 from ...compiler.plan import plan_program
-from ...compiler.scenes.encode_kernel import EncodeArtifact, compile_encode
+from ...compiler.scenes.encode_kernel import compile_encode
 from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.schedules.names import remedy
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError, choice
@@ -98,7 +99,7 @@ class Export:
     manifest: Mapping[str, Any]
     denoiser: Artifact | None
     path: PathArtifact | None
-    encoder: EncodeArtifact | None
+    encoder: PlaneArtifact | None
     passes: Mapping[str, str]
     pair: check_pair.Pair
 
@@ -228,7 +229,7 @@ def _finished(
     files: Mapping[str, bytes],
     denoiser: Artifact | None,
     path: PathArtifact | None,
-    encoder: EncodeArtifact | None,
+    encoder: PlaneArtifact | None,
     passes: Mapping[str, str],
     pair: check_pair.Pair,
 ) -> Export:
@@ -420,7 +421,7 @@ def _usual(row: Row) -> str:
 
 def _of_scene(
     request: Request, row: Row, programs: PathPrograms | None
-) -> tuple[PathArtifact | None, EncodeArtifact | None, Mapping[str, str]]:
+) -> tuple[PathArtifact | None, PlaneArtifact | None, Mapping[str, str]]:
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}

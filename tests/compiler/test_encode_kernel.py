@@ -59,7 +59,7 @@ def test_the_program_is_the_reference(samples):
 def test_float32_is_within_the_bound_which_is_small(samples):
     """2^-18 is 64 u: 37 of them the power's where it is worst, 5 each division's, scales the rest."""
     artifact, sums = compile_encode(ALL, SCALES, "numpy"), sums_of(samples)
-    exact, found = (interpreted(artifact.program, sums, samples, kind) for kind in (np.float64, np.float32))
+    exact, found = (interpreted(artifact.programs, sums, samples, kind) for kind in (np.float64, np.float32))
     for name, errors in error_at(artifact, sums, samples).items():
         assert np.all(errors <= 2.0**-18)
         for channel in range(FEATURES[name].channels):
@@ -69,7 +69,7 @@ def test_float32_is_within_the_bound_which_is_small(samples):
 
 def test_the_bound_catches_an_exponent_of_2_2():
     artifact, sums = compile_encode(("color",), SCALES, "numpy"), sums_of(1)
-    exact = interpreted(artifact.program, sums, 1, np.float64)["color_0"]
+    exact = interpreted(artifact.programs, sums, 1, np.float64)["color_0"]
     wrong = np.clip(sums["color_r"] * 2**0.5, 0, 1) ** (1 / 2.2)
     assert np.any(np.abs(wrong - exact) > error_at(artifact, sums, 1)["color"][..., 0])
 
@@ -117,7 +117,7 @@ def test_planes_of_a_whole_frame_are_read_where_they_lie():
     assert made.planes == given
     assert [f"sums[{n} * plane" in made.source for n in range(8)] == [False] * 5 + [True] * 3
     texture = compile_encode(("normal",), SCALES, "opengl", planes=given).source
-    assert "normal_x = texelFetch(sums_1, at, 0)[1];" in texture
+    assert "normal_x = texelFetch(sums_1, ivec2(x, y), 0)[1];" in texture
 
 
 def test_layers_follow_the_features():

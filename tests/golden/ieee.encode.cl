@@ -10,12 +10,19 @@
  *           unshadowed: 3 channels in [0.0, 1.0], the lamps' radiance off the first hit, were it matt and nothing in between: sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
  *           highlights: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^(0.5 - 4)) clipped to 0 .. 1: what color clips
  * bound     at given sums: see the rules for each operation
- * arguments sums: float, one plane of plane_stride numbers for each of:
+ * arguments sums: planes of height rows of width floats:
  *           color_r, color_g, color_b, normal_x, normal_y, normal_z, albedo_r, albedo_g, albedo_b, depth,
  *           position_x, position_y, position_z, direction_x, direction_y, direction_z, unshadowed_r,
  *           unshadowed_g, unshadowed_b;
- *           each image: width * height * channels floats, rows from the top, channels interleaved;
- *           width; height; row_stride: numbers from row to row of a plane; plane_stride; sample_count.
+ *           image_color: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_albedo: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_depth: width * height * 1 floats, rows from the top, channels interleaved;
+ *           image_position: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_direction: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_unshadowed: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_highlights: width * height * 3 floats, rows from the top, channels interleaved;
+ *           width; height; row_stride: floats from row to row of a plane; plane_stride: and from plane to plane; sample_count.
  *           Global size: at least (width, height)
  */
 __kernel void wamnet_encode(
@@ -39,8 +46,9 @@ __kernel void wamnet_encode(
     if (x >= width || y >= height) {
         return;
     }
-    size_t at = (size_t)y * (size_t)row_stride + (size_t)x;
+    size_t stride = (size_t)row_stride;
     size_t plane = (size_t)plane_stride;
+    size_t at = (size_t)y * stride + (size_t)x;
     size_t pixel = (size_t)y * (size_t)width + (size_t)x;
     float samples = (float)sample_count;
     float color_r = sums[0 * plane + at];

@@ -10,13 +10,21 @@
  *           unshadowed: 3 channels in [0.0, 1.0], the lamps' radiance off the first hit, were it matt and nothing in between: sRGB of (linear radiance * 2^0.5) clipped to 0 .. 1 (IEC 61966-2-1)
  *           highlights: 3 channels in [0.0, 1.0], sRGB of (linear radiance * 2^(0.5 - 4)) clipped to 0 .. 1: what color clips
  * bound     at given sums: see the rules for each operation
- * arguments sums_0, sums_1, ...: RGBA textures of 32-bit floats; component c of sums_k is number 4 k + c of
+ * arguments sums_0, sums_1, sums_2, sums_3, sums_4: RGBA textures of 32-bit floats, plane 4 k + c in component
+ *           c of number k:
  *           color_r, color_g, color_b, normal_x, normal_y, normal_z, albedo_r, albedo_g, albedo_b, depth,
  *           position_x, position_y, position_z, direction_x, direction_y, direction_z, unshadowed_r,
  *           unshadowed_g, unshadowed_b;
- *           sample_count;
- *           each image: a float colour buffer of the same size (RGBA; channels that a feature lacks mean
- *           nothing). Draw one triangle that covers them: row 0 stays row 0
+ *           image_color: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_normal: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_albedo: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_depth: a float colour buffer, RGBA, of which 1 components are written;
+ *           image_position: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_direction: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_unshadowed: a float colour buffer, RGBA, of which 3 components are written;
+ *           image_highlights: a float colour buffer, RGBA, of which 3 components are written;
+ *           sample_count.
+ *           Draw one triangle that covers what is written: row 0 is the TOP row of all images
  */
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable
@@ -42,27 +50,36 @@ uniform int sample_count;
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy);
+    int x = int(gl_FragCoord.x);
+    int y = int(gl_FragCoord.y);
+    image_color = vec4(0.0);
+    image_normal = vec4(0.0);
+    image_albedo = vec4(0.0);
+    image_depth = vec4(0.0);
+    image_position = vec4(0.0);
+    image_direction = vec4(0.0);
+    image_unshadowed = vec4(0.0);
+    image_highlights = vec4(0.0);
     PRECISE float samples = float(sample_count);
-    PRECISE float color_r = texelFetch(sums_0, at, 0)[0];
-    PRECISE float color_g = texelFetch(sums_0, at, 0)[1];
-    PRECISE float color_b = texelFetch(sums_0, at, 0)[2];
-    PRECISE float normal_x = texelFetch(sums_0, at, 0)[3];
-    PRECISE float normal_y = texelFetch(sums_1, at, 0)[0];
-    PRECISE float normal_z = texelFetch(sums_1, at, 0)[1];
-    PRECISE float albedo_r = texelFetch(sums_1, at, 0)[2];
-    PRECISE float albedo_g = texelFetch(sums_1, at, 0)[3];
-    PRECISE float albedo_b = texelFetch(sums_2, at, 0)[0];
-    PRECISE float depth = texelFetch(sums_2, at, 0)[1];
-    PRECISE float position_x = texelFetch(sums_2, at, 0)[2];
-    PRECISE float position_y = texelFetch(sums_2, at, 0)[3];
-    PRECISE float position_z = texelFetch(sums_3, at, 0)[0];
-    PRECISE float direction_x = texelFetch(sums_3, at, 0)[1];
-    PRECISE float direction_y = texelFetch(sums_3, at, 0)[2];
-    PRECISE float direction_z = texelFetch(sums_3, at, 0)[3];
-    PRECISE float unshadowed_r = texelFetch(sums_4, at, 0)[0];
-    PRECISE float unshadowed_g = texelFetch(sums_4, at, 0)[1];
-    PRECISE float unshadowed_b = texelFetch(sums_4, at, 0)[2];
+    float color_r = texelFetch(sums_0, ivec2(x, y), 0)[0];
+    float color_g = texelFetch(sums_0, ivec2(x, y), 0)[1];
+    float color_b = texelFetch(sums_0, ivec2(x, y), 0)[2];
+    float normal_x = texelFetch(sums_0, ivec2(x, y), 0)[3];
+    float normal_y = texelFetch(sums_1, ivec2(x, y), 0)[0];
+    float normal_z = texelFetch(sums_1, ivec2(x, y), 0)[1];
+    float albedo_r = texelFetch(sums_1, ivec2(x, y), 0)[2];
+    float albedo_g = texelFetch(sums_1, ivec2(x, y), 0)[3];
+    float albedo_b = texelFetch(sums_2, ivec2(x, y), 0)[0];
+    float depth = texelFetch(sums_2, ivec2(x, y), 0)[1];
+    float position_x = texelFetch(sums_2, ivec2(x, y), 0)[2];
+    float position_y = texelFetch(sums_2, ivec2(x, y), 0)[3];
+    float position_z = texelFetch(sums_3, ivec2(x, y), 0)[0];
+    float direction_x = texelFetch(sums_3, ivec2(x, y), 0)[1];
+    float direction_y = texelFetch(sums_3, ivec2(x, y), 0)[2];
+    float direction_z = texelFetch(sums_3, ivec2(x, y), 0)[3];
+    float unshadowed_r = texelFetch(sums_4, ivec2(x, y), 0)[0];
+    float unshadowed_g = texelFetch(sums_4, ivec2(x, y), 0)[1];
+    float unshadowed_b = texelFetch(sums_4, ivec2(x, y), 0)[2];
     PRECISE float t20 = color_r / samples;
     PRECISE float t21 = color_g / samples;
     PRECISE float t22 = color_b / samples;

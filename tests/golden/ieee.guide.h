@@ -2,11 +2,20 @@
  * wamnet edge-avoiding filter: a frame's light and guides, C99. Generated: change the compiler, not this text.
  * program   119d17075b06b6123094da326f61ecc5
  * bound     at given layers: see the rules for each operation
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved, not encoded, without NaN;
- *           guides: float, one plane of height rows of row_stride numbers for each of:
+ * arguments image_color: width * height * 3 floats, rows from the top, channels interleaved, not encoded,
+ *           without NaN;
+ *           image_normal: width * height * 3 floats, rows from the top, channels interleaved, not encoded,
+ *           without NaN;
+ *           image_albedo: width * height * 3 floats, rows from the top, channels interleaved, not encoded,
+ *           without NaN;
+ *           image_position: width * height * 3 floats, rows from the top, channels interleaved, not encoded,
+ *           without NaN;
+ *           image_depth: width * height * 1 floats, rows from the top, channels interleaved, not encoded,
+ *           without NaN;
+ *           guides: planes of height rows of row_stride floats:
  *           normal_x, normal_y, normal_z, albedo_x, albedo_y, albedo_z, position_x, position_y, position_z,
  *           factor_position_x;
- *           light: the same of:
+ *           light: planes of height rows of row_stride floats:
  *           color_r, color_g, color_b;
  *           width; height; row_stride: at least width.
  *           wamnet_guide does all pixels, wamnet_guide_pixel one: call that from your own loops
@@ -24,6 +33,9 @@
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
+/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
@@ -80,10 +92,11 @@ static inline void wamnet_guide_pixel(
     int x,
     int y)
 {
-    const size_t stride = (size_t)row_stride;
-    const size_t plane = (size_t)height * stride;
-    const size_t at = (size_t)y * stride + (size_t)x;
-    const size_t pixel = (size_t)y * (size_t)width + (size_t)x;
+
+    size_t stride = (size_t)row_stride;
+    size_t plane = (size_t)height * stride;
+    size_t at = (size_t)y * stride + (size_t)x;
+    size_t pixel = (size_t)y * (size_t)width + (size_t)x;
     float color_0 = image_color[pixel * 3 + 0];
     float color_1 = image_color[pixel * 3 + 1];
     float color_2 = image_color[pixel * 3 + 2];

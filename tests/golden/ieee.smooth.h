@@ -3,10 +3,12 @@
  * program   8b394641fc87462674d11ff7e46d8f83
  * program   2af2be0d0ca07c315f98de34d92385c6
  * bound     at given layers: see the rules for each operation
- * arguments guides: float, one plane of height rows of row_stride numbers for each of:
+ * arguments guides: planes of height rows of row_stride floats:
  *           normal_x, normal_y, normal_z, albedo_x, albedo_y, albedo_z, position_x, position_y, position_z,
  *           factor_position_x;
- *           light, result: the same of:
+ *           light: planes of height rows of row_stride floats:
+ *           color_r, color_g, color_b;
+ *           result: planes of height rows of row_stride floats:
  *           color_r, color_g, color_b;
  *           width; height; row_stride: at least width; gap: pixels between taps.
  *           wamnet_smooth does all pixels, wamnet_smooth_pixel one: call that from your own loops
@@ -24,6 +26,9 @@
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
+/* No product may be fused with a sum. Compilers differ in what they obey, so give them -ffp-contract=off too:
+   clang takes the standard's pragma unless it is told -ffp-contract=fast, GCC ignores that and takes its own,
+   others may ignore both. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
@@ -31,12 +36,6 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 static const float SPLINE[5] = {0.0625f, 0.25f, 0.375f, 0.25f, 0.0625f};
-/* The nearest of `count` places to one that may be outside. */
-static inline int wamnet_tap(int place, int count)
-{
-    return place < 0 ? 0 : place < count ? place : count - 1;
-}
-
 /* One pixel (x, y). */
 static inline void wamnet_smooth_pixel(
     const float *restrict guides,
@@ -66,6 +65,11 @@ static inline void wamnet_smooth(
     }
 }
 
+static inline int wamnet_smooth_clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
 static inline void wamnet_smooth_pixel(
     const float *restrict guides,
     const float *restrict light,
@@ -77,41 +81,41 @@ static inline void wamnet_smooth_pixel(
     int x,
     int y)
 {
-    const size_t stride = (size_t)row_stride;
-    const size_t plane = (size_t)height * stride;
-    const size_t at = (size_t)y * stride + (size_t)x;
-    size_t own = (size_t)y * stride;
-    float here_normal_x = guides[0 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_normal_y = guides[1 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_normal_z = guides[2 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_albedo_x = guides[3 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_albedo_y = guides[4 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_albedo_z = guides[5 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_position_x = guides[6 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_position_y = guides[7 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_position_z = guides[8 * plane + own + (size_t)wamnet_tap(x, width)];
-    float here_factor_position_x = guides[9 * plane + own + (size_t)wamnet_tap(x, width)];
+
+    size_t stride = (size_t)row_stride;
+    size_t plane = (size_t)height * stride;
+    size_t at = (size_t)y * stride + (size_t)x;
+    float here_normal_x = guides[0 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_normal_y = guides[1 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_normal_z = guides[2 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_albedo_x = guides[3 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_albedo_y = guides[4 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_albedo_z = guides[5 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_position_x = guides[6 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_position_y = guides[7 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_position_z = guides[8 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
+    float here_factor_position_x = guides[9 * plane + (size_t)y * stride + (size_t)wamnet_smooth_clamp(x, 0, width - 1)];
     float total_r = 0.0f;
     float total_g = 0.0f;
     float total_b = 0.0f;
     float weights = 0.0f;
-    for (int dy = -2; dy < 3; ++dy) {
-        size_t line = (size_t)wamnet_tap(y + gap * dy, height) * stride;
-        for (int dx = -2; dx < 3; ++dx) {
-            int column = x + gap * dx;
-            float there_normal_x = guides[0 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_normal_y = guides[1 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_normal_z = guides[2 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_albedo_x = guides[3 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_albedo_y = guides[4 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_albedo_z = guides[5 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_position_x = guides[6 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_position_y = guides[7 * plane + line + (size_t)wamnet_tap(column, width)];
-            float there_position_z = guides[8 * plane + line + (size_t)wamnet_tap(column, width)];
-            float color_r = light[0 * plane + line + (size_t)wamnet_tap(column, width)];
-            float color_g = light[1 * plane + line + (size_t)wamnet_tap(column, width)];
-            float color_b = light[2 * plane + line + (size_t)wamnet_tap(column, width)];
-            float spline = SPLINE[dy + 2] * SPLINE[dx + 2];
+    for (int dy = 0; dy < 5; ++dy) {
+        int line = wamnet_smooth_clamp(y + gap * (dy - 2), 0, height - 1);
+        for (int dx = 0; dx < 5; ++dx) {
+            int column = x + gap * (dx - 2);
+            float there_normal_x = guides[0 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_normal_y = guides[1 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_normal_z = guides[2 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_albedo_x = guides[3 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_albedo_y = guides[4 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_albedo_z = guides[5 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_position_x = guides[6 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_position_y = guides[7 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float there_position_z = guides[8 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float color_r = light[0 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float color_g = light[1 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float color_b = light[2 * plane + (size_t)line * stride + (size_t)wamnet_smooth_clamp(column, 0, width - 1)];
+            float spline = SPLINE[dy] * SPLINE[dx];
             float t29 = there_normal_x - here_normal_x;
             float t30 = there_normal_y - here_normal_y;
             float t31 = there_normal_z - here_normal_z;

@@ -410,7 +410,8 @@ def test_race(kernel, message):
 def test_a_barrier_that_some_items_miss():
     """`verify` refuses such a kernel, so that the run itself is called."""
     kernel = small(If(LOCAL < 3, (Barrier(),)), WRITTEN, group=(4, 2))
-    runner = Runner(kernel, {"a": np.zeros((2, 4, 1), np.float32)}, np.zeros(4, np.float32), Domain())
+    arrays, size = {"image_a": np.zeros((2, 4, 1), np.float32)}, {"width": 4, "height": 2}
+    runner = Runner(kernel, arrays, size, np.zeros(4, np.float32), Domain())
     with pytest.raises(KernelError, match="a barrier is reached by 6 of 8 items of a group"):
         runner.body(kernel.body)
 

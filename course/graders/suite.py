@@ -201,7 +201,7 @@ def new_case(student: Any) -> None:
         name: replace(output, value=to_json(output.value), bound=to_json(output.bound))
         for name, output in function.bounded(inputs)[0].items()
     }
-    case = Case(f"{DISPLAY}/new", function.clause, to_json(inputs), outputs)
+    case = Case(function.clause, to_json(inputs), outputs, id=f"{DISPLAY}/new")
     single = encoding.to_display(np.asarray(inputs["linear"], np.float32))
     found = judge(DISPLAY, case, {"output": {"encoded": to_json(float(single))}})
     what = f"the case linear = {inputs['linear']:g}"

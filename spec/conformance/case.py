@@ -49,19 +49,27 @@ class Output:
     clause: str = ""
 
 
+def exact(
+    outputs: Mapping[str, Any], source: str = "exact", clause: Callable[[str], str] = lambda name: ""
+) -> dict[str, Output]:
+    """Return outputs that are expected to the bit; `clause` is what a deviation of each is blamed on."""
+    return {name: Output(value, 0.0, source, clause=clause(name)) for name, value in outputs.items()}
+
+
 @dataclass(frozen=True)
 class Case:
     """One question to a program, and the answer. `expected` None: the program must refuse the input.
 
-    `refusal`: what is blamed where it refuses a valid one, if that is not the case's clause."""
+    `refusal`: what is blamed where it refuses a valid one, if that is not the case's clause.
+    `id`: the kind's name and a number (kinds/__init__.py)."""
 
-    id: str
     clause: str
     inputs: Mapping[str, Any]
     expected: Mapping[str, Output] | None
-    flags: tuple[str, ...] = ()
     note: str = ""
     refusal: str = ""
+    flags: tuple[str, ...] = ()
+    id: str = ""
 
     @property
     def clauses(self) -> tuple[str, ...]:
@@ -166,10 +174,9 @@ def _case(data: Mapping[str, Any], folder: Path) -> Case:
     expected = None
     if data["valid"]:
         expected = {name: _output(o) for name, o in data["expected"].items()}
-    flags, note = tuple(data["flags"]), data.get("note", "")
     inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
-    refusal = str(data.get("refusal", ""))
-    return Case(str(data["id"]), str(data["clause"]), inputs, expected, flags, note, refusal)
+    note, refusal = (str(data.get(name, "")) for name in ("note", "refusal"))
+    return Case(str(data["clause"]), inputs, expected, note, refusal, tuple(data["flags"]), str(data["id"]))
 
 
 def _output(data: Mapping[str, Any]) -> Output:

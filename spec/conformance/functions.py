@@ -54,7 +54,7 @@ class Function:
 
     `given`: inputs of cases with a note, and a clause where it is another one; `draws` more are drawn by
     `draw` from uniform numbers in [0, 1). `decided`: ties, with note and clause, of numbers that are the same
-    to the bit wherever like operations round alike, so that no rounding decides.
+    to the bit wherever like operations round alike, so that no rounding decides. `later` come last.
     """
 
     name: str
@@ -63,10 +63,11 @@ class Function:
     inputs: Mapping[str, Field]
     outputs: Mapping[str, Field]
     call: Callable[[Numbers, Any], Numbers]
-    given: Sequence[tuple[str, Numbers] | tuple[str, Numbers, str]] = ()
+    given: Sequence[tuple[Any, ...]] = ()
     draw: Callable[[NDArray[np.float64]], Numbers] | None = None
     draws: int = 8
-    decided: Sequence[tuple[str, Numbers, str]] = ()
+    decided: Sequence[tuple[Any, ...]] = ()
+    later: Sequence[tuple[Any, ...]] = ()
 
     def kind(self) -> Kind:
         """Return the kind of case."""
@@ -78,25 +79,17 @@ class Function:
 
     def cases(self) -> list[Case]:
         """Return the cases with their answers and bounds."""
-        rows = [(row[0], row[1], row[2] if len(row) == 3 else self.clause) for row in self.given]
+        rows = [*self.given]
         if self.draw is not None:
-            rows += [("", self.draw(drawn(self.name, index)), self.clause) for index in range(self.draws)]
-        found = []
-        for index, (note, values, clause) in enumerate(rows):
-            inputs = self._rounded(values)
-            expected, undecided = self.bounded(inputs)
-            flags = ("undecided",) if undecided else ()
-            found.append(Case(f"{self.name}/{index}", clause, inputs, expected, flags, note))
-        for note, values, clause in self.decided:
-            inputs = self._rounded(values)
-            found.append(
-                Case(f"{self.name}/{len(found)}", clause, inputs, self._as_decided(inputs), (), note)
-            )
-        return found
+            rows += [("", self.draw(drawn(self.name, index))) for index in range(self.draws)]
+        return [self._case(*row) for row in (*rows, *((*row, True) for row in self.decided), *self.later)]
 
-    def _rounded(self, values: Numbers) -> dict[str, Any]:
-        """Return the inputs of a case, numbers that float32 holds."""
-        return {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
+    def _case(self, note: str, values: Numbers, clause: str = "", decided: bool = False) -> Case:
+        """Return a case; `decided`: ranges touch, and no rounding decides."""
+        inputs = {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
+        expected, undecided = (self._as_decided(inputs), False) if decided else self.bounded(inputs)
+        flags = ("undecided",) if undecided else ()
+        return Case(clause or self.clause, inputs, expected, note, flags=flags)
 
     def answer(self, inputs: Numbers) -> Numbers:
         """Return the reference's answer, in float64."""

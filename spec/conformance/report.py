@@ -46,74 +46,26 @@ def counts(verdicts: Sequence[Verdict]) -> list[Kinds]:
     by_kind: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
         by_kind.setdefault(verdict.kind, []).append(verdict)
-    return [
-        Kinds(
-            kind,
-            len(some),
-            {name: count for name in VERDICTS if (count := Counter(v.verdict for v in some)[name])},
-            max((v.ratio for v in some if v.verdict == PASS), default=0.0),
-        )
-        for kind, some in by_kind.items()
-    ]
+    found = []
+    for kind, some in by_kind.items():
+        count = Counter(v.verdict for v in some)
+        ratio = max((v.ratio for v in some if v.verdict == PASS), default=0.0)
+        found.append(Kinds(kind, len(some), {n: count[n] for n in VERDICTS if count[n]}, ratio))
+    return found
 
 
 ELEMENTARY = (
-    "random.pcg4d",
-    "random.float",
-    "random.block",
-    "random.scrambled",
-    "random.point",
-    "random.",
-    "vector",
-    "sampling.tangent_frame",
-    "sampling.to_world",
-    "sampling.",
-    "camera.axes",
-    "camera.",
-    "intersection.slabs",
-    "intersection.sphere",
-    "intersection.quad",
-    "intersection.box",
-    "intersection.turned_box",
-    "intersection.room",
-    "intersection.nearest",
-    "intersection.",
-    "material.mirror",
-    "material.lambertian",
-    "material.ggx",
-    "material.schlick",
-    "material.visible_normal",
-    "material.refracted",
-    "material.fresnel",
-    "material.",
-    "transport.lamp",
-    "transport.light_pdf",
-    "transport.",
-    "sky.share",
-    "sky.",
-    "encoding.srgb",
-    "encoding.exposed",
-    "encoding.",
-    "image.smoothed",
-    "image.",
-    "file.camera",
-    "file.scene",
-    "file.",
-    "path.start",
-    "path.arrive",
-    "path.scatter",
-    "path.whole",
-    "sine",
-    "network.",
-    "adam.",
-    "whole.sine",
-    "whole.forward",
-    "whole.",
-    "metric.",
-    "picture.denoised",
-    "picture.exact",
-    "picture.",
-)
+    "random.pcg4d", "random.float", "random.block", "random.scrambled", "random.point", "random.", "vector",
+    "sampling.tangent_frame", "sampling.to_world", "sampling.", "camera.axes", "camera.",
+    "intersection.slabs", "intersection.sphere", "intersection.quad", "intersection.box",
+    "intersection.turned_box", "intersection.room", "intersection.nearest", "intersection.",
+    "material.mirror", "material.lambertian", "material.ggx", "material.schlick", "material.visible_normal",
+    "material.refracted", "material.fresnel", "material.", "transport.lamp", "transport.light_pdf",
+    "transport.", "sky.share", "sky.", "encoding.srgb", "encoding.exposed", "encoding.", "image.smoothed",
+    "image.", "file.camera", "file.scene", "file.", "path.start", "path.arrive", "path.scatter",
+    "path.whole", "sine", "network.", "adam.", "whole.sine", "whole.forward", "whole.", "metric.",
+    "picture.denoised", "picture.exact", "picture.",
+)  # fmt: skip
 """How kinds begin, those that others are made of first: what fails there makes the others fail."""
 
 

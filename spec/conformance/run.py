@@ -26,14 +26,9 @@ from .protocol import NoAnswerError, Session
 
 Numbers = NDArray[Any]
 
-PASS, FAIL, UNSUPPORTED, TIMEOUT, CRASH, GARBAGE = VERDICTS = (
-    "pass",
-    "fail",
-    "unsupported",
-    "timeout",
-    "crash",
-    "garbage",
-)
+VERDICTS = PASS, FAIL, UNSUPPORTED, TIMEOUT, CRASH, GARBAGE = (
+    "pass", "fail", "unsupported", "timeout", "crash", "garbage",
+)  # fmt: skip
 """Verdicts: three of answers, and those of [`NoAnswerError`]."""
 
 MOST_TIMEOUTS = 3

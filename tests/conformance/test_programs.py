@@ -209,7 +209,7 @@ def test_a_program_that_takes_what_is_invalid(program, verdicts, kind, clause):
 
 
 def judged(output, **expected):
-    case = Case("k/0", "RNG-3", {"x": 1}, {"y": Output(**expected)})
+    case = Case("RNG-3", {"x": 1}, {"y": Output(**expected)}, id="k/0")
     return run.judge("k", case, {"output": {"y": output}})
 
 
@@ -244,7 +244,7 @@ def test_of_a_path_the_earliest_vertex_that_deviates_is_told():
     """The worst number is a later one, of an output that is looked at before."""
     expected = {"t": Output([1.0, 2.0, 3.0], 0.5), "point": Output([[0.0] * 3] * 3, 0.5)}
     answer = {"output": {"t": [1.0, 2.0, 300.0], "point": [[0, 0, 0], [0, 2, 1], [9, 9, 9]]}}
-    case = Case("path.whole/0", "LTR-8", {}, expected)
+    case = Case("LTR-8", {}, expected, id="path.whole/0")
     verdict = judge("path.whole", case, answer)
     assert (verdict.stage, verdict.expected, verdict.got) == ("point[1][1]", "0x0p+0", "0x1p+1")
     elsewhere = judge("metric.mse", case, answer)
@@ -253,7 +253,7 @@ def test_of_a_path_the_earliest_vertex_that_deviates_is_told():
 
 def test_a_deviation_is_blamed_on_the_clause_of_its_output():
     expected = {"a": Output(1.0, 0.5), "b": Output(1.0, 0.5, clause="RNG-4")}
-    case = Case("path.start/0", "CAM-3", {}, expected)
+    case = Case("CAM-3", {}, expected, id="path.start/0")
     assert judge("path.start", case, {"output": {"a": 1, "b": 1}}).clause == "CAM-3"
     assert judge("path.start", case, {"output": {"a": 1, "b": 2}}).clause == "RNG-4"
     assert judge("path.start", case, {"output": {"a": 1}}).clause == "RNG-4"

@@ -296,6 +296,6 @@ def test_vectors_are_written_whole_and_through_no_link(tmp_path, monkeypatch):
 
 def test_a_page_keeps_bars_out_of_tables():
     kind = Kind(
-        "k", "t", {"x": "|x|"}, {"y": "float"}, lambda: [Case("k/0", "RNG-3", {}, {"y": Output(0)})], dict
+        "k", "t", {"x": "|x|"}, {"y": "float"}, lambda: [Case("RNG-3", {}, {"y": Output(0)}, id="k/0")], dict
     )
     assert "| input | `x` | \\|x\\| |" in vectors._about(kind)

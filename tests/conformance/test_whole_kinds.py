@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from wamnet.refimpl.network import whole
-from wamnet.spec.conformance.kinds.whole import CHOSEN, KINDS
+from wamnet.spec.conformance.kinds import KINDS
+from wamnet.spec.conformance.kinds.whole import CHOSEN
 
-KIND = next(kind for kind in KINDS if kind.name == "whole.rounded_on")
+KIND = KINDS["whole.rounded_on"]
 """The kind whose integers are chosen by least squares."""
+
+CASES = [case for case in KIND.make() if case.expected is not None]
+"""Its valid cases."""
 
 LEAST = 2.0**-12
 """Least distance from a tie."""
@@ -21,7 +25,7 @@ def test_the_distance_is_what_the_source_says() -> None:
     assert "2^-12 from a tie" in CHOSEN
 
 
-@pytest.mark.parametrize("case", KIND.make(), ids=lambda case: case.id)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
 def test_nothing_is_near_a_tie(case, monkeypatch) -> None:
     """WHO-7's own roundings may be at ties: each of its operations is rounded in a stated order."""
     distances, round_ = [], np.rint
@@ -41,7 +45,7 @@ def test_nothing_is_near_a_tie(case, monkeypatch) -> None:
     assert min(distances) >= LEAST
 
 
-@pytest.mark.parametrize("case", KIND.make(), ids=lambda case: case.id)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
 def test_inputs_do_not_vary_alike(case) -> None:
     """The order of two inputs of the same variance is free, and would change what is chosen.
 

@@ -35,19 +35,6 @@ THIS = "tests/meta/test_words.py"
 KEPT = {
     "compiler/kernel/instructions.py": ("unless it is told -ffp",),  # a comment of kernels
     "refimpl/network/dataset.py": ("were it matt and nothing in between",),  # manifests and heads of kernels
-    "spec/conformance/kinds/files.py": (  # notes of vectors
-        "a header that is no JSON",
-        "a header that is no object",
-        "features that are no list",
-    ),
-    "spec/conformance/kinds/scene_files.py": (  # notes of vectors
-        "whole numbers are numbers",
-        "a version that is a truth value",
-        "a truth value as number",
-        "a matrix that is no rotation",
-        "glass that is no body",
-    ),
-    "spec/conformance/kinds/materials.py": ("A matt surface sends a path on",),  # a title of vectors
 }
 """Phrases in files with a version or a golden text: they change when these files change anyway."""
 

@@ -25,36 +25,23 @@ from ....compiler.training.step import SQUARES, sum_errors
 from ....refimpl.errors import InputError
 from ....refimpl.network import adam, siren, train
 from ....refimpl.network.siren import Siren
-from ..case import Case, Kind, Output
+from ..case import Case, Output, exact
 from ..functions import drawn
+from .tables import kind, table
 
 Array = NDArray[Any]
 
 POSTERIORI = "bounds of profile ieee at these inputs (compiler/proof/bounds.py)"
 """Where the bounds of networks come from."""
 
-SIZES = (
-    ([4, 5, 3], 3.0, 1.0),
-    ([6, 8, 8, 3], 1.0, 10.0),
-    ([3, 4, 4, 4, 3], 30.0, 30.0),
-    ([2, 3], 1.0, 1.0),
-    ([2, 3, 4, 3, 4, 3, 2], 3.0, 1.5),
-)
-"""Networks of the cases: widths, omega_0 of the first layer and of the others; the last is only affine."""
+ROWS = table("networks")
+"""Networks of the cases, which are data: widths, omega_0 of the first layer and of the others; networks with
+more than 1,024 weights or 255 neurons in a layer and large seeds, which are only drawn; what is refused;
+layers and inputs that do not fit a network of 4, 5 and 3 numbers (SIR-1); and for Adam gradients of the first
+step, which halve from step to step, and every second one turns in the second row."""
 
-DRAWN_ONLY = (([40, 28, 2], 3.0, 2.0, 2**32 - 5), ([3, 300, 1], 1.0, 30.0, 2**31 + 77))
-"""Networks with more than 1,024 weights or 255 neurons in a layer, and large seeds: only drawn."""
-
-WRONG_NETWORKS: tuple[tuple[str, Any], ...] = (
-    ("widths", np.array([4])),
-    ("widths", np.array([4, 0, 3])),
-    ("widths", np.array([4, 5, -3])),
-    ("omega_0_first", 0.0),
-    ("omega_0_hidden", -1.0),
-    ("omega_0_first", 1.0000001e12),
-    ("omega_0_hidden", 1.0000001e12),
-)
-"""What is refused."""
+SIZES = ROWS["sizes"]
+"""Networks of the cases."""
 
 EXAMPLES = 4
 """Examples of a minibatch."""
@@ -66,7 +53,7 @@ def _network(index: int) -> Siren:
     return siren.init(widths, first, hidden, seed=index, dtype=np.float32)
 
 
-def _as_inputs(network: Siren) -> dict[str, Any]:
+def as_inputs(network: Siren) -> dict[str, Any]:
     """Return a network as inputs of a case."""
     found: dict[str, Any] = {"omega_0_first": network.omega_0_first, "omega_0_hidden": network.omega_0_hidden}
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
@@ -74,7 +61,7 @@ def _as_inputs(network: Siren) -> dict[str, Any]:
     return found
 
 
-def _from_inputs(inputs: Mapping[str, Any]) -> Siren:
+def network_of(inputs: Mapping[str, Any]) -> Siren:
     """Return the network of a case in float64."""
     count = sum(name.startswith("weight_") for name in inputs)
     weights, biases = (
@@ -114,24 +101,20 @@ def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
         int(inputs["seed"]),
         np.float32,
     )
-    return {name: value for name, value in _as_inputs(drawn_ones).items() if not name.startswith("omega")}
+    return {name: value for name, value in as_inputs(drawn_ones).items() if not name.startswith("omega")}
 
 
 def _init_cases() -> list[Case]:
     """Return some networks."""
     cases = []
     rows = [(*row, index) for index, row in enumerate(SIZES)]
-    for index, (widths, first, hidden, seed) in enumerate([*rows, *DRAWN_ONLY]):
+    for widths, first, hidden, seed in [*rows, *ROWS["drawn"]]:
         inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": seed}
-        expected = {
-            name: Output(value, 0.0, "exact, rounded once to float32")
-            for name, value in _init(inputs).items()
-        }
-        cases.append(Case(f"network.init/{index}", "SIR-5", inputs, expected))
-    for name, value in WRONG_NETWORKS:
+        cases.append(Case("SIR-5", inputs, exact(_init(inputs), "exact, rounded once to float32")))
+    for name, value in ROWS["wrong"]:
         inputs = {"widths": np.array([4, 5, 3]), "omega_0_first": 3.0, "omega_0_hidden": 1.0, "seed": 0}
-        wrong = {**inputs, name: value}
-        cases.append(Case(f"network.init/{len(cases)}", "SIR-5", wrong, None, (), f"{name} = {value}"))
+        wrong = {**inputs, name: np.array(value) if isinstance(value, list) else value}
+        cases.append(Case("SIR-5", wrong, None, f"{name} = {wrong[name]}"))
     return cases
 
 
@@ -155,7 +138,7 @@ def activations(network: Siren, x: Any) -> dict[str, Any]:
 
 def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the activations of one input vector."""
-    network, x = _from_inputs(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis]
+    network, x = network_of(inputs), np.asarray(inputs["x"], np.float64)[np.newaxis]
     if x.shape[1:] != network.widths[:1]:
         rule = f"the first layer takes {network.widths[0]} numbers"
         raise InputError("x", x.shape[1:], rule, "give as many")
@@ -173,14 +156,18 @@ def _forward_cases() -> list[Case]:
         x = {"": _numbers(number, (n_in,)), "zeros": np.zeros(n_in)}.get(
             note, _numbers(number, (n_in,), 40.0)
         )
-        inputs = {**_as_inputs(network), "x": x}
+        inputs = {**as_inputs(network), "x": x}
         program = analysed(trace(partial(activations, network), {"x": Type(shape=(n_in,))}))
         found = bounds.at_inputs(program, {"x": x[np.newaxis]}, EMITTED_SINE)
         expected = {
             name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
             for name, value in _forward(inputs).items()
         }
-        cases.append(Case(f"network.forward/{number}", "SIR-2", inputs, expected, (), note))
+        cases.append(Case("SIR-2", inputs, expected, note))
+    good = as_inputs(siren.init([4, 5, 3], 3.0, 1.0, seed=0, dtype=np.float32))
+    for note, name, shape in ROWS["unfit"]:
+        wrong = {**good, "x": np.zeros(4), name: np.zeros(shape)}
+        cases.append(Case("SIR-1", wrong, None, note))
     return cases
 
 
@@ -190,7 +177,7 @@ def _forward_cases() -> list[Case]:
 def _gradient(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the loss and its derivatives."""
     windows, targets = (np.asarray(inputs[name], np.float64) for name in ("x", "target"))
-    loss, found = train.loss_and_gradients(_from_inputs(inputs), windows, targets)
+    loss, found = train.loss_and_gradients(network_of(inputs), windows, targets)
     derivatives: dict[str, Any] = {"loss": loss}
     for layer, (weight, bias) in enumerate(zip(found.dweights, found.dbiases, strict=True)):
         derivatives |= {f"dweight_{layer}": weight, f"dbias_{layer}": bias}
@@ -203,7 +190,7 @@ def _gradient_cases() -> list[Case]:
     for index, (widths, _, _) in enumerate(SIZES):
         network = _network(index)
         x, target = _numbers(20 + index, (EXAMPLES, widths[0])), _numbers(30 + index, (EXAMPLES, widths[-1]))
-        inputs = {**_as_inputs(network), "x": x, "target": target}
+        inputs = {**as_inputs(network), "x": x, "target": target}
         step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
         errors = sum_errors(step, x, target)
         expected = {}
@@ -217,7 +204,7 @@ def _gradient_cases() -> list[Case]:
             array = inputs[name.removeprefix("d")]
             owner = next(n for n, p in step.program.parameters.items() if np.array_equal(p, array))
             expected[name] = Output(value, errors[owner].reshape(value.shape), POSTERIORI)
-        cases.append(Case(f"network.gradient/{index}", "SIR-7", inputs, expected))
+        cases.append(Case("SIR-7", inputs, expected))
     return cases
 
 
@@ -259,27 +246,19 @@ def _rounded(value: float) -> Range:
     return Range(np.float64(ends[0]), np.float64(ends[1]), near)
 
 
-ADAM_ROWS = (
-    ("gradients of all sizes", np.array([1e-6, 1e-3, 1.0, 1e3]), 4),
-    ("a gradient that turns", np.array([1.0, -1.0, 0.5, -0.25]), 4),
-    ("a parameter without a gradient", np.array([0.0, 0.0, 1.0, 0.0]), 3),
-)
-"""Gradients of the first step; they halve from step to step, and every second one turns in the second row."""
-
-
 def _adam_cases() -> list[Case]:
     """Return runs of a few steps."""
     cases = []
-    for index, (note, first, count) in enumerate(ADAM_ROWS):
+    for index, (note, first, count) in enumerate(ROWS["adam"]):
         factors = [(-0.5 if index == 1 else 0.5) ** k for k in range(count)]
-        gradients = np.array([np.float32(f) * first.astype(np.float32) for f in factors], np.float64)
+        gradients = np.array([np.float32(f) * np.array(first, np.float32) for f in factors], np.float64)
         inputs = {"theta": _numbers(40 + index, (4,)), "gradients": gradients, "learning_rate": 2.0**-10}
         found, ends = _adam(inputs), _adam_ranges(inputs)
         expected = {
             name: Output(value, np.maximum(ends[name][1] - value, value - ends[name][0]), ranges_text())
             for name, value in found.items()
         }
-        cases.append(Case(f"adam.run/{index}", "ADM-1", inputs, expected, (), note))
+        cases.append(Case("ADM-1", inputs, expected, note))
     return cases
 
 
@@ -288,46 +267,10 @@ def ranges_text() -> str:
     return "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
 
 
-NETWORK = {
-    "weight_l": "float[D_out][D_in], for each layer l from 0",
-    "bias_l": "float[D_out]",
-    "omega_0_first": "float",
-    "omega_0_hidden": "float",
-}
-"""What a network is, for the page."""
-
 KINDS = (
-    Kind(
-        "network.init",
-        "Initial parameters",
-        {"widths": "integer[L + 1]", "omega_0_first": "float", "omega_0_hidden": "float", "seed": "integer"},
-        {name: f"{NETWORK[name]}, float32" for name in ("weight_l", "bias_l")},
-        _init_cases,
-        _init,
-    ),
-    Kind(
-        "network.forward",
-        "The network, layer by layer",
-        {**NETWORK, "x": "float[D_in]"},
-        {"layer_l": "float[D_out], what layer l gives: after its sine, except for the last"},
-        _forward_cases,
-        _forward,
-    ),
-    Kind(
-        "network.gradient",
-        "The mean squared error of a minibatch, and its derivatives",
-        {**NETWORK, "x": "float[N][D_in]", "target": "float[N][D_out]"},
-        {"loss": "float", "dweight_l": "float[D_out][D_in]", "dbias_l": "float[D_out]"},
-        _gradient_cases,
-        _gradient,
-    ),
-    Kind(
-        "adam.run",
-        "Adam over several steps, from moments of zero",
-        {"theta": "float[n]", "gradients": "float[K][n], one row a step", "learning_rate": "float"},
-        {"theta": "float[K][n], after each step", "m": "float[K][n]", "v": "float[K][n]"},
-        _adam_cases,
-        _adam,
-    ),
+    kind("network.init", _init_cases, _init),
+    kind("network.forward", _forward_cases, _forward),
+    kind("network.gradient", _gradient_cases, _gradient),
+    kind("adam.run", _adam_cases, _adam),
 )
 """The kinds of this module."""

@@ -10,9 +10,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,29 +29,25 @@ from ....refimpl.light.intersection import Hit, materials_by_id, reflecting
 from ....refimpl.light.materials import Dielectric
 from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
-from ..case import Case, Kind, Output
+from ..case import Case, Output
 from ..functions import SOURCE
 from ..numbers import Decimal
-from .terrace import MIRRORS
+from .tables import kind
 from .views import (
-    NO_INTEGERS,
+    PLACED,
     SEED,
-    SENT,
-    WRONG_SETTINGS,
+    VARIANTS,
     View,
     aimed,
     files,
-    foundry,
-    foundry_settings,
-    glass,
     midway,
     others,
-    overcast,
-    picks,
+    placed,
     rounded,
+    scene,
     scene_text,
-    tall,
-    terrace,
+    sent,
+    towards,
     views,
 )
 
@@ -62,12 +59,6 @@ MOST_VERTICES = 5
 
 CHAIN = "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
 """Where the bounds of whole paths come from."""
-
-SCENE_FIELD = "scene file (SCN-6)"
-"""What a scene is, for the page."""
-
-SETTINGS_FIELD = "object: max_depth, roulette_depth (or null), strategy, heuristic, sampler (LTR-6 to LTR-9)"
-"""What settings are, for the page."""
 
 State = dict[str, Any]
 
@@ -92,11 +83,8 @@ def world_of(text: str, settings: Mapping[str, Any]) -> World:
 @cache
 def _world(text: str, settings_text: str) -> World:
     """Return a world, made once."""
-    scene, settings = scene_module.from_json(text), settings_of(json.loads(settings_text))
-    return World(
-        transport.build(scene, settings, np.float64),
-        camera.camera_basis(scene.camera, np.float64),
-    )
+    read, settings = scene_module.from_json(text), settings_of(json.loads(settings_text))
+    return World(transport.build(read, settings, np.float64), camera.camera_basis(read.camera, np.float64))
 
 
 def programs_of(name: str, settings: Settings) -> PathPrograms:
@@ -107,7 +95,7 @@ def programs_of(name: str, settings: Settings) -> PathPrograms:
 @cache
 def _programs(name: str, settings: Settings) -> PathPrograms:
     """Return the programs of a path through a canonical scene, made once."""
-    return lower_scene(scene_module.from_json(scene_text(name)), settings, STATEMENTS)
+    return lower_scene(scene(name), settings, STATEMENTS)
 
 
 # ---- steps in float64 -----------------------------------------------------------------------------------
@@ -171,24 +159,17 @@ ARRIVED = ("t", "surface", "point", "normal", "reflectance")
 def _flat(inputs: Mapping[str, Any], values: Values) -> dict[str, Any]:
     """Return the components of a state by name, each (1,)."""
     found = {}
-    for name, (ends, kind) in values.items():
+    for name, (ends, dtype) in values.items():
         parts = np.asarray(inputs[name]).reshape(len(ends))
         for end, part in zip(ends, parts, strict=True):
-            found[name + end] = np.array([part]).astype(kind)
+            found[name + end] = np.array([part]).astype(dtype)
     return found
 
 
 def _counted(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the counters by the names of programs."""
-    names = {
-        "seed": "seed",
-        "pixel": "pixel",
-        "sample_number": "sample",
-        "x": "x",
-        "y": "y",
-        "depth": "depth",
-    }
-    found = {name: rng.counter(int(inputs[own])) for name, own in names.items() if own in inputs}
+    own = {"sample_number": "sample", **{name: name for name in ("seed", "pixel", "x", "y", "depth")}}
+    found = {name: rng.counter(int(inputs[key])) for name, key in own.items() if key in inputs}
     sizes = {name: np.array([inputs[name]], np.float32) for name in ("width", "height") if name in inputs}
     return {**found, **sizes}
 
@@ -225,16 +206,15 @@ WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
 """Clauses of outputs of a scattering with Russian roulette."""
 
 
-def _clauses(kind: str, inputs: Mapping[str, Any], wanted: State) -> Mapping[str, str]:
+def _clauses(name: str, view: View, inputs: Mapping[str, Any], wanted: State) -> dict[str, str]:
     """Return the clauses of a case's outputs where they are not the case's own."""
-    name = str(inputs["scene"]["file"]).removeprefix("scenes/").removesuffix(".json")
-    found = {**CLAUSES[kind], **({"radiance": "SHD-4"} if name == MIRRORS.name else {})}
-    if kind != "path.scatter":
+    found = {**CLAUSES[name], **({"radiance": "SHD-4"} if view.scene == "mirrors" else {})}
+    if name != "path.scatter":
         return found
-    scene = scene_module.from_json(scene_text(name))
-    if scene.lights and scene.environment is not None and name != MIRRORS.name:
+    seen = scene(view.scene)
+    if seen.lights and seen.environment is not None and view.scene != "mirrors":
         found |= {"radiance": "ENV-4"}
-    materials = materials_by_id(scene)
+    materials = materials_by_id(seen)
     number = int(inputs["surface"])
     if number < len(materials) and isinstance(materials[number][0], Dielectric):
         found |= OF_GLASS
@@ -243,131 +223,161 @@ def _clauses(kind: str, inputs: Mapping[str, Any], wanted: State) -> Mapping[str
     return {**found, **(WITH_ROULETTE if inputs["settings"]["roulette_depth"] is not None else {})}
 
 
+EQUAL = "range of single precision with decisions as the reference takes them: twins are equal to the bit"
+"""Where the bounds of rays to two equal shapes come from."""
+
+NEAR = 2.0**-14
+"""Largest bound of a ray to twins: a wrong decision would move a number by a quarter at least."""
+
+
 def _expected(
-    wanted: State, found: Mapping[str, Range], clauses: Mapping[str, str]
+    wanted: State, found: Mapping[str, Range], clauses: Mapping[str, str], guided: bool
 ) -> dict[str, Output] | None:
-    """Return outputs with bounds, or nothing where a decision is not sure."""
+    """Return outputs with bounds, or nothing where a decision is not sure; `guided`: twins decide nothing."""
     outputs = {}
     for name, value in wanted.items():
+        clause = clauses.get(name, "")
         if name == "pixel":
-            outputs[name] = Output(value, clause=clauses[name])
+            outputs[name] = Output(value, clause=clause)
             continue
-        ends, kind = {**PATH, **SURFACE, "alive": (("",), "bool")}[name]
+        ends, form = {**PATH, **SURFACE, "alive": (("",), "bool")}[name]
         low, high, sure = _ends(found, name, ends)
-        if not sure:
+        if not sure and not guided:
             return None
-        if kind in ("bool", "int32"):
-            outputs[name] = Output(bool(value) if kind == "bool" else int(value), clause=clauses[name])
+        if form in ("bool", "int32"):
+            outputs[name] = Output(bool(value) if form == "bool" else int(value), clause=clause)
             continue
         low, high = (end.reshape(np.shape(value)) for end in (low, high))
         bound = np.maximum(high - value, value - low)
-        outputs[name] = Output(value, bound, SOURCE, clause=clauses.get(name, ""))
+        assert not guided or np.max(bound) <= NEAR, name
+        outputs[name] = Output(value, bound, EQUAL if guided else SOURCE, clause=clause)
     return outputs
 
 
 # ---- cases ----------------------------------------------------------------------------------------------
 
-
-def _with_scene(inputs: Mapping[str, Any], view: View) -> dict[str, Any]:
-    """Return inputs as the reference takes them: the scene's text for its file."""
-    return {**inputs, "scene": scene_text(view.scene)}
+Cases = dict[str, list[Case]]
+"""Cases of steps, by kind."""
 
 
-class Found(NamedTuple):
-    """The cases of the three kinds of steps."""
+def step(
+    cases: Cases,
+    name: str,
+    view: View,
+    inputs: Mapping[str, Any],
+    of_light: str | None = None,
+    note: str = "",
+    clause: str = "",
+    guided: bool = False,
+) -> State:
+    """Append a case of a step, unless a decision of it is not sure, and return what the reference answers.
 
-    start: list[Case]
-    arrive: list[Case]
-    scatter: list[Case]
+    Its light, and its end, may have a clause of its own; that of an arrival is found if none is stated.
+    """
+    answer, own_clause = STEPS[name]
+    wanted = answer({**inputs, "scene": scene_text(view.scene)})
+    program = getattr(programs_of(view.scene, view.settings), name.removeprefix("path."))
+    states = [_flat(inputs, values) for values in (PATH, SURFACE) if values.keys() <= inputs.keys()]
+    found = ranges.evaluate(program, dict(ChainMap(*states, _counted(inputs))), guided=guided)
+    if of_light is None:
+        of_light = _of_emission(view, inputs["direction"], wanted) if name == "path.arrive" else ""
+    own = ("radiance",) if wanted.get("alive", True) else ("alive", "radiance")
+    clauses = _clauses(name, view, inputs, wanted) | (dict.fromkeys(own, of_light) if of_light else {})
+    expected = _expected(wanted, found, clauses, guided)
+    if expected is not None:
+        note = note or f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
+        cases.setdefault(name, []).append(Case(clause or own_clause, dict(inputs), expected, note, "LTR-8"))
+    return wanted
+
+
+STEPS = {"path.start": (start, "CAM-3"), "path.arrive": (arrive, "LTR-2"), "path.scatter": (scatter, "LTR-7")}
+"""Function and clause of each step."""
 
 
 @cache
-def _steps() -> Found:
+def _steps() -> Cases:
     """Return the cases of all steps: paths in float64 whose states are rounded to float32 at each step."""
-    found = Found([], [], [])
-    for view in (*views(16), *terrace(), *foundry(), *others(), *glass(), *tall(), *picks()):
-        _walk(found, view)
-    _sent_midway(found)
-    _refuse(found, WRONG_SETTINGS)
-    for view in overcast():
-        _walk(found, view)
-    _refuse(found, NO_INTEGERS)
-    return found
+    cases: Cases = {}
+    for view in (*views(16), *placed("terrace", "foundry"), *others(), *placed("glass", "tall", "picks")):
+        walk(cases, view)
+    for view, inputs, note in (*sent(), *aimed()):
+        step(cases, "path.arrive", view, inputs, note=note)
+    _refuse(cases, "wrong_settings")
+    for view in placed("overcast"):
+        walk(cases, view)
+    _refuse(cases, "no_integers")
+    _decide(cases)
+    return cases
 
 
-def _refuse(found: Found, settings: Sequence[tuple[str, str, Any]]) -> None:
+def _decide(cases: Cases) -> None:
+    """Add steps that decide what others leave open: each kills changes of a program that survived.
+
+    The largest counts that there are; two equal shapes at once, of which the one of the lower number counts
+    (SCN-2); a block that shines, which no light sample finds; light samples a thousand units out, where a
+    lamp's point is lifted by its magnitude; a lamp and its floor; a choice of a light at its threshold.
+    """
+    most = transport.LARGEST_DEPTH - 1
+    view = View("foundry", Settings(max_depth=most, roulette_depth=most), 3, 8)
+    step(cases, "path.start", view, view.inputs(), note=f"both depths {most}", clause="LTR-8")
+    view = View("twins", VARIANTS[0])
+    for shapes, origin, direction in PLACED["twins"]:
+        note = f"two equal {shapes}: the first counts"
+        inputs = midway(view, origin, direction)
+        step(cases, "path.arrive", view, inputs, "", note, clause="ISC-1", guided=True)
+    start, end = (1.375, 1.5, 1.5), (1.4375, 0.375, -0.25)
+    for settings in VARIANTS[:2]:
+        view, note = View("terrace", settings), f"a block that shines under a sky, {settings.strategy}"
+        step(cases, "path.arrive", view, midway(view, start, towards(start, end)), "LTR-10", note)
+    for note, clause, name, direction, point, normal, reflectance, t, surface, sample in PLACED["scattered"]:
+        view = View(name, VARIANTS[0])
+        numbers = {"point": point, "normal": normal, "reflectance": reflectance, "t": float(t)}
+        inputs = {
+            **midway(view, np.subtract(point, np.multiply(t, direction)), direction),
+            "seed": SEED,
+            "pixel": 0,
+            "sample": sample,
+            "depth": 0,
+            **{name: rounded(np.array(value, np.float64)) for name, value in numbers.items()},
+            "surface": surface,
+        }
+        step(cases, "path.scatter", view, inputs, clause, note)
+    for view in placed("tie"):
+        tied: Cases = {}
+        walk(tied, view)
+        cases["path.scatter"] += tied["path.scatter"]
+
+
+def _refuse(cases: Cases, group: str) -> None:
     """Add settings that are refused: clause, name and value."""
-    given = foundry_settings()
-    for clause, name, value in settings:
-        inputs = {**given, "settings": {**given["settings"], name: value}}
-        note = f"{name} = {json.dumps(value)}" if isinstance(value, Decimal) else f"{name} = {value}"
-        found.start.append(Case(f"path.start/{len(found.start)}", clause, inputs, None, (), note))
+    given = next(placed("foundry")).inputs()
+    for clause, name, value in PLACED[group]:
+        number = Decimal(value) if group == "no_integers" and isinstance(value, float) else value
+        inputs = {**given, "settings": {**given["settings"], name: number}}
+        cases["path.start"].append(Case(clause, inputs, None, f"{name} = {value}"))
 
 
-def _walk(found: Found, view: View) -> None:
+def walk(cases: Cases, view: View) -> None:
     """Add the steps of a path, each from the state that the step before has left."""
     given = view.inputs()
-    programs = programs_of(view.scene, view.settings)
-    wanted = start(_with_scene(given, view))
-    _add(
-        found.start,
-        "path.start",
-        "CAM-3",
-        given,
-        wanted,
-        ranges.evaluate(programs.start, _counted(given)),
-    )
+    wanted = step(cases, "path.start", view, given)
     kept = {name: given[name] for name in ("scene", "settings")}
     counters = {"seed": view.seed, "pixel": wanted.pop("pixel"), "sample": view.sample}
-    one = np.ones(3)
-    state: dict[str, Any] = {**wanted, "beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
+    state: dict[str, Any] = {**wanted, **AT_CAMERA}
     for depth in range(view.depth, view.depth + view.steps):
         state = {name: rounded(state[name]) for name in PATH}
-        wanted = arrive(_with_scene({**kept, **state}, view))
-        sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
-        inputs = {**kept, **state}
-        of_light = _of_emission(view, state["direction"], wanted)
-        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent, of_light)
+        wanted = step(cases, "path.arrive", view, {**kept, **state})
         surface = {name: rounded(wanted[name]) for name in SURFACE}
-        inputs = {
-            **kept,
-            **counters,
-            "depth": depth,
-            **state,
-            "radiance": rounded(wanted["radiance"]),
-            **surface,
-        }
-        wanted = scatter(_with_scene(inputs, view))
-        flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
-        sent = ranges.evaluate(programs.scatter, flat)
-        _add(
-            found.scatter,
-            "path.scatter",
-            "LTR-7",
-            inputs,
-            wanted,
-            sent,
-            view.clause * (depth == view.depth),
-        )
+        state |= {"radiance": rounded(wanted["radiance"])}
+        inputs = {**kept, **counters, "depth": depth, **state, **surface}
+        wanted = step(cases, "path.scatter", view, inputs, view.clause * (depth == view.depth))
         if not wanted["alive"]:
             break
         state = wanted
 
 
-def _sent_midway(found: Found) -> None:
-    """Add arrivals of rays that are sent from inside of a scene."""
-    for scene, settings, direction in SENT:
-        inputs = midway(scene, settings, direction)
-        view = View(scene, settings, 0, 0, 0)
-        wanted = arrive(_with_scene(inputs, view))
-        reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
-        of_light = _of_emission(view, inputs["direction"], wanted)
-        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light)
-    for view, inputs, note in aimed():
-        wanted = arrive(_with_scene(inputs, view))
-        reach = ranges.evaluate(programs_of(view.scene, view.settings).arrive, _flat(inputs, PATH))
-        of_light = _of_emission(view, inputs["direction"], wanted)
-        _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light, note)
+AT_CAMERA = {"beta": np.ones(3), "radiance": np.zeros(3), "pdf": transport.CAMERA_PDF}
+"""What a path has gathered at the camera."""
 
 
 def _of_emission(view: View, direction: Any, wanted: State) -> str:
@@ -378,33 +388,14 @@ def _of_emission(view: View, direction: Any, wanted: State) -> str:
     world = world_of(scene_text(view.scene), asdict(view.settings)).world
     lamp = int(world.geometry.light[int(wanted["surface"])])
     if lamp < 0 and int(wanted["surface"]) < world.geometry.nothing:
-        scene = scene_module.from_json(scene_text(view.scene))
-        quad = int(wanted["surface"]) - (world.geometry.nothing - len(scene.lights) - len(scene.quads))
-        return "QUA-1" if quad >= 0 and any(scene.quads[quad].emission) else ""
+        seen = scene(view.scene)
+        quad = int(wanted["surface"]) - (world.geometry.nothing - len(seen.lights) - len(seen.quads))
+        return "QUA-1" if quad >= 0 and any(seen.quads[quad].emission) else ""
     if lamp >= 0 and world.lights is not None and float(world.lights.normal[lamp] @ direction) > 0.0:
         return "ISC-14"
     if world.samples_lights:
         return "ENV-4" if world.lights is not None and world.environment is not None else ""
     return "SHD-4" if world.materials.single else "LTR-10"
-
-
-def _add(
-    cases: list[Case],
-    kind: str,
-    clause: str,
-    inputs: Mapping[str, Any],
-    wanted: State,
-    found: Mapping[str, Range],
-    of_light: str = "",
-    note: str = "",
-) -> None:
-    """Append a case, unless a decision of it is not sure. Its light may have a clause of its own."""
-    own = ("radiance",) if wanted.get("alive", True) else ("alive", "radiance")
-    clauses = {**_clauses(kind, inputs, wanted), **(dict.fromkeys(own, of_light) if of_light else {})}
-    expected = _expected(wanted, found, clauses)
-    if expected is not None:
-        note = note or f"{inputs['settings']['strategy']}, {inputs['settings']['sampler']}"
-        cases.append(Case(f"{kind}/{len(cases)}", clause, dict(inputs), expected, (), note, "LTR-8"))
 
 
 # ---- whole paths ----------------------------------------------------------------------------------------
@@ -415,11 +406,9 @@ VERTEX = ("t", "surface", "point", "normal", "reflectance", "beta", "radiance")
 
 def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return every vertex of a path: each output with the vertices on its first axis."""
-    state: dict[str, Any] = dict(start(inputs))
     counters = {name: inputs[name] for name in ("scene", "settings", "seed", "sample")}
+    state: dict[str, Any] = {**start(inputs), **AT_CAMERA}
     counters["pixel"] = state.pop("pixel")
-    one = np.ones(3)
-    state |= {"beta": one, "radiance": 0.0 * one, "pdf": transport.CAMERA_PDF}
     vertices = []
     for depth in range(inputs["settings"]["max_depth"] + 1):
         found = arrive({**counters, **state})
@@ -434,48 +423,60 @@ def whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.array([vertex[name] for vertex in vertices]) for name in VERTEX}
 
 
+class _Ranges:
+    """The ranges of a path, from step to step."""
+
+    def __init__(self, view: View) -> None:
+        self.programs = programs_of(view.scene, view.settings)
+        self.counters = _counted({**view.inputs(), "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
+        self.state = dict(ranges.evaluate(self.programs.start, self.counters))
+
+    def arrive(self) -> None:
+        """Go on to the next surface."""
+        self.state |= ranges.evaluate(self.programs.arrive, self.state)
+
+    def sure(self, names: Iterable[str]) -> bool:
+        """Tell whether all values of these names are sure and finite."""
+        return all(np.all(self.state[name].sure & self.state[name].known) for name in names)
+
+    def scatter(self, depth: int) -> Range:
+        """Leave the surface, and return whether the path continues."""
+        given = {**self.state, **self.counters, "depth": rng.counter(depth)}
+        sent = dict(ranges.evaluate(self.programs.scatter, given))
+        alive = sent.pop("alive")
+        self.state |= sent
+        return alive
+
+
 def followed(view: View) -> Iterator[tuple[dict[str, Range], bool]]:
     """Yield the ranges of each vertex of a path while all decisions are sure, and whether it surely ends."""
-    given, programs = view.inputs(), programs_of(view.scene, view.settings)
-    counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
-    state = dict(ranges.evaluate(programs.start, counters))
+    at = _Ranges(view)
     for depth in range(MOST_VERTICES):
-        state |= ranges.evaluate(programs.arrive, state)
-        if not all(
-            np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}
-        ):
+        at.arrive()
+        if not at.sure([*kinds(PATH), *kinds(SURFACE)]):
             return
-        sent = dict(
-            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
-        )
-        alive = sent.pop("alive")
-        yield dict(state), bool(np.all(alive.sure) and not np.any(alive.high))
-        state = {**state, **sent}
+        there = dict(at.state)
+        alive = at.scatter(depth)
+        yield there, bool(np.all(alive.sure) and not np.any(alive.high))
         if not (np.all(alive.sure) and np.all(alive.low)):
             return
 
 
 def gathered(view: View) -> tuple[Any, Any] | None:
     """Return the ends (3,) of what a whole path gathers, or None where some decision is not sure."""
-    given, programs = view.inputs(), programs_of(view.scene, view.settings)
-    counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
-    state = dict(ranges.evaluate(programs.start, counters))
+    at = _Ranges(view)
     for depth in range(view.settings.max_depth + 1):
-        state |= ranges.evaluate(programs.arrive, state)
+        at.arrive()
         if depth == view.settings.max_depth:
             break
-        if not all(np.all(state[name].sure & state[name].known) for name in kinds(SURFACE)):
+        if not at.sure(kinds(SURFACE)):
             return None
-        sent = dict(
-            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
-        )
-        alive = sent.pop("alive")
-        state = {**state, **sent}
+        alive = at.scatter(depth)
         if not np.all(alive.sure):
             return None
         if not np.any(alive.high):
             break
-    low, high, sure = _ends(state, "radiance", PATH["radiance"][0])
+    low, high, sure = _ends(at.state, "radiance", PATH["radiance"][0])
     return (low, high) if sure else None
 
 
@@ -483,7 +484,7 @@ def gathered(view: View) -> tuple[Any, Any] | None:
 def _whole_cases() -> list[Case]:
     """Return whole paths."""
     cases: list[Case] = []
-    for view in (*views(32), *terrace(), *others()):
+    for view in (*views(32), *placed("terrace"), *others()):
         reach, ends = list[dict[str, Range]](), False
         for state, ends in followed(view):
             low, high, _ = _ends(state, "point", PATH["origin"][0])
@@ -497,7 +498,7 @@ def _whole_cases() -> list[Case]:
         # Paths of the scenes that came first are cut where they are known to end; others end by themselves.
         by_itself = ends and view.seed != SEED and len(reach) > 1
         inputs["settings"]["max_depth"] = len(reach) - 1 + 2 * by_itself
-        wanted = whole(_with_scene(inputs, view))
+        wanted = whole({**inputs, "scene": scene_text(view.scene)})
         expected = {}
         for name in VERTEX:
             parts = {**PATH, **SURFACE}[name][0]
@@ -506,87 +507,17 @@ def _whole_cases() -> list[Case]:
             bound = np.maximum(high - wanted[name], wanted[name] - low)
             expected[name] = Output(wanted[name], bound if name != "surface" else 0.0, CHAIN)
         note = f"{view.scene}, {len(reach)} vertices"
-        cases.append(Case(f"path.whole/{len(cases)}", "LTR-8", inputs, expected, (), note))
+        cases.append(Case("LTR-8", inputs, expected, note))
     return cases
 
 
-COUNTED = {"seed": "integer below 2^32", "sample": "integer below 2^32"}
-"""Counters, for the page."""
+def _cases(name: str) -> list[Case]:
+    """Return the cases of a step."""
+    return _steps()[name]
 
-PLACED = {"width": "pixels", "height": "pixels", "x": "column", "y": "row"}
-"""A pixel, for the page."""
-
-OF_PATH = {
-    "origin": "float[3]",
-    "direction": "float[3], unit",
-    "beta": "float[3], throughput",
-    "radiance": "float[3], gathered so far",
-    "pdf": "float, density of the direction, 1/sr; of single directions and at the camera float32(1e30), a "
-    "little above 1e30: it says all that the depth does (LTR-2)",
-}
-"""A state, for the page."""
-
-OF_SURFACE = {
-    "point": "float[3]",
-    "normal": "float[3]",
-    "reflectance": "float[3]",
-    "t": "float, distance; 1e30 for none, which a request has as float32(1e30)",
-    "surface": "integer, number of the surface (ISC-1)",
-}
-"""A surface, for the page."""
-
-GIVEN = {"scene": SCENE_FIELD, "settings": SETTINGS_FIELD}
-"""What all paths are given, for the page."""
 
 KINDS = (
-    Kind(
-        "path.start",
-        "A path at the camera",
-        {**GIVEN, **PLACED, **COUNTED},
-        {"pixel": "integer, its counter (RNG-4)", "origin": "float[3]", "direction": "float[3], unit"},
-        lambda: _steps().start,
-        start,
-        files,
-    ),
-    Kind(
-        "path.arrive",
-        "The next surface of a path, and the light that it emits",
-        {**GIVEN, **OF_PATH},
-        {**OF_SURFACE, "radiance": "float[3], after the surface's emission"},
-        lambda: _steps().arrive,
-        arrive,
-        files,
-    ),
-    Kind(
-        "path.scatter",
-        "A path leaves a surface: light sample, new direction, roulette",
-        {
-            **GIVEN,
-            **COUNTED,
-            "pixel": "integer below 2^32",
-            "depth": "scatterings before; who calls compares it with max_depth (LTR-8)",
-            **OF_PATH,
-            **OF_SURFACE,
-        },
-        {"alive": "whether it continues; if not, only radiance is required", **OF_PATH},
-        lambda: _steps().scatter,
-        scatter,
-        files,
-    ),
-    Kind(
-        "path.whole",
-        "A whole path with every vertex",
-        {**GIVEN, **PLACED, **COUNTED},
-        {
-            "t": "float[V]",
-            "surface": "integer[V]",
-            **dict.fromkeys(("point", "normal", "reflectance"), "float[V][3]"),
-            "beta": "float[V][3], on arrival",
-            "radiance": "float[V][3], after the vertex's emission, the last one's too",
-        },
-        _whole_cases,
-        whole,
-        files,
-    ),
+    *(kind(name, partial(_cases, name), answer, files) for name, (answer, _) in STEPS.items()),
+    kind("path.whole", _whole_cases, whole, files),
 )
 """The kinds of this module."""

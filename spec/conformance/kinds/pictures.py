@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -32,10 +32,11 @@ from ....refimpl.network.activation import SINE
 from ....refimpl.network.dataset import Normalization, Window
 from ....refimpl.network.denoise import Model
 from .. import blocks
-from ..case import Case, Kind, Output
+from ..case import Case, Output
 from . import paths, views
 from .files import file_of, model_from
-from .images import LAYER_FIELDS, ULP, bad_layers, frame_of
+from .images import ULP, bad_layers, frame_of
+from .tables import kind
 
 SIGNIFICANCE = 1e-5
 """Chance that a right program fails a case of a render, over all its blocks and channels."""
@@ -112,20 +113,20 @@ def _denoised() -> Iterator[tuple[Model, dict[str, Any], str]]:
 def _denoise_cases() -> list[Case]:
     """Return denoised pictures with bounds."""
     cases = []
-    for index, (model, layers, note) in enumerate(_denoised()):
+    for model, layers, note in _denoised():
         inputs = {**layers, "model": base64.b64encode(file_of(model)).decode()}
         picture = _denoise(inputs)["picture"]
         bound = _bound(model, frame_of(layers), picture)
         text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
         expected = {"picture": Output(picture, bound, text)}
         clause = "DEN-2" if model.siren.activation == SINE else "ACT-1"
-        cases.append(Case(f"picture.denoised/{index}", clause, inputs, expected, (), note, "FRM-5"))
+        cases.append(Case(clause, inputs, expected, note, "FRM-5"))
     needy = _model(("color", "normal"), Window(2, "clamp"), [4], 0, MIDDLE)
     inputs = {
         "color": bad_layers(2, 2, 5)["color"],
         "model": base64.b64encode(file_of(needy)).decode(),
     }
-    cases.append(Case(f"picture.denoised/{len(cases)}", "DAT-9", inputs, None, (), "layers are missing"))
+    cases.append(Case("DAT-9", inputs, None, "layers are missing"))
     wide = np.zeros((2, 3, 3))
     for note, changes in (
         ("layers of two sizes", {"normal": wide}),
@@ -133,7 +134,7 @@ def _denoise_cases() -> list[Case]:
         ("a layer of two axes", {"color": wide, "normal": np.zeros((2, 3))}),
     ):
         other = {**inputs, **changes}
-        cases.append(Case(f"picture.denoised/{len(cases)}", "FRM-1", other, None, (), note))
+        cases.append(Case("FRM-1", other, None, note))
     return cases
 
 
@@ -151,10 +152,10 @@ def _bound(model: Model, frame: Frame, picture: Any) -> Any:
 # ---- rendering --------------------------------------------------------------------------------------------
 
 
-def _render(inputs: Mapping[str, Any]) -> dict[str, Any]:
+def _render(inputs: Mapping[str, Any], dtype: str = "float32") -> dict[str, Any]:
     """Return mean and variance of each pixel."""
     width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
-    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]))
+    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]), dtype)
     found = render(scene_module.from_json(inputs["scene"]), job)
     return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
@@ -164,20 +165,8 @@ def _render_cases() -> list[Case]:
     """Return small renders."""
     cases = []
     for index, (name, block_px) in enumerate(RENDERED):
-        settings = {
-            "max_depth": 3,
-            "roulette_depth": None,
-            "strategy": "mis",
-            "heuristic": "power",
-            "sampler": "pcg4d",
-        }
-        own = {
-            "width": SIZE_PX,
-            "height": SIZE_PX,
-            "spp": REFERENCE_SPP,
-            "seed": 1000 + index,
-            "settings": settings,
-        }
+        size = {"width": SIZE_PX, "height": SIZE_PX, "spp": REFERENCE_SPP, "seed": 1000 + index}
+        own = {**size, "settings": asdict(Settings(max_depth=3))}
         found = _render({**own, "scene": views.scene_text(name)})
         mean, variance = blocks.mean_and_variance(
             found["mean"].astype(np.float64), found["variance"], block_px
@@ -191,9 +180,9 @@ def _render_cases() -> list[Case]:
             "significance": SIGNIFICANCE,
         }
         text = f"Welch's test of block means, significance {SIGNIFICANCE:g} in all"
-        inputs = {**own, "scene": {"file": f"scenes/{name}.json"}, "spp": ASKED_SPP, "seed": index}
+        inputs = {**own, "scene": {"file": views.scene_file(name)}, "spp": ASKED_SPP, "seed": index}
         expected = {"mean": Output(mean, 0.0, text, (), welch)}
-        cases.append(Case(f"picture.rendered/{index}", "LTR-6", inputs, expected, ("statistical",), name))
+        cases.append(Case("LTR-6", inputs, expected, name, flags=("statistical",)))
     return cases
 
 
@@ -218,30 +207,13 @@ class Exact(NamedTuple):
     seed: int
 
 
-EXACT = (
-    Exact("foundry", Settings(max_depth=2), 5, 3, 3, (1 << 31) + 1),
-    Exact("terrace", Settings(max_depth=2, heuristic="balance"), 3, 1, 2, (1 << 31) + 2),
-    Exact("yard", Settings(max_depth=1, roulette_depth=0, sampler="sobol"), 1, 3, 2, (1 << 31) + 13),
-    Exact("foundry", Settings(max_depth=0), 3, 4, 2, (1 << 31) + 1),
-    Exact("foundry", Settings(max_depth=1), 2, 2, 1, (1 << 31) + 1),
-    Exact("foundry", Settings(max_depth=0), 1, 1, 65, (1 << 31) + 1),
-    Exact("terrace", Settings(max_depth=3, roulette_depth=0), 2, 2, 2, (1 << 31) + 24),
-    Exact("yard", Settings(max_depth=3, roulette_depth=0), 2, 2, 2, (1 << 31) + 46),
-)
-"""The pictures; the seeds are the first ones of which no sample has a decision that rounding could change."""
+def _exact_rows(group: str) -> Iterator[tuple[Exact, str]]:
+    """Yield pictures, with notes.
 
-
-WRONG_SIZES = (
-    ("width", 0),
-    ("width", 65537),
-    ("height", 0),
-    ("height", -1),
-    ("seed", -1),
-    ("seed", 1 << 32),
-    ("spp", 0),
-    ("spp", (1 << 32) + 1),
-)
-"""What is refused."""
+    Seeds are the first ones of which no sample has a decision that rounding could change, or the ends of what
+    they may be; the numbers of 258 samples need more than 8 bits."""
+    for scene, settings, *numbers, note in views.PLACED[group]:
+        yield Exact(scene, Settings(**settings), *numbers), note
 
 
 def samples_of(exact: Exact) -> Iterator[tuple[Any, Any] | None]:
@@ -277,75 +249,27 @@ def exact_case(exact: Exact, note: str = "") -> Case:
         "variance": Output(variance, of_variance, OF_SAMPLES, clause="RND-4"),
         "spp": Output(exact.spp),
     }
-    return Case("", "RND-1", inputs, expected, (), note or exact.scene, "RND-6")
+    return Case("RND-1", inputs, expected, note or exact.scene, "RND-6")
 
 
 @cache
 def _exact_cases() -> list[Case]:
     """Return tiny pictures, and what is refused."""
-    cases = [replace(exact_case(exact), id=f"picture.exact/{index}") for index, exact in enumerate(EXACT)]
-    for name, value in WRONG_SIZES:
+    cases = [exact_case(exact, note) for exact, note in _exact_rows("exact")]
+    for name, value in views.PLACED["wrong_sizes"]:
         wrong = {**cases[0].inputs, name: value}
-        cases.append(Case(f"picture.exact/{len(cases)}", "RND-6", wrong, None, (), f"{name} = {value}"))
-    return cases
+        cases.append(Case("RND-6", wrong, None, f"{name} = {value}"))
+    return [*cases, *(exact_case(exact, note) for exact, note in _exact_rows("exact_later"))]
 
 
 def _exact(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return mean and variance of each pixel in float64."""
-    width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
-    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]), "float64")
-    found = render(scene_module.from_json(inputs["scene"]), job)
-    return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
+    return _render(inputs, "float64")
 
-
-RENDER_FIELDS = {
-    "scene": paths.SCENE_FIELD,
-    "settings": paths.SETTINGS_FIELD,
-    "width": "pixels",
-    "height": "pixels",
-    "spp": "samples per pixel",
-    "seed": "integer",
-}
-"""What a render is given, for the page."""
-
-RENDERED_FIELDS = {
-    "mean": "float[H][W][3], linear radiance",
-    "variance": "float[H][W][3], of one sample",
-    "spp": "integer",
-}
-"""What comes of it, for the page."""
 
 KINDS = (
-    Kind(
-        "picture.denoised",
-        "Denoising of a small frame with NaN, infinities and fireflies",
-        {**LAYER_FIELDS, "model": "text, a model file in base64"},
-        {"picture": "float[H][W][3], display-encoded"},
-        _denoise_cases,
-        _denoise,
-        notes="The layers that the model needs, and no others, are given; they may hold nan and inf.",
-    ),
-    Kind(
-        "picture.exact",
-        "A tiny render, to the bound",
-        RENDER_FIELDS,
-        RENDERED_FIELDS,
-        _exact_cases,
-        _exact,
-        views.files,
-        "The answer has the requested samples, numbered from 0, with the random numbers of the settings.",
-    ),
-    Kind(
-        "picture.rendered",
-        "A small render",
-        RENDER_FIELDS,
-        RENDERED_FIELDS,
-        _render_cases,
-        _render,
-        views.files,
-        "The answer may have more samples, any random numbers and be in files; `expected` holds the means of "
-        "blocks of pixels, and `welch` what else the test needs: the variance of one sample of a block is "
-        "the reference's, so other ways to sample must not be worse.",
-    ),
+    kind("picture.denoised", _denoise_cases, _denoise),
+    kind("picture.exact", _exact_cases, _exact, views.files),
+    kind("picture.rendered", _render_cases, _render, views.files),
 )
 """The kinds of this module."""

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ....refimpl.frame import FIRST_HIT, LAYERS, Frame, validate
 from ....refimpl.network import smoothing
 from ....refimpl.network.smoothing import DEPTH, FARTHEST, GUIDES
-from ..case import Case, Kind, Output
+from ..case import Case, Output
 from ..functions import drawn
+from .tables import kind
 
 Array = NDArray[Any]
 Layers = dict[str, Array]
@@ -193,12 +194,10 @@ def _smoothed_cases() -> list[Case]:
         inputs = {"color": color, **layers, "levels": levels}
         value = _smoothed(inputs)["color"]
         expected = {"color": Output(value, bound_of(color, layers, levels), SOURCE)}
-        cases.append(Case(f"image.smoothed/{len(cases)}", "SMO-3", inputs, expected, (), note, "FRM-5"))
+        cases.append(Case("SMO-3", inputs, expected, note, "FRM-5"))
     for name in GUIDE_LAYERS:
         inputs = {"color": colors(0, 3, 2), **alike(3, 2), "levels": 1, name: alike(2, 3)[name]}
-        cases.append(
-            Case(f"image.smoothed/{len(cases)}", "FRM-5", inputs, None, (), f"{name} of another size")
-        )
+        cases.append(Case("FRM-5", inputs, None, f"{name} of another size"))
     return cases
 
 
@@ -254,18 +253,5 @@ def missing_rows() -> Iterator[tuple[str, str, Layers]]:
     yield "only guides past mirrors and glass", "smoothed", {"color": layers["color"], **past(alike(2, 2))}
 
 
-KINDS = (
-    Kind(
-        "image.smoothed",
-        "Colour smoothed where pixels are alike",
-        {
-            **{name: f"float[H][W][{LAYERS[name].channels}]" for name in ("color", *GUIDE_LAYERS)},
-            "levels": "integer, how many levels",
-        },
-        {"color": "float[H][W][3], in float64"},
-        _smoothed_cases,
-        _smoothed,
-        notes="Colour is as after SMO-2, and no layer holds nan; guides may hold inf, and depths may be 0.",
-    ),
-)
+KINDS = (kind("image.smoothed", _smoothed_cases, _smoothed),)
 """The kinds of this module."""

@@ -24,7 +24,7 @@ from lab.tables import markdown
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.measure_primitives import NO_CACHES
+from wamnet.kernels.bench.paths import NO_CACHES
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.measure import environment

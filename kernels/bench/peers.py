@@ -11,8 +11,8 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 
 if TYPE_CHECKING:
-    from .contender import Contender
-    from .measure_pipeline import Maker
+    from .contenders import Contender
+    from .pipelines import Maker
 
 GROUP = "wamnet.peers"
 """Group of the entry point, whose value is a module with the names of [`Table`]."""

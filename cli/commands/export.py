@@ -68,6 +68,18 @@ STATUS_WRONG = 1
 """Exit status when an export was written, and what runs it here finds it off, or refuses it."""
 
 
+Checked = Annotated[
+    bool,
+    typer.Option(
+        "--check", help="Compile and run the export here, and compare its output with the reference."
+    ),
+]
+Measured = Annotated[
+    bool,
+    typer.Option("--measure", help="Measure the time per frame on this machine and report it in the README."),
+]
+
+
 @dataclass(frozen=True)
 class Kernel(KernelRequest):
     """How the denoiser is compiled, for another machine than this one."""
@@ -189,18 +201,8 @@ def export(
     *,
     shown: Shown,
     kernel: Kernel,
-    check: Annotated[
-        bool,
-        typer.Option(
-            "--check", help="Compile and run the export here, and compare its output with the reference."
-        ),
-    ] = False,
-    measure: Annotated[
-        bool,
-        typer.Option(
-            "--measure", help="Measure the time per frame on this machine and report it in the README."
-        ),
-    ] = False,
+    check: Checked = False,
+    measure: Measured = False,
 ) -> None:
     """Export a denoiser for another program: kernels, a manifest, a README and a reference test image.
 

@@ -24,6 +24,7 @@ import typer
 
 from ..refimpl.errors import InputError, WamnetError
 from .common.default_command import CommandWithOthers
+from .common.request import spread
 from .common.terminal import tell
 
 STATUS_BAD_INPUT = 2
@@ -61,11 +62,11 @@ COMMANDS: Mapping[str, tuple[str, str, str]] = {
     "conformance": ("conformance", "conformance", "EXAMPLES"),
     "demo": ("demo", "demo", "EXAMPLES"),
     "bench": ("bench", "bench", "EXAMPLES"),
-    "bench render": ("measure.render", "render", "EXAMPLES"),
+    "bench render": ("measure.paths", "render", "RENDER_EXAMPLES"),
     "bench train": ("measure.train", "train", "EXAMPLES"),
     "bench pipeline": ("measure.pipeline", "pipeline", "EXAMPLES"),
     "bench exports": ("measure.exports", "exports", "EXAMPLES"),
-    "bench primitives": ("measure.primitives", "primitives", "EXAMPLES"),
+    "bench primitives": ("measure.paths", "primitives", "PRIMITIVES_EXAMPLES"),
 }
 """Each command's module in `commands`, function and examples; one of a group follows the group."""
 
@@ -120,9 +121,11 @@ def _join(groups: dict[str, typer.Typer], name: str | None) -> None:
 
 def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: str, examples: str) -> None:
     """Add a command, whose help is its docstring, to its group; a group joins the others."""
-    command = getattr(module, function)
+    command = spread(getattr(module, function))
     # Each paragraph on one line, as typer wants it.
-    shown = "\n\n".join(" ".join(part.split()) for part in (command.__doc__ or "").split("\n\n"))
+    shown = "\n\n".join(
+        " ".join(part.split()) for part in (getattr(module, function).__doc__ or "").split("\n\n")
+    )
     group, _, name = path.rpartition(" ")
     how: dict[str, Any] = {"help": shown, "epilog": getattr(module, examples) if examples else None}
     if path in GROUPS:

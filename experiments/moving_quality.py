@@ -30,7 +30,7 @@ from lab.sets import SETS
 from quality import PLANS, ROWS, SHIPPED_SET, Bench
 
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench.measure_pipeline import PEERS, STEP_S, moments
+from wamnet.kernels.bench.pipelines import PEERS, STEP_S, moments
 from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_on import render_on
 from wamnet.models.data.frame_plan import TRAIN

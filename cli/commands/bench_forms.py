@@ -20,7 +20,7 @@ from ..common.terminal import say
 from . import train
 
 if TYPE_CHECKING:
-    from ...kernels.bench.contender import Variant
+    from ...kernels.bench.contenders import Variant
     from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
     from ...refimpl.network.train import Recipe, TrainState
@@ -44,7 +44,7 @@ SEED = 2
 def planned(model: Model, names: Sequence[str], steps: int) -> dict[str, Variant]:
     """Return the forms that this model can have, by the names of variants, not trained yet."""
     from ...compiler import variants
-    from ...kernels.bench.contender import Variant
+    from ...kernels.bench.contenders import Variant
     from ...kernels.run.measure_curve import names_for
 
     found = {}

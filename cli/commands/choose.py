@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...refimpl.errors import NO_VALUE, InputError
+from ..common import options
 from ..common.terminal import progress, say
 
 if TYPE_CHECKING:
@@ -28,12 +29,12 @@ SMALLEST_PX, LARGEST_PX = 16, 4096
 class Request:
     """What a choice is asked to keep, and where its curve comes from; None for what is not given."""
 
-    max_error: float | None = None
-    max_ms: float | None = None
-    max_loss_db: float | None = None
-    curve: Path | None = None
-    frames: Path | None = None
-    size: int | None = None
+    max_error: options.MaxError = None
+    max_ms: options.MaxMs = None
+    max_loss_db: options.MaxLoss = None
+    curve: options.CurveFile = None
+    frames: options.CurveFrames = None
+    size: options.CurveSize = None
 
     @property
     def limited(self) -> bool:

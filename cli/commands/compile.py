@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +20,7 @@ from ..common import options
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
 from ..common.options import Sampler, Target
+from ..common.request import KernelRequest
 from ..common.terminal import say
 from ..files.outputs import check_parent, unwritable
 from .choose import Request, check_request, choose
@@ -27,7 +28,6 @@ from .choose import Request, check_request, choose
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact, Files
     from ...compiler.scenes.path_kernel import PathArtifact
-    from ...refimpl.light.scene import Scene
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -55,10 +55,45 @@ HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
 
-Lanes = Annotated[
-    int | None,
-    typer.Option(help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"),
-]
+
+@dataclass(frozen=True)
+class OfScene:
+    """What only the kernel of a scene has."""
+
+    time: options.Time = None
+    parameters: options.Parameters = None
+    max_depth: Annotated[
+        int | None, typer.Option(help="Maximum number of bounces per path (scenes only).", show_default="5")
+    ] = None
+    sampler: Annotated[Sampler | None, typer.Option(help="Sampler (scenes only).", show_default="pcg4d")] = (
+        None
+    )
+    lanes: Annotated[
+        int | None,
+        typer.Option(
+            help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
+        ),
+    ] = None
+
+    def options(self) -> dict[str, object]:
+        """Return the options by name."""
+        given = {"--time": self.time, "--set": self.parameters, "--lanes": self.lanes}
+        return {**given, "--max-depth": self.max_depth, "--sampler": self.sampler and self.sampler.value}
+
+    def compiled(self, name: str, target: str, profile: str) -> PathArtifact:
+        """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
+        from ...compiler.scenes.lower_scene import lower_scene
+        from ...compiler.scenes.path_kernel import compile_path, forms_of
+        from ...refimpl.light.transport import Settings
+
+        scene = load_scene(name, self.time, self.parameters or [])
+        for line in said_of_compiling(scene):
+            say(line)
+        settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
+        if self.sampler is not None:
+            settings = replace(settings, sampler=self.sampler.value)
+        programs = lower_scene(scene, settings, forms_of(target))
+        return compile_path(programs, target, profile, 1 if self.lanes is None else self.lanes)
 
 
 def compile_model(
@@ -75,25 +110,11 @@ def compile_model(
         Path | None,
         typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.", show_default="TARGET"),
     ] = None,
-    profile: options.Profile = "ieee",
-    time: options.Time = None,
-    parameters: options.Parameters = None,
-    max_depth: Annotated[
-        int | None, typer.Option(help="Maximum number of bounces per path (scenes only).", show_default="5")
-    ] = None,
-    sampler: Annotated[
-        Sampler | None, typer.Option(help="Sampler (scenes only).", show_default="pcg4d")
-    ] = None,
-    lanes: Lanes = None,
-    schedule: options.Schedule = None,
+    *,
+    of_scene: OfScene,
+    network: KernelRequest,
     here: options.Here = False,
-    variant: options.Variant = None,
-    max_error: options.MaxError = None,
-    max_ms: options.MaxMs = None,
-    max_loss_db: options.MaxLoss = None,
-    curve: options.CurveFile = None,
-    frames: options.CurveFrames = None,
-    size: options.CurveSize = None,
+    limits: Request,
 ) -> None:
     """Compile a model or a scene to a kernel: source, weights, and a manifest of its interface.
 
@@ -103,21 +124,17 @@ def compile_model(
     is measured once per device.
     """
     folder, name = output or Path(target.value), EXECUTOR_OF[target]
-    request = Request(max_error, max_ms, max_loss_db, curve, frames, size)
     kernel: Files
     if is_scene(model):
-        of_models = {"--schedule": schedule, "--variant": variant, "--here": here or None}
+        of_models = {"--schedule": network.schedule, "--variant": network.variant, "--here": here or None}
         rule = f"{model} is a scene, whose kernels have one schedule, no variants"
-        _only_for("a model", of_models | request.options(), rule)
+        _only_for("a model", of_models | limits.options(), rule)
         check_folder(folder, name, of_scene=True)
-        scene = load_scene(model, time, parameters or [])
-        kernel = _compiled_scene(scene, name, profile, max_depth, sampler, lanes)
+        kernel = of_scene.compiled(model, name, network.profile)
     else:
-        of_scenes: dict[str, object] = {"--time": time, "--set": parameters, "--lanes": lanes}
-        of_scenes |= {"--max-depth": max_depth, "--sampler": sampler and sampler.value}
-        _check_name(model, of_scenes)
+        _check_name(model, of_scene.options())
         check_folder(folder, name)
-        kernel = _compiled_model(Path(model), name, profile, schedule, variant, request, here)
+        kernel = _compiled_model(Path(model), name, network, limits, here)
     _write(kernel, folder)
 
 
@@ -136,47 +153,40 @@ def _write(kernel: Files, folder: Path) -> None:
         say(f"no certificate: {kernel.plan.unproven}")
 
 
-def _chosen_here(model: Model, executor: str, profile: str, schedule: str | None, variant: str) -> str:
+def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
     """Return the schedule of a variant for this machine's device, and say why."""
-    from ...compiler.variants import plan_model
+    from ...compiler.variants import FULL, plan_model
     from ...kernels import open_executor
     from ...kernels.run import tune
 
-    if schedule is not None:
-        raise InputError("--schedule", schedule, "--here chooses another", "leave one of them out")
-    plan = plan_model(model, executor, profile, variant=variant)
+    if network.schedule is not None:
+        raise InputError("--schedule", network.schedule, "--here chooses another", "leave one of them out")
+    plan = plan_model(model, executor, network.profile, variant=network.variant or FULL)
     with open_executor(executor) as runner:
         found = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
         say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
     return found.schedule
 
 
-def _compiled_model(
-    path: Path,
-    target: str,
-    profile: str,
-    schedule: str | None,
-    variant: str | None,
-    request: Request,
-    here: bool,
-) -> Artifact:
+def _compiled_model(path: Path, target: str, network: KernelRequest, limits: Request, here: bool) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ...compiler.compile import compile_plan
     from ...compiler.schedules.schedules import PLAIN
     from ...compiler.variants import FULL, plan_model
 
-    check_request(request, variant)
+    profile, schedule, variant = network.profile, network.schedule, network.variant
+    check_request(limits, variant)
     model = load_model(path, imported=True)
-    if request.limited:
+    if limits.limited:
         if model.is_imported:
             rule = "limits are measured on frames, which an imported network does not read"
             raise InputError("limits", NO_VALUE, rule, "leave them out")
         if here:
             rule = "limits choose the schedule too"
             raise InputError("--here", NO_VALUE, rule, "leave it out")
-        variant, schedule = choose(model, request, target, profile, schedule)
+        variant, schedule = choose(model, limits, target, profile, schedule)
     elif here:
-        schedule = _chosen_here(model, target, profile, schedule, variant or FULL)
+        schedule = _chosen_here(model, target, network)
     return compile_plan(plan_model(model, target, profile, schedule or PLAIN, variant or FULL))
 
 
@@ -204,28 +214,6 @@ def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
 
         known = [*CANONICAL, *(f"{MODEL_PREFIX}{model}" for model in models.names())]
         raise InputError("model or scene", name, "not found", f"{choice(name, known)}, or give a file")
-
-
-def _compiled_scene(
-    scene: Scene,
-    target: str,
-    profile: str,
-    max_depth: int | None,
-    sampler: Sampler | None,
-    lanes: int | None,
-) -> PathArtifact:
-    """Return the kernel that follows a scene's paths; of a large scene it is said first how long it takes."""
-    from ...compiler.scenes.lower_scene import lower_scene
-    from ...compiler.scenes.path_kernel import compile_path, forms_of
-    from ...refimpl.light.transport import Settings
-
-    for line in said_of_compiling(scene):
-        say(line)
-    settings = Settings() if max_depth is None else Settings(max_depth=max_depth)
-    if sampler is not None:
-        settings = replace(settings, sampler=sampler.value)
-    programs = lower_scene(scene, settings, forms_of(target))
-    return compile_path(programs, target, profile, 1 if lanes is None else lanes)
 
 
 def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:

@@ -24,6 +24,7 @@ from ..common.domain import check_domain
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
 from ..common.options import ExecutorChoice, ExecutorName
+from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
 from ..files.outputs import check_output
@@ -152,10 +153,9 @@ def denoise(
     ],
     output: Output = Path("denoised.png"),
     executor: options.Executor = ExecutorChoice.auto,
-    profile: options.Profile = "ieee",
-    schedule: options.Schedule = None,
+    *,
+    kernel: KernelRequest,
     rank: options.CutRank = 0,
-    variant: options.Variant = None,
     anyway: Annotated[
         bool,
         typer.Option(
@@ -184,7 +184,8 @@ def denoise(
     for result in outputs:
         check_output(result, suffixes, [model, *paths])
     network, notes = load_model(model), Notes()
-    cut, name = chosen_variant(variant, rank), chosen(executor)
+    cut, name = chosen_variant(kernel.variant, rank), chosen(executor)
+    profile, schedule = kernel.profile, kernel.schedule
     with open_executor(name) as runner:
         denoiser = Denoiser(runner, network, profile, schedule, cut, len(paths), keeps=True)
         job = Job(denoiser, notes, anyway, keep_layers, view_layer)

@@ -12,6 +12,7 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene
 from ..common.options import Sampler
+from ..common.request import KernelRequest
 from ..common.terminal import say
 from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
@@ -19,6 +20,7 @@ from ..reports import webpage
 if TYPE_CHECKING:
     from ...kernels.export.motion import Motion
     from ...kernels.export.package import Export
+    from ...refimpl.light.scene import Scene
 
 EXAMPLES = """Examples:
 
@@ -66,67 +68,6 @@ STATUS_WRONG = 1
 """Exit status when an export was written, and what runs it here finds it off, or refuses it."""
 
 
-Place = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PLACE",
-        help="Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
-        show_default="the target's default",
-    ),
-]
-
-
-ScheduleName = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        help="Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
-        show_default="the fastest for this target and model",
-    ),
-]
-
-
-Moving = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LIST",
-        help="Scene parameters to pass at run time instead of baking in: time, camera, lights, positions.",
-        show_default="none: the scene is baked in",
-    ),
-]
-
-
-Seconds = Annotated[
-    float | None,
-    typer.Option(help="Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"),
-]
-Fps = Annotated[float | None, typer.Option(help="Table entries per second.", show_default=f"{FPS:g}")]
-SceneToo = Annotated[
-    str | None,
-    typer.Option(
-        metavar="SCENE",
-        help="Also export the path tracer for this scene: a canonical scene or a file (.json).",
-        show_default="denoiser only",
-    ),
-]
-
-
-TargetName = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME", help=f"Target language or format: {TARGETS}.", show_default="the host's target"
-    ),
-]
-HostName = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help=f"Complete host program to generate: {HOSTS}.", show_default="none"),
-]
-Folder = Annotated[
-    Path | None,
-    typer.Option(
-        "-o", "--output", metavar="FOLDER", help="New output folder.", show_default="HOST or TARGET"
-    ),
-]
 Checked = Annotated[
     bool,
     typer.Option(
@@ -140,14 +81,84 @@ Measured = Annotated[
 
 
 @dataclass(frozen=True)
-class Span:
-    """What moves, and the length and the density of the table of times, if they are given."""
+class Kernel(KernelRequest):
+    """How the denoiser is compiled, for another machine than this one."""
 
-    kinds: tuple[str, ...]
-    seconds: float | None
-    fps: float | None
+    schedule: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
+            show_default="the fastest for this target and model",
+        ),
+    ] = None
+    weights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLACE",
+            help="Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
+            show_default="the target's default",
+        ),
+    ] = None
 
-    def motion(self, scene: str, start: float | None, parameters: list[str]) -> Motion:
+
+@dataclass(frozen=True)
+class Shown:
+    """The scene whose path tracer comes along, and what of it moves."""
+
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="Also export the path tracer for this scene: a canonical scene or a file (.json).",
+            show_default="denoiser only",
+        ),
+    ] = None
+    time: options.Time = None
+    parameters: options.Parameters = None
+    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = DEPTH
+    sampler: options.SamplerName = Sampler.pcg4d
+    moving: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Scene parameters to pass at run time instead of baking in: time, camera, lights, "
+            "positions.",
+            show_default="none: the scene is baked in",
+        ),
+    ] = None
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            help="Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"
+        ),
+    ] = None
+    fps: Annotated[float | None, typer.Option(help="Table entries per second.", show_default=f"{FPS:g}")] = (
+        None
+    )
+
+    def check(self) -> None:
+        """Refuse options that mean nothing without others."""
+        if self.scene is None:
+            turned = None if self.sampler is Sampler.pcg4d else self.sampler.value
+            depth = None if self.max_depth == DEPTH else self.max_depth
+            given = {"--time": self.time, "--set": self.parameters, "--sampler": turned, "--max-depth": depth}
+            given["--moving"] = self.moving
+            _refuse(given, "there is no scene", "name one with --scene, or leave it out")
+        if self.moving is None:
+            _refuse(self._table, "nothing moves", "add --moving time, or leave it out")
+
+    @property
+    def _table(self) -> dict[str, Any]:
+        """Return the length and the density of the table of times, by option."""
+        return {"--seconds": self.seconds, "--fps": self.fps}
+
+    def at(self, time: float | None) -> Scene:
+        """Return the scene at a time."""
+        assert self.scene is not None, "there is a scene"
+        return load_scene(self.scene, time, self.parameters or [])
+
+    def motion(self) -> Motion | None:
         """Return the scene at the times of the table: half a step beside multiples, as a page has them.
 
         Some scenes are laid out in another way at time 0, where their boxes are parallel to the axes.
@@ -155,33 +166,41 @@ class Span:
         from ...kernels.export.motion import TIME, Motion
         from ...models.data.frame_plan import animation_times
 
-        if TIME not in self.kinds:
-            given = {"--seconds": self.seconds, "--fps": self.fps}
-            _refuse(given, "time does not move", "add it to --moving, or leave it out")
-            return Motion((start or 0.0,), (load_scene(scene, start, parameters),), self.kinds)
-        seconds = SECONDS if self.seconds is None else self.seconds
+        if self.moving is None:
+            return None
+        kinds, start = tuple(self.moving.split(",")), self.time or 0.0
+        if TIME not in kinds:
+            _refuse(self._table, "time does not move", "add it to --moving, or leave it out")
+            return Motion((start,), (self.at(self.time),), kinds)
         fps = FPS if self.fps is None else self.fps
-        times = [time + 0.5 / fps for time in animation_times(start or 0.0, seconds, fps)]
-        return Motion(tuple(times), tuple(load_scene(scene, time, parameters) for time in times), self.kinds)
+        spaced = animation_times(start, SECONDS if self.seconds is None else self.seconds, fps)
+        times = [time + 0.5 / fps for time in spaced]
+        return Motion(tuple(times), tuple(map(self.at, times)), kinds)
 
 
 def export(
     model: options.ModelFile,
-    target: TargetName = None,
-    host: HostName = None,
-    output: Folder = None,
-    scene: SceneToo = None,
-    time: options.Time = None,
-    parameters: options.Parameters = None,
-    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = DEPTH,
-    sampler: options.SamplerName = Sampler.pcg4d,
-    profile: options.Profile = "ieee",
-    variant: options.Variant = None,
-    weights: Place = None,
-    schedule: ScheduleName = None,
-    moving: Moving = None,
-    seconds: Seconds = None,
-    fps: Fps = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help=f"Target language or format: {TARGETS}.", show_default="the host's target"
+        ),
+    ] = None,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help=f"Complete host program to generate: {HOSTS}.", show_default="none"
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FOLDER", help="New output folder.", show_default="HOST or TARGET"
+        ),
+    ] = None,
+    *,
+    shown: Shown,
+    kernel: Kernel,
     check: Checked = False,
     measure: Measured = False,
 ) -> None:
@@ -196,25 +215,20 @@ def export(
     target = _target(target, host)
     folder = output or Path(host or target)
     if target == HTML:
-        of_kernels = {"--weights": weights, "--variant": variant, "--check": check or None, "--time": time}
-        of_kernels |= {"--schedule": schedule, "--moving": moving, "--seconds": seconds, "--fps": fps}
-        of_kernels["--measure"] = measure or None
+        of_kernels: dict[str, Any] = {
+            "--weights": kernel.weights,
+            "--variant": kernel.variant,
+            "--check": check or None,
+        }
+        of_kernels |= {"--time": shown.time, "--schedule": kernel.schedule, "--moving": shown.moving}
+        of_kernels |= {"--seconds": shown.seconds, "--fps": shown.fps, "--measure": measure or None}
         _refuse(of_kernels, "a web page has its own", "leave it out")
-        _write(folder, {PAGE_NAME: webpage.page_of(model, scene, parameters or [], None).encode()})
+        page = webpage.page_of(model, shown.scene, shown.parameters or [], None)
+        _write(folder, {PAGE_NAME: page.encode()})
         return
     check_new_folder(folder)
-    if scene is None:
-        turned = None if sampler is Sampler.pcg4d else sampler.value
-        depth = None if max_depth == DEPTH else max_depth
-        given = {"--time": time, "--set": parameters, "--sampler": turned, "--max-depth": depth}
-        given["--moving"] = moving
-        _refuse(given, "there is no scene", "name one with --scene, or leave it out")
-    if moving is None:
-        _refuse({"--seconds": seconds, "--fps": fps}, "nothing moves", "add --moving time, or leave it out")
-    moment, paths = (time, parameters or []), (max_depth, sampler)
-    span = None if moving is None else Span(tuple(moving.split(",")), seconds, fps)
-    asked = (variant, weights, schedule)
-    made = _export(model, (target, host or ""), scene, moment, paths, profile, asked, span, measure)
+    shown.check()
+    made = _export(model, target, host or "", shown, kernel, measure)
     _write(folder, made.contents())
     _tell(made)
     if check:
@@ -240,22 +254,8 @@ def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
             raise InputError(option, value, rule, way_out)
 
 
-def _export(
-    model: Path,
-    place: tuple[str, str],
-    scene: str | None,
-    moment: tuple[float | None, list[str]],
-    paths: tuple[int, Sampler],
-    profile: str,
-    asked: tuple[str | None, str | None, str | None],
-    span: Span | None,
-    measured: bool,
-) -> Export:
-    """Return the export that the options ask for.
-
-    `place`: target and host; `asked`: variant, place of the weights and schedule; `measured`: whether it says
-    how long it takes.
-    """
+def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
+    """Return the export that the options ask for; `measured`: it says how long it takes."""
     from ...compiler.variants import FULL
     from ...kernels.export.package import Request, with_speed
     from ...kernels.export.package import export as exported
@@ -263,13 +263,12 @@ def _export(
     from ...refimpl.light.transport import Settings
 
     if measured:
-        check_measured(place[0])
-    settings = replace(Settings(max_depth=paths[0]), sampler=paths[1].value)
-    motion = span.motion(scene, *moment) if scene and span else None
-    loaded = motion.scenes[0] if motion else load_scene(scene, *moment) if scene else None
-    variant, weights, schedule = (text or "" for text in asked)
-    options_of = (weights, variant or FULL, settings, schedule, motion, place[1])
-    made = exported(Request(load_model(model, imported=True), place[0], loaded, profile, *options_of))
+        check_measured(target)
+    settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler.value)
+    motion = shown.motion()
+    scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
+    how = (kernel.profile, kernel.weights or "", kernel.variant or FULL, settings, kernel.schedule or "")
+    made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
     return with_speed(made, measure(made).facts()) if measured else made
 
 

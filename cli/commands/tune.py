@@ -19,7 +19,6 @@ from ..files.alone import alone_in
 
 if TYPE_CHECKING:
     from ...kernels.run.tune import Table
-    from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
 
@@ -30,9 +29,6 @@ wamnet tune model.safetensors --executor opengl --size 512 --force"""
 
 LARGEST_SIZE = 2**13
 """Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
-
-PAPER_WINDOW, PAPER_LAYERS, PAPER_OMEGA = 12, (32, 32, 32, 32, 3), 3.0
-"""The paper's network, where no model is given."""
 
 MANY = 1000
 """Pictures of an animation, for which a long compilation may pay."""
@@ -70,13 +66,14 @@ def tune(
     """
     from ...compiler.variants import FULL, plan_model, with_rank
     from ...kernels import open_executor
+    from ...kernels.bench.workload import paper_model
     from ...kernels.run import tune as tuning
 
     if not 1 <= size <= LARGEST_SIZE:
         raise InputError("--size", size, f"must be from 1 to {LARGEST_SIZE}", "for example --size 512")
     if cache is not None:
         os.environ["WAMNET_CACHE"] = str(cache)
-    network = load_model(model) if model else paper()
+    network = load_model(model) if model else paper_model()
     square = (size, size)
     with _alone(), open_executor(executor.value) as runner:
         plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
@@ -102,19 +99,6 @@ def _alone() -> Iterator[None]:
         return
     with alone_in(folder, "tuning", "wait for it, or choose another with --cache"):
         yield
-
-
-def paper() -> Model:
-    """Return a network of the paper's shape, untrained: times do not depend on weights."""
-    import numpy as np
-
-    from ...refimpl.network import siren
-    from ...refimpl.network.dataset import Normalization, Window
-    from ...refimpl.network.denoise import Model
-
-    widths = (PAPER_WINDOW**2 * 6, *PAPER_LAYERS)
-    network = siren.init(widths, PAPER_OMEGA, PAPER_OMEGA, 1, np.float32)
-    return Model(network, ("color", "normal"), Window(PAPER_WINDOW, "clamp"), Normalization(), {})
 
 
 def show(found: Table) -> None:

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.measure_pipeline import Ways
-from wamnet.kernels.bench.measure_render import VARIANT
+from wamnet.kernels.bench.paths import VARIANT
+from wamnet.kernels.bench.pipelines import Ways
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.transport import Settings

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.measure_pipeline import Ways
+from wamnet.kernels.bench.pipelines import Ways
 from wamnet.models.blender.line_process import LineProcess
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scene import Scene, to_json

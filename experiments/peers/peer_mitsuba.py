@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.kernels.bench.measure_render import VARIANT
+from wamnet.kernels.bench.paths import VARIANT
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.materials import Material
 from wamnet.refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere

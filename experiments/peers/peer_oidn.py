@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contender import Contender, Opened, Tools
+from wamnet.kernels.bench.contenders import Contender, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError

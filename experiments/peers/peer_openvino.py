@@ -10,7 +10,7 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools
+from wamnet.kernels.bench.contenders import FULL, Contender, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contender import Contender, Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import Contender, Opened, Tools, activation_in
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.activation import RELU, SINE

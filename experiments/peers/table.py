@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from wamnet.kernels.bench.contender import Contender
-from wamnet.kernels.bench.measure_pipeline import Maker
+from wamnet.kernels.bench.contenders import Contender
 from wamnet.kernels.bench.peers import Renderer
+from wamnet.kernels.bench.pipelines import Maker
 from wamnet.refimpl.light.scene import Scene
 
 from . import (

@@ -30,7 +30,7 @@ from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
 from ...refimpl.network.whole import round_image
 from ..devices.images import Images
-from .contender import Variant
+from .contenders import Variant
 
 Array = NDArray[np.float64]
 

@@ -1,12 +1,12 @@
-"""One run of the benchmark: contenders open, take turns, and are judged; what is known can be had any time.
+"""One run of the benchmark of denoisers: contenders open, take turns, and are judged.
 
 1. The machine's limits once, and the rates of each executor and schedule [rates.py]. A kernel whose predicted
    time [cost.py] is far over the budget is left out, and its row says so [`Contest._open`].
 2. Packages are imported, executors opened; then a contender opens and makes its first frame, which is
    compared with the reference [accuracy.py]. That time less a later frame's is its compilation.
 3. Rounds in which every contender makes a frame and the machine's limits are measured again, in turn
-   [`Contest._race`]. A contender whose repeats would take longer than the budget takes fewer turns; where a
-   frame takes more than half of it, the first one counts.
+   [measure.py]. A contender whose repeats would take longer than the budget takes fewer turns; where a
+   frame takes more than half of it, the first one counts [`Contest._warm`].
 4. Quality on unseen frames [`Contest._judge`].
 5. Other sizes, ascending: what took t at p pixels is taken to need t p' / p at p' pixels, and is left out,
    with that reason, where it is over the budget [`Contest._grow`].
@@ -18,42 +18,23 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
 
 from ...compiler.schedules.names import split
-from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ...refimpl.frame import Frame
 from ...refimpl.network.denoise import Model
-from ..measure import PAUSE_S, Times, in_turns
+from ..measure import PAUSE_S, Entry, Round, begin, take_turns
 from ..memory import keep_freed_memory
 from . import accuracy, rates
-from .contender import IEEE, MACHINE, Contender, Opened, Tools, parameters_of
+from .contenders import IEEE, MACHINE, Contender, Opened, Tools, parameters_of
 from .cost import Rates, predicted_seconds
-from .first_run import first_runs
-from .result import (
-    FAILED,
-    KERNEL,
-    MEASURED,
-    MISSING,
-    PEER,
-    SCHEMA,
-    SKIPPED,
-    Row,
-    clean,
-    front,
-    median_ms,
-    of_front,
-)
+from .fresh import first_runs
+from .rows import KERNEL, MEASURED, PEER, SCHEMA, SKIPPED, Row, clean, front
 from .workload import Given, filled, given, noise
-
-Told = Callable[[str, float], None]
-"""Called with what is done next, and the share of the work that has been done since the last call."""
 
 PROBE_PAUSE_S = 0.05
 """Seconds before a run of a small program: only one library runs, whose threads wait for it."""
@@ -61,14 +42,9 @@ PROBE_PAUSE_S = 0.05
 DOUBT = 4.0
 """Times the budget that a prediction must reach for a kernel to be left out unseen: it may be off."""
 
-MOST_TOLD = 200
-"""Characters of a peer's error that are repeated."""
-
-FRONTS = {"error": "max", "quality": "psnr_loss_db", "rounding": "bound"}
-"""Parts of a row with a front, and the number of each that is set against time."""
-
-STEPS = {"quality": 0.01}
-"""Differences of a part's number, here in dB, that no front sees: those of rounding."""
+FRONTS = {"error": ("max", None), "quality": ("psnr_loss_db", 0.01), "rounding": ("bound", None)}
+"""Parts of a row with a front: the number that is set against time, and differences of it, here in dB, that
+no front sees: those of rounding."""
 
 GROWTH_ROUNDS = 3
 """Most frames of each contender at another size: what grows is seen from few."""
@@ -99,42 +75,49 @@ class Request:
 
 @dataclass
 class Contest:
-    """A run and what it has found so far; made for open `tools`."""
+    """A run and what it has found so far; made for open `tools`. `told` is called with shares of the work."""
 
     request: Request
     contenders: Sequence[Contender]
     tools: Tools
-    told: Told = lambda what, share: None
+    told: Callable[[float], None] = lambda share: None
     rows: dict[str, Row] = field(default_factory=dict)
     opened: dict[str, Opened] = field(default_factory=dict)
-    machine: dict[str, list[float]] = field(default_factory=dict)
+    machine: list[Entry] = field(default_factory=list)
     found_rates: dict[str, Rates] = field(default_factory=dict)
     sizes: dict[int, dict[str, Row]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for each in self.contenders:
-            kind = KERNEL if each.executor else PEER
             facts = {"caches": each.caches, "executor": each.executor}
             facts |= each.variant.facts(self.request.model) if each.variant else {}
-            self.rows[each.name] = Row(each.name, each.text, kind, facts=facts)
+            kind = KERNEL if each.executor else PEER
+            self.rows[each.name] = Row(each.name, text=each.text, kind=kind, facts=facts)
 
     def run(self) -> None:
         """Do all steps."""
         keep_freed_memory()
-        shown = self._given(self.request.size)
-        crop = accuracy.Crop(self.request.model, shown.images)
-        self.told("the machine's limits", 0.02)
+        request, shown = self.request, self._given(self.request.size)
+        crop = accuracy.Crop(request.model, shown.images)
         ways = rates.machine_ways(self._scale)
-        self._measure_machine(ways, repeats=1, warm=1)
+        self.machine = [Entry(name, lambda way=way: way) for name, way in ways.items()]  # type: ignore[misc]
+        begin(self.machine)
+        take_turns(self.machine, 1, request.pause_s)
+        self.told(0.02)
         for contender in self.contenders:
-            self.told(f"opening {contender.name}", 0.45 / len(self.contenders))
-            with self._failing(self.rows[contender.name]):
+            with self.rows[contender.name].failing():
                 self._open(contender, shown, crop)
-        self._race(shown, ways)
+            self.told(0.45 / len(self.contenders))
+        for row in self._going():
+            with row.failing():
+                self._warm(row, shown)
+        entries = [*self._going(), *self.machine]
+        share = 0.48 / (request.repeats * len(entries))
+        take_turns(entries, request.repeats, request.pause_s, lambda: self.told(share))
         self._judge()
-        if self.request.first_runs:
+        if request.first_runs:
             self._begin_anew()
-        for size in sorted(set(self.request.sizes) - {self.request.size}):
+        for size in sorted(set(request.sizes) - {request.size}):
             self._grow(size)
 
     @property
@@ -142,43 +125,22 @@ class Contest:
         """Return the divisor of the lengths of the machine's measurements."""
         return 2 if self.request.quick else 1
 
-    def _given(self, size: int) -> Given:
-        """Return the picture of a size: an unseen frame, or noise."""
-        pairs = self.request.pairs
-        frame = filled(pairs[0][0], size) if pairs else noise(size)
-        return given(self.request.model, frame)
-
-    def _measure_machine(self, ways: Mapping[str, Callable[[], None]], repeats: int, warm: int) -> None:
-        """Measure the machine's limits."""
-        for name, times in in_turns(ways, repeats, warm, self.request.pause_s).items():
-            self.machine.setdefault(name, []).extend(times.seconds)
-
     @property
     def limits(self) -> rates.Limits | None:
         """Return the machine's limits by what has been measured so far."""
-        if not self.machine:
+        if not all(entry.seconds for entry in self.machine):
             return None
-        times = {name: Times(tuple(seconds)) for name, seconds in self.machine.items()}
-        return rates.limits_of(times, self._scale)
+        times = {entry.name: entry.times for entry in self.machine}
+        return rates.limits_of(times, self._scale) if times else None
 
-    @contextmanager
-    def _failing(self, row: Row) -> Iterator[None]:
-        """Write an error into a row, and continue; a peer may raise what it likes, others only our errors."""
-        try:
-            yield
-            return
-        except ExecutorUnavailable as error:
-            row.state, row.reason = MISSING, str(error)
-        except (WamnetError, MemoryError) as error:
-            row.state, row.reason = FAILED, str(error) or type(error).__name__
-        except Exception as error:
-            if row.kind != PEER:
-                raise
-            row.state, row.reason = (
-                FAILED,
-                f"{type(error).__name__}: {' '.join(str(error).split())[:MOST_TOLD]}",
-            )
-        self.opened.pop(row.name, None)
+    def _going(self) -> list[Row]:
+        """Return the rows that are open, and have not failed."""
+        return [row for name, row in self.rows.items() if name in self.opened and row.state == MEASURED]
+
+    def _given(self, size: int) -> Given:
+        """Return the picture of a size: an unseen frame, or noise."""
+        pairs = self.request.pairs
+        return given(self.request.model, filled(pairs[0][0], size) if pairs else noise(size))
 
     # ---- opening ------------------------------------------------------------------------------------------
 
@@ -189,17 +151,13 @@ class Contest:
         start = time.perf_counter()
         opened = contender.open(self.tools, self.request.model, self.request.size)
         seconds = time.perf_counter() - start
-        row.facts |= {"device": opened.device, "source_bytes": opened.source_bytes}
-        row.facts |= {"schedule": opened.schedule or None}
-        self._predict(contender, opened, row)
-        needed = row.facts["predicted_ms"]
-        if contender.executor and needed is not None and needed > 1e3 * DOUBT * self.request.budget_s:
-            row.state, row.reason = SKIPPED, self._too_long(1e-3 * needed, "the cost model")
+        needed = self._predict(opened, row)
+        if contender.executor and needed is not None and needed > DOUBT * self.request.budget_s:
+            self._leave_out(row, needed, "the cost model")
             return
         start = time.perf_counter()
         picture = opened.display(opened.run(shown))
-        first = time.perf_counter() - start
-        row.facts |= {"open_s": seconds, "first_frame_s": first}
+        row.facts |= {"open_s": seconds, "first_frame_s": time.perf_counter() - start}
         row.state, self.opened[contender.name] = MEASURED, opened
         self._compare(contender, opened, crop, picture)
 
@@ -207,29 +165,28 @@ class Contest:
         self, contender: Contender, opened: Opened, crop: accuracy.Crop, picture: NDArray[Any]
     ) -> None:
         """Note the error of a picture; another denoiser has none."""
-        row = self.rows[contender.name]
+        facts = self.rows[contender.name].facts
         if contender.variant is None:
             return
-        row.facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
+        facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
         expected, bound = crop.rounding(contender.variant, contender.executor, opened.schedule)
-        found: dict[str, Any] = {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
+        proven: dict[str, Any] = {"bound": None, "bound_all": None, "certified": False}
         if contender.executor:
-            found |= {"bound": bound, "bound_all": opened.bound, "certified": opened.certified}
-        row.facts["rounding"] = {"bound": None, "bound_all": None, "certified": False} | found
+            proven = {"bound": bound, "bound_all": opened.bound, "certified": opened.certified}
+        facts["rounding"] = proven | {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
 
-    def _predict(self, contender: Contender, opened: Opened, row: Row) -> None:
-        """Note the time that the cost model gives."""
-        found = self._rates_of(contender, opened.rates)
-        seconds = predicted_seconds(opened.stages, found, self.request.size**2)
-        row.facts |= {
-            "predicted_ms": seconds and 1e3 * seconds,
-            "rates": opened.rates if opened.stages else None,
-            "products": sum(stage.products for stage in opened.stages) or None,
-            "sines": sum(stage.sines for stage in opened.stages) or None,
-            "bytes": sum(stage.bytes for stage in opened.stages) or None,
-        }
+    def _predict(self, opened: Opened, row: Row) -> float | None:
+        """Note what a contender is and does for a pixel, and return the time that the cost model gives."""
+        stages, found = opened.stages, self._rates_of(opened.rates)
+        seconds = predicted_seconds(stages, found, self.request.size**2)
+        row.facts |= {"device": opened.device, "source_bytes": opened.source_bytes}
+        row.facts |= {"schedule": opened.schedule or None, "rates": opened.rates if stages else None}
+        row.facts["predicted_ms"] = seconds and 1e3 * seconds
+        for name in ("products", "sines", "bytes"):
+            row.facts[name] = sum(getattr(stage, name) for stage in stages) or None
+        return seconds
 
-    def _rates_of(self, contender: Contender, name: str) -> Rates:
+    def _rates_of(self, name: str) -> Rates:
         """Return the machine's rates, or an executor's with a schedule, measured at its first use."""
         limits = self.limits
         assert limits is not None, "the machine is measured first"
@@ -242,100 +199,74 @@ class Contest:
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
 
-    def _too_long(self, seconds: float, by: str) -> str:
-        """Return the reason for which something is left out."""
-        budget = self.request.budget_s
-        return f"left out: a frame would take {seconds:.1f} s by {by}, more than --budget {budget:g} s"
+    def _leave_out(self, row: Row, seconds: float, by: str) -> None:
+        """Note the reason for which something is left out."""
+        budget = f"more than --budget {self.request.budget_s:g} s"
+        row.state, row.reason = SKIPPED, f"left out: a frame would take {seconds:.1f} s by {by}, {budget}"
 
     # ---- times --------------------------------------------------------------------------------------------
 
-    def _race(self, shown: Given, machine: Mapping[str, Callable[[], None]]) -> None:
-        """Let all that are open make frames in turn, with the machine's measurements between them."""
-        turns = {}
-        for name, opened in list(self.opened.items()):
-            self.told(f"warming {name}", 0.08 / len(self.opened))
-            with self._failing(self.rows[name]):
-                turns[name] = self._turns(self.rows[name], opened, shown)
-        for turn in range(self.request.repeats):
-            self.told(f"round {turn + 1} of {self.request.repeats}", 0.4 / self.request.repeats)
-            going = [name for name in self.opened if turn < turns.get(name, 0)]
-            ways = {name: partial(self._turn, name, shown) for name in going}
-            in_turns(ways, 1, 0, self.request.pause_s)
-            self._measure_machine(machine, repeats=1, warm=0)
+    def _warm(self, row: Row, shown: Given) -> None:
+        """Let a contender make a second frame, by which it takes part in as many rounds as the budget allows.
 
-    def _turns(self, row: Row, opened: Opened, shown: Given) -> int:
-        """Return how often a contender may run in the budget; a frame that takes half of it is the only one.
-
-        A kernel is built by then; what a peer compiles with its first frame does not count as a frame.
+        A frame that takes half of it is the only one: a kernel is built by then. What a peer compiles with
+        its first frame does not count as a frame.
         """
-        wanted, budget, frame = self.request.repeats, self.request.budget_s, row.facts["first_frame_s"]
+        repeats, budget, frame = self.request.repeats, self.request.budget_s, row.facts["first_frame_s"]
+        row.round = self._round(row, shown)
         if row.kind != KERNEL or frame <= budget / 2:
             start = time.perf_counter()
-            opened.run(shown)
+            self.opened[row.name].run(shown)
             frame = time.perf_counter() - start
-        turns = min(wanted, int(budget / max(frame, 1e-9)) - 1)
-        if turns < 1:
+        row.most = min(repeats, int(budget / max(frame, 1e-9)) - 1)
+        if row.most < 1:
             row.seconds.append(frame)
             row.reason = f"only one frame: it took {frame:.1f} s of --budget {budget:g} s"
-        elif turns < wanted:
-            row.reason = f"{turns} of {wanted} rounds: a frame takes {frame:.1f} s, --budget is {budget:g} s"
-        return turns
+        elif row.most < repeats:
+            row.reason = (
+                f"{row.most} of {repeats} rounds: a frame takes {frame:.1f} s, --budget is {budget:g} s"
+            )
 
-    def _turn(self, name: str, shown: Given) -> float:
-        """Make a frame and note its time, and the kernel's own; a contender that fails is out."""
-        opened, row = self.opened.get(name), self.rows[name]
-        if opened is None:
-            return 0.0
-        with self._failing(row):
+    def _round(self, row: Row, shown: Given, alone: bool = True) -> Round:
+        """Return a round: a frame, whose time is returned, and the kernel's `alone`, which is noted."""
+        opened = self.opened[row.name]
+
+        def work(_number: int) -> float:
             start = time.perf_counter()
             opened.run(shown)
-            row.seconds.append(time.perf_counter() - start)
-            if opened.kernel_seconds:
+            seconds = time.perf_counter() - start
+            if alone and opened.kernel_seconds:
                 row.kernel_seconds.append(opened.kernel_seconds(shown))
-        return row.seconds[-1] if row.seconds else 0.0
+            return seconds
+
+        return work
 
     def _grow(self, size: int) -> None:
         """Measure at another size all that its time at the nearest size lets hope for."""
         shown, rows = self._given(size), self.sizes.setdefault(size, {})
-        ways = {}
-        for contender in self.contenders:
-            name, hoped = contender.name, self._hoped(contender.name, size)
+        for main in self._going():
+            hoped, predicted = self._hoped(main.name, size), main.facts["predicted_ms"]
             if hoped is None:
                 continue
-            self.told(f"{name} at {size}x{size}", 0.02)
-            row = rows[name] = self._row_of(name, size)
+            facts = {key: main.facts[key] for key in ("products", "sines", "bytes")}
+            facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
+            row = rows[main.name] = Row(main.name, text=main.text, kind=main.kind, facts=facts)
             if hoped > self.request.budget_s:
-                row.state, row.reason = SKIPPED, self._too_long(hoped, "its time at another size")
+                self._leave_out(row, hoped, "its time at another size")
                 continue
-            with self._failing(row):
-                self.opened[name].run(shown)
-                ways[name] = partial(self._turn_of, row, shown)
-        in_turns(ways, min(GROWTH_ROUNDS, self.request.repeats), 0, self.request.pause_s)
-
-    def _row_of(self, name: str, size: int) -> Row:
-        """Return the row of a contender at another size: what it does for a pixel stays."""
-        main = self.rows[name]
-        facts = {key: main.facts[key] for key in ("products", "sines", "bytes")}
-        predicted = main.facts["predicted_ms"]
-        facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
-        return Row(name, main.text, main.kind, MEASURED, facts=facts)
-
-    def _turn_of(self, row: Row, shown: Given) -> float:
-        """Make a frame of another size and note its time."""
-        with self._failing(row):
-            start = time.perf_counter()
-            self.opened[row.name].run(shown)
-            row.seconds.append(time.perf_counter() - start)
-        return row.seconds[-1] if row.seconds else 0.0
+            with row.failing():
+                row.state = MEASURED
+                self.opened[row.name].run(shown)
+                row.round = self._round(row, shown, alone=False)
+            self.told(0.02)
+        take_turns([*rows.values()], min(GROWTH_ROUNDS, self.request.repeats), self.request.pause_s)
 
     def _hoped(self, name: str, size: int) -> float | None:
-        """Return the time that a contender should need at a size; None where nothing is known of it."""
-        known = {
-            self.request.size: self.rows[name],
-            **{at: rows[name] for at, rows in self.sizes.items() if name in rows},
-        }
+        """Return the time that a contender should need at a size; None if it has none, or failed at one."""
+        known = {at: rows[name] for at, rows in self.sizes.items() if name in rows}
+        known[self.request.size] = self.rows[name]
         measured = {at: statistics.median(row.seconds) for at, row in known.items() if row.seconds}
-        if name not in self.opened or not measured:
+        if not measured or any(row.state not in (MEASURED, SKIPPED) for row in known.values()):
             return None
         nearest = min(measured, key=lambda at: abs(at - size))
         return measured[nearest] * (size / nearest) ** 2
@@ -343,48 +274,41 @@ class Contest:
     # ---- quality, and the result --------------------------------------------------------------------------
 
     def _judge(self) -> None:
-        """Note the quality of each contender's pictures of unseen frames."""
+        """Note the quality of each contender's pictures of unseen frames, where there are any."""
         model, pairs = self.request.model, self.request.pairs
+        if not pairs:
+            return
         full = accuracy.full_quality(model, pairs)
         images = {id(noisy): given(model, noisy) for noisy, _ in pairs}
-        for name, opened in list(self.opened.items()):
-            if not pairs:
-                break
-            self.told(f"quality of {name}", 0.05 / len(self.opened))
-            hoped = self._hoped(name, 1)
-            pixels = sum(noisy.height * noisy.width for noisy, _ in pairs)
+        pixels = sum(noisy.height * noisy.width for noisy, _ in pairs)
+        going = self._going()
+        for row in going:
+            opened, hoped = self.opened[row.name], self._hoped(row.name, 1)
             if hoped is not None and hoped * pixels > self.request.budget_s:
-                self.rows[name].facts["quality"] = None
+                row.facts["quality"] = None
                 continue
-            with self._failing(self.rows[name]):
-                self.rows[name].facts["quality"] = accuracy.quality(
-                    model,
-                    pairs,
-                    full,
-                    lambda frame, o=opened: o.display(o.run(images[id(frame)])),  # type: ignore[misc]
-                )
+
+            def show(frame: Frame, opened: Opened = opened) -> NDArray[Any]:
+                return opened.display(opened.run(images[id(frame)]))
+
+            with row.failing():
+                row.facts["quality"] = accuracy.quality(model, pairs, full, show)
+            self.told(0.05 / len(going))
 
     def _begin_anew(self) -> None:
         """Note how long a first frame takes with empty caches, and with what a process before has left."""
         # A form that was trained has a kernel of another network: the process would not have it.
-        by_name = {each.name: each.variant for each in self.contenders}
-        for name in self.opened:
-            if (variant := by_name[name]) and variant.model:
-                continue
-            self.told(f"first run of {name}", 0.05)
-            never, later = first_runs(name, self.request.model, self.request.size)
-            self.rows[name].facts |= {"first_run_s": never, "later_run_s": later}
+        others = {each.name for each in self.contenders if each.variant and each.variant.model}
+        for row in self._going():
+            if row.name not in others:
+                never, later = first_runs(row.name, self.request.model, self.request.size)
+                row.facts |= {"first_run_s": never, "later_run_s": later}
+                self.told(0.05)
 
     def as_data(self) -> dict[str, Any]:
         """Return all that is known so far as JSON's types; the keys are those of spec/bench.md."""
-        request, model = self.request, self.request.model
-        rows = [self._with_rates(row.as_data(), request.size) for row in self.rows.values()]
-        by_name = {row["name"]: row for row in rows}
-        fronts = {
-            part: front({name: of_front(row, part, key, STEPS.get(part)) for name, row in by_name.items()})
-            for part, key in FRONTS.items()
-        }
-        limits = self.limits
+        request, model, limits = self.request, self.request.model, self.limits
+        rows = self._data_of(self.rows, request.size)
         found: dict[str, Any] = clean(
             {
                 "schema": SCHEMA,
@@ -403,35 +327,45 @@ class Contest:
                 },
                 "unseen_frames": len(request.pairs),
                 "limits": limits and asdict(limits),
-                "limits_rounds_s": self.machine,
+                "limits_rounds_s": {entry.name: entry.seconds for entry in self.machine},
                 "rates": {name: asdict(found) for name, found in self.found_rates.items()},
                 "contenders": rows,
-                "front": fronts,
+                "front": {part: front({r["name"]: _point(r, part) for r in rows}) for part in FRONTS},
                 "sizes": [
-                    {
-                        "size_px": size,
-                        "contenders": [self._with_rates(row.as_data(), size) for row in found.values()],
-                    }
+                    {"size_px": size, "contenders": self._data_of(found, size)}
                     for size, found in sorted(self.sizes.items())
                 ],
             }
         )
         return found
 
-    def _with_rates(self, row: dict[str, Any], size: int) -> dict[str, Any]:
-        """Return a row with what follows from its times at a size."""
-        ms, limits, pixels = median_ms(row), self.limits, size * size
-        if ms is None:
-            return row
-        counted = (row["kernel_ms"] or row["ms"])["median"]
-        found: dict[str, Any] = {"frames_per_s": 1e3 / ms}
-        if row.get("products") and limits:
-            flops = 2 * row["products"] * pixels / (1e-3 * counted)
-            memory = row["bytes"] * pixels / (1e-3 * counted)
-            found |= {"gflops": 1e-9 * flops, "of_sgemm": flops / limits.flops_per_s}
-            found |= {"of_memory": memory / limits.bytes_per_s}
-        if row.get("predicted_ms"):
-            found["predicted_over_measured"] = row["predicted_ms"] / ms
-        if "first_frame_s" in row:
-            found["compile_s"] = max(0.0, row["open_s"] + row["first_frame_s"] - 1e-3 * ms)
-        return {**row, **found}
+    def _data_of(self, rows: Mapping[str, Row], size: int) -> list[dict[str, Any]]:
+        """Return the rows of a size as JSON's types, with what follows from their times."""
+        return [
+            data | _derived(data, size * size, self.limits) for data in (r.as_data() for r in rows.values())
+        ]
+
+
+def _derived(row: Mapping[str, Any], pixels: int, limits: rates.Limits | None) -> dict[str, Any]:
+    """Return what follows from a row's times."""
+    if row["ms"] is None:
+        return {}
+    ms, counted_s = row["ms"]["median"], 1e-3 * (row["kernel_ms"] or row["ms"])["median"]
+    found: dict[str, Any] = {"frames_per_s": 1e3 / ms}
+    if row.get("products") and limits:
+        flops, memory = 2 * row["products"] * pixels / counted_s, row["bytes"] * pixels / counted_s
+        found |= {"gflops": 1e-9 * flops, "of_sgemm": flops / limits.flops_per_s}
+        found["of_memory"] = memory / limits.bytes_per_s
+    if row.get("predicted_ms"):
+        found["predicted_over_measured"] = row["predicted_ms"] / ms
+    if "first_frame_s" in row:
+        found["compile_s"] = max(0.0, row["open_s"] + row["first_frame_s"] - 1e-3 * ms)
+    return found
+
+
+def _point(row: Mapping[str, Any], part: str) -> tuple[float | None, float | None]:
+    """Return a row's median time, and the number of one of its parts, to the nearest multiple of a step."""
+    key, step = FRONTS[part]
+    found = (row.get(part) or {}).get(key)
+    median = row["ms"] and row["ms"]["median"]
+    return median, found if step is None or found is None else step * round(found / step)

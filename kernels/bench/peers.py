@@ -11,8 +11,7 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 
 if TYPE_CHECKING:
-    from .contender import Contender
-    from .measure_pipeline import Maker
+    from .pipelines import Maker
 
 GROUP = "wamnet.peers"
 """Group of the entry point, whose value is a module with the names of [`Table`]."""
@@ -24,7 +23,7 @@ Renderer = Callable[[Scene, int, int, Settings], Callable[[int, int], Any]]
 class Table(Protocol):
     """All peers: denoisers, renderers, makers of whole pictures from a scene and a size, and a trainer."""
 
-    contenders: tuple[Contender, ...]
+    contenders: tuple[Any, ...]
     renderers: Mapping[str, Renderer]
     makers: Mapping[str, Callable[[Scene, int], Maker]]
     trainer: Callable[..., Callable[[int], None]]
@@ -38,8 +37,8 @@ def table() -> Table:
     raise ExecutorUnavailable("the baselines are not installed: pip install wamnet-peers")
 
 
-def contenders() -> tuple[Contender, ...]:
-    """Return the denoisers among the peers; none where they are not installed."""
+def contenders() -> tuple[Any, ...]:
+    """Return the denoisers among the peers [`contenders.Contender`]; none where they are not installed."""
     try:
         return table().contenders
     except ExecutorUnavailable:

@@ -32,7 +32,7 @@ from ...refimpl import rng
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor
 from ..devices.images import Images
-from ..measure import Times, in_turns
+from ..measure import Round, Times, in_turns
 from .cost import FLOAT_BYTES, Rates, products_of, sines_of
 
 MATRIX = 4096
@@ -85,15 +85,15 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def machine_ways(scale: int = 1) -> Mapping[str, Callable[[], None]]:
-    """Return the machine's measurements by name; a `scale` of 2 halves each length."""
+def machine_ways(scale: int = 1) -> Mapping[str, Round]:
+    """Return the machine's rounds by name; a `scale` of 2 halves each length."""
     side, count = MATRIX // scale, TRIAD_NUMBERS // scale
     left, product = np.full((side, side), 0.5, np.float32), np.empty((side, side), np.float32)
     b, c, a = (np.full(count, value, np.float32) for value in (1.0, 2.0, 0.0))
     # Arguments between -3 and 3, as those of hidden layers are.
     angles = np.linspace(-3.0, 3.0, BLOCK_NUMBERS, dtype=np.float32)
 
-    def sgemm() -> None:
+    def sgemm(_number: int = 0) -> None:
         np.matmul(left, left, out=product)
 
     def triad(block: slice) -> None:
@@ -123,7 +123,7 @@ def limits_of(times: Mapping[str, Times], scale: int = 1) -> Limits:
     )
 
 
-def _in_threads(work: Callable[[slice], None], blocks: list[slice]) -> None:
+def _in_threads(work: Callable[[slice], None], blocks: list[slice], _number: int = 0) -> None:
     """Do all blocks, a part of them in each thread; NumPy lets other threads run meanwhile."""
     count = cores()
     share = math.ceil(len(blocks) / count)

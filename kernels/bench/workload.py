@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,8 @@ from ...refimpl.network.whole import round_image
 from ..devices.images import Images
 from ..run.denoise_on import images_of
 
-HIDDEN = (32, 32, 32, 32, 3)
-"""The paper's layers after the window."""
+HIDDEN = (32, 32, 32, 32)
+"""The paper's hidden layers."""
 
 OMEGA_0 = 3.0
 """omega_0 of the network without a model: that of the presets."""
@@ -56,13 +57,15 @@ class Given:
         return self.frame.height * self.frame.width
 
 
-def paper_model(features: Sequence[str] = FEATURES) -> Model:
-    """Return the paper's network for these features, with its initial weights."""
+def paper_model(
+    features: Sequence[str] = FEATURES, size: int = 12, hidden: Sequence[int] = HIDDEN, **scales: Any
+) -> Model:
+    """Return an untrained network for these features, by default the paper's: windows of `size` pixels."""
     dataset.check_features(features)
-    window = dataset.Window(12, "clamp")
-    widths = [dataset.n_inputs(features, window), *HIDDEN]
+    window = dataset.Window(size, "clamp")
+    widths = [dataset.n_inputs(tuple(features), window), *hidden, 3]
     network = siren.init(widths, OMEGA_0, OMEGA_0, seed=1, dtype=np.float32)
-    return Model(network, tuple(features), window, dataset.Normalization())
+    return Model(network, tuple(features), window, dataset.Normalization(**scales))
 
 
 def given(model: Model, frame: Frame) -> Given:
@@ -86,13 +89,15 @@ def noise(size: int, seed: int = 1) -> Frame:
 
 def filled(frame: Frame, size: int) -> Frame:
     """Return a frame (size, size) that repeats this one."""
+    return Frame({name: repeated(layer, size) for name, layer in frame.layers.items()}, frame.info)
+
+
+def repeated(image: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Return an image (H, W, C) beside and below itself until it has size x size pixels."""
     check_size(size)
-    rows, columns = (-(-size // length) for length in (frame.height, frame.width))
-
-    def repeated(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.ascontiguousarray(np.tile(values, (rows, columns, 1))[:size, :size], np.float32)
-
-    return Frame({name: repeated(values) for name, values in frame.layers.items()}, frame.info)
+    height, width, _ = image.shape
+    many = np.tile(image, (-(-size // height), -(-size // width), 1))
+    return np.ascontiguousarray(many[:size, :size], np.float32)
 
 
 def check_size(size: int) -> None:

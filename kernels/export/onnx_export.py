@@ -19,7 +19,7 @@ from ...refimpl.network.activation import RELU, SINE
 from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.whole import COLOUR_STEPS, SINES, TURN, Whole
-from ..bench.contender import activation_in
+from ..bench.contenders import activation_in
 
 OPERATORS = 17
 """Version of the operators: the graph uses none that is newer."""

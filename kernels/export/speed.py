@@ -3,24 +3,20 @@
 1. What runs the target's kernels here builds a text that no driver has seen: the seconds to compile it
    [`_unseen`].
 2. It denoises a picture of the usual size several times; the images of the check pair, repeated, are its
-   input [`_repeated`].
+   input [`repeated`].
 """
 
 from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...compiler.artifact import Artifact
 from ...refimpl.errors import InputError
-from ..devices.executor import Executor
-from ..measure import Clock, Times, in_turns
+from ..bench.workload import repeated
+from ..measure import PAUSE_S, Clock, Entry, take_turns
 from .check import runner
 from .package import Export
 from .runners import WAYS
@@ -63,15 +59,22 @@ def measure(
     check_measured(export.target)
     assert export.denoiser is not None, "targets that are measured have kernels"
     denoiser = _unseen(export.denoiser)
-    images = {name: _repeated(image, size) for name, image in export.pair.images.items()}
+    images = {name: repeated(image, size) for name, image in export.pair.images.items()}
     with runner(export.target, denoiser.target) as opened:
+
+        def picture(_number: int) -> None:
+            opened.run(denoiser, images)
+
+        entry = Entry("denoiser", round=picture)
         start = clock()
         opened.build(denoiser, (size, size))
-        _run(opened, denoiser, images)
-        first, ways = clock() - start, {"frame": lambda: _run(opened, denoiser, images)}
-        found = in_turns(ways, rounds, warm=0, clock=clock)["frame"]
+        picture(0)
+        first = clock() - start
+        take_turns([entry], rounds, PAUSE_S, clock=clock)
+        median, ms = entry.times.median, [MS * seconds for seconds in entry.seconds]
         # Some drivers compile when a kernel first runs: what that took beyond a picture is theirs.
-        return _speed(WAYS[export.target].route + opened.device, size, found, max(0.0, first - found.median))
+        device, compiled = WAYS[export.target].route + opened.device, max(0.0, first - median)
+        return Speed(device, size, rounds, MS * median, min(ms), max(ms), compiled)
 
 
 def _unseen(denoiser: Artifact) -> Artifact:
@@ -87,21 +90,3 @@ def check_measured(target: str) -> None:
         rule = "does not run on real hardware here, so a time would be meaningless"
         known = ", ".join(name for name, each in WAYS.items() if not each.stands_in)
         raise InputError("--measure with target", target, rule, f"leave it out, or choose one of {known}")
-
-
-def _run(opened: Executor, denoiser: Artifact, images: Mapping[str, NDArray[np.float32]]) -> None:
-    """Denoise once; nothing is returned, so that the round is timed as a whole."""
-    opened.run(denoiser, images)
-
-
-def _speed(device: str, size: int, times: Times, compiled: float) -> Speed:
-    """Return the numbers of a README."""
-    least, most = min(times.seconds), max(times.seconds)
-    return Speed(device, size, len(times.seconds), MS * times.median, MS * least, MS * most, compiled)
-
-
-def _repeated(image: NDArray[np.float32], size: int) -> NDArray[np.float32]:
-    """Return an image (H, W, C) beside and below itself until it has size x size pixels."""
-    height, width, _ = image.shape
-    whole = np.tile(image, (-(-size // height), -(-size // width), 1))
-    return np.ascontiguousarray(whole[:size, :size])

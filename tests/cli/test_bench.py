@@ -160,7 +160,7 @@ def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> Non
 
 def test_absent_peers_are_named(wamnet, here, monkeypatch) -> None:
     """In the result, in its text, and on the terminal, with the command that installs them."""
-    monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
+    monkeypatch.setattr("wamnet.kernels.bench.contenders.find_spec", lambda name: None)
     only = "numpy:plain,torch*,oidn*,onnx*,tinygrad"
     outcome = wamnet("bench", "model.safetensors", "--only", only, "--size", 8, "--repeats", 1, "-o", "s")
     assert outcome.status == 0
@@ -344,7 +344,7 @@ def test_noise_is_measured_on_request(wamnet, here, named) -> None:
 
 def test_the_shipped_model_is_measured_by_default(monkeypatch) -> None:
     """It names a scene, so that frames of it can be rendered."""
-    wanted = bench.Wanted(None, None, (), synthetic=False, trains=True)
+    wanted = bench.Wanted(train_variants=True)
     name, network = wanted.network()
     wanted.check(network)
     assert name == "minicubes"

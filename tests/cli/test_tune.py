@@ -7,7 +7,6 @@ import shutil
 
 import pytest
 
-from wamnet.cli.commands import tune
 from wamnet.kernels import cache
 from wamnet.kernels.run import tune as tuning
 
@@ -73,7 +72,6 @@ def test_refusals_of_tune(refused, here) -> None:
 
 def test_without_a_model_the_network_is_the_paper_s(wamnet, here) -> None:
     """The interpreter has one schedule, and is timed too."""
-    assert tune.paper().siren.widths == (864, 32, 32, 32, 32, 3)
     outcome = wamnet("tune", "--executor", "numpy", "--size", 4)
     assert outcome.status == 0
     assert "4x4, 864-32-32-32-32-3, color + normal, window 12 (clamp)" in outcome.out

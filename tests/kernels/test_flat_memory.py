@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.kernels.bench.measure_pipeline import moments, random_model
+from wamnet.kernels.bench.pipelines import moments, random_model
 from wamnet.kernels.run.pipeline import Pipeline
 
 pytestmark = pytest.mark.apart

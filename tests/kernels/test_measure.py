@@ -36,3 +36,19 @@ def test_a_way_may_measure_itself() -> None:
     assert times.seconds == (3.0, 1.0, 2.0)
     assert times.median == 2.0
     assert times.spread == (3.0 - 1.0) / 2.0
+
+
+def test_entries_open_and_take_turns_while_they_are_in() -> None:
+    """Round 0 is not measured; one takes part in a single round, another has no round and is out."""
+    order: list[tuple[str, int]] = []
+
+    def opened(name: str) -> Callable[[], measure.Round]:
+        return lambda: lambda number: order.append((name, number))
+
+    entries = [measure.Entry("a", opened("a")), measure.Entry("b", opened("b"), most=1)]
+    done = [0]
+    measure.begin(entries)
+    measure.take_turns([*entries, measure.Entry("out")], 2, done=lambda: done.append(len(order)))
+    assert order == [("a", 0), ("b", 0), ("a", 1), ("b", 1), ("a", 2)]
+    assert [len(entry.seconds) for entry in entries] == [2, 1]
+    assert done == [0, 3, 4, 4, 5, 5, 5]

@@ -63,7 +63,7 @@ def exports(
     shown = scene_source(scene).at(TIME_S)
     chosen = tuple(NAMES) if targets is None else names_of("--targets", targets, NAMES)
     network = load_model(model) if model else random_model()
-    head(*HEAD)
+    head(*HEAD, apart=False)
     wrong = 0
     for target in chosen:
         for place in places_of(target, places):

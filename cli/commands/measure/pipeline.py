@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ....refimpl.errors import ExecutorUnavailable, InputError
 from ...common.terminal import say
 from .shared import (
+    NUMPY,
     Repeats,
     SceneShown,
-    check_count,
+    check_counts,
     counts_of,
     extent,
-    facts,
     head,
     names_of,
-    numpy_version,
     row,
+    say_facts,
 )
 
 if TYPE_CHECKING:
-    from ....kernels.bench.measure_pipeline import Maker, Measured
+    from ....kernels.measure import Entry
     from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -35,13 +35,6 @@ wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --pe
 
 wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
 """Shown below the help of `wamnet bench pipeline`."""
-
-Peers = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
-    ),
-]
 
 
 def pipeline(
@@ -66,7 +59,12 @@ def pipeline(
         ),
     ] = 0,
     repeats: Repeats = 5,
-    peers: Peers = "",
+    peers: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
+        ),
+    ] = "",
 ) -> None:
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 
@@ -77,34 +75,29 @@ def pipeline(
     caches, in a separate process, all kernels. The network has random weights.
     """
     from ....kernels import EXECUTORS
-    from ....kernels.bench import measure_pipeline as measuring
-    from ....kernels.bench.workload import check_size
+    from ....kernels.bench import pipelines
     from ....models.data.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
 
     scene_source(scene)
     given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
-    others = names_of("--peers", peers, measuring.PEERS) if peers else ()
-    for size in widths:
-        check_size(size)
-    check_count("--window", window, 12)
-    check_count("--repeats", repeats, 5)
+    others = names_of("--peers", peers, pipelines.PEERS) if peers else ()
+    check_counts(widths, window=(window, 12), repeats=(repeats, 5))
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
-    model = measuring.random_model(seen, window, layers)
+    model = pipelines.random_model(seen, window, layers)
     rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
     network = f"network {'-'.join(map(str, model.siren.widths))}"
-    say(", ".join(facts(numpy_version(), f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)))
-    say("")
+    say_facts(NUMPY, f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)
     head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
     notes: dict[str, None] = {}
     for size in widths:
-        _show(_rows(given, others, model, scene, size, repeats, notes, feature_rays), size)
+        _show(_entries(given, others, model, scene, size, repeats, notes, feature_rays), size)
     for line in ("", *notes) if notes else ():
         say(line)
 
 
-def _rows(
+def _entries(
     given: Sequence[str],
     others: Sequence[str],
     model: Model,
@@ -113,54 +106,47 @@ def _rows(
     repeats: int,
     notes: dict[str, None],
     rays: int,
-) -> list[Measured]:
-    """Return all rows of a size: what takes turns, then first pictures."""
+) -> list[Entry]:
+    """Return all rows of a size: what takes turns, then first pictures; note what others are, or lack."""
     from ....kernels import open_executor
-    from ....kernels.bench.first_picture import first_picture
-    from ....kernels.bench.measure_pipeline import Measured, first_pictures, measured
+    from ....kernels.bench import peers, pipelines
+    from ....kernels.bench.fresh import first_picture
+    from ....kernels.measure import Entry, begin, take_turns
 
-    with ExitStack() as stack:
+    with ExitStack() as stack, ExitStack() as pipes:
+        found: list[Entry] = []
         opened = [stack.enter_context(open_executor(name)) for name in given]
-        makers = _makers(stack, others, scene, size, notes)
-        found = measured(opened, model, scene, size, repeats, makers, rays)
-        for executor in opened:
-            news = tuple(first_pictures(executor, model, scene, size, rays))
-            found.append(Measured(executor.name, "first picture of a new scene", news))
+        for each in opened:
+            found += pipelines.entries(each.name, pipelines.ways_of(pipes, each, model, scene, size, rays))
+        shots = pipelines.moments(scene)
+        for name in others:
+            try:
+                maker = peers.table().makers[name](shots[0], size)
+            except (ExecutorUnavailable, InputError) as error:
+                notes[f"No row: {error}"] = None
+                continue
+            stack.callback(maker.close)
+            notes[f"{name}: {maker.about}"] = None
+            found += pipelines.entries(name, maker.ways(shots))
+        begin(found)
+        take_turns(found, repeats, pipelines.PAUSE_S)
+        pipes.close()
+        for each in opened:
+            seconds = pipelines.first_pictures(each, model, scene, size, rays)
+            found.append(Entry("first picture of a new scene", by=each.name, seconds=seconds))
     for name in given:
         if (cold := first_picture(name, model, scene, size)) is not None:
-            found.append(Measured(name, "first picture, empty caches", (cold,)))
+            found.append(Entry("first picture, empty caches", by=name, seconds=[cold]))
     return found
 
 
-def _makers(
-    stack: ExitStack, names: Sequence[str], scene: str, size: int, notes: dict[str, None]
-) -> dict[str, Maker]:
-    """Open other makers of pictures until the stack is closed; note what they are, or why one is missing."""
-    from ....kernels.bench import measure_pipeline as measuring
-    from ....kernels.bench import peers
-    from ....refimpl.errors import ExecutorUnavailable, InputError
-
-    makers: dict[str, Maker] = {}
-    for name in names:
-        try:
-            makers[name] = peers.table().makers[name](measuring.moments(scene)[0], size)
-        except (ExecutorUnavailable, InputError) as error:
-            notes[f"No row: {error}"] = None
-        else:
-            stack.callback(makers[name].close)
-            notes[f"{name}: {makers[name].about}"] = None
-    return makers
-
-
-def _show(found: Sequence[Measured], size: int) -> None:
+def _show(found: Sequence[Entry], size: int) -> None:
     """Print the rows of a size; pictures a second are those of whole pictures that were not the first."""
-    from ....kernels.bench.measure_pipeline import MOVING
+    from ....kernels.bench.pipelines import MOVING
 
-    ours = next(statistics.median(each.seconds) for each in found if each.way == MOVING)
+    ours = next(each.times.median for each in found if each.name == MOVING)
     for each in found:
-        ms, median = [1e3 * second for second in each.seconds], statistics.median(each.seconds)
-        whole = not each.way.startswith(("of it", "first"))
-        rate = f"{1.0 / median:.2f}" if whole else ""
-        ratio = f"{median / ours:.2f}" if whole else ""
-        cells = (f"{statistics.median(ms):.1f}", extent(ms, 1), rate, ratio)
-        row(each.by, f"{size}x{size}", each.way, *cells)
+        ms, median = [1e3 * second for second in each.seconds], each.times.median
+        whole = not each.name.startswith(("of it", "first"))
+        rates = (f"{1.0 / median:.2f}", f"{median / ours:.2f}") if whole else ("", "")
+        row(each.by, f"{size}x{size}", each.name, f"{1e3 * median:.1f}", extent(ms, 1), *rates)

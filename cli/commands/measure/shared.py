@@ -19,6 +19,9 @@ from ...reports import machine
 MOST = 1 << 20
 """Largest count that an option takes: a typing error is refused before anything is measured."""
 
+NUMPY = f"NumPy {metadata.version('numpy')}"
+"""NumPy's version, with its name."""
+
 Repeats = Annotated[int, typer.Option(help="Number of interleaved rounds.")]
 SceneShown = Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}) or scene file.")]
 Square = Annotated[int, typer.Option(help="Width and height in pixels.")]
@@ -45,24 +48,27 @@ def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
     return counts
 
 
-def check_count(option: str, value: int, example: int) -> None:
-    """Refuse a number of things that makes none."""
-    if not 1 <= value <= MOST:
-        raise InputError(option, value, f"must be from 1 to {MOST}", f"for example {option} {example}")
+def check_counts(sizes: Iterable[int] = (), **counts: tuple[int, int]) -> None:
+    """Refuse sizes of which no picture is made, and numbers of things that make none: (value, example)."""
+    from ....kernels.bench.workload import check_size
+
+    for size in sizes:
+        check_size(size)
+    for name, (value, example) in counts.items():
+        if not 1 <= value <= MOST:
+            option = f"--{name}"
+            raise InputError(option, value, f"must be from 1 to {MOST}", f"for example {option} {example}")
 
 
-def facts(*others: str) -> list[str]:
-    """Return what is said of the machine, then what else was given."""
-    return [*(f"{name} {value}" for name, value in machine.describe().items()), *others]
+def say_facts(*others: str) -> None:
+    """Print what is said of the machine, then what else was given."""
+    say(", ".join([*(f"{name} {value}" for name, value in machine.describe().items()), *others]))
 
 
-def numpy_version() -> str:
-    """Return NumPy's version, with its name."""
-    return f"NumPy {metadata.version('numpy')}"
-
-
-def head(*cells: str) -> None:
-    """Print the head of a table."""
+def head(*cells: str, apart: bool = True) -> None:
+    """Print the head of a table, apart from what is above it by an empty line."""
+    if apart:
+        say("")
     row(*cells)
     say(f"|{'---|' * len(cells)}")
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import statistics
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ....refimpl.errors import InputError
 from ...common.terminal import progress, say
 from ...reports import machine
-from .shared import Repeats, Square, check_count, extent, facts, head, names_of, row
-
-if TYPE_CHECKING:
-    from ....refimpl.network.train import Recipe
+from .shared import Repeats, Square, check_counts, extent, head, names_of, row, say_facts
 
 EXAMPLES = """Examples:
 
@@ -53,41 +49,32 @@ def train(
     products, their share of the large product's rate, and the time that all steps would take. [bold]pip
     install torch[/] adds PyTorch.
     """
-    from ....kernels.bench import measure_train as measuring
-    from ....kernels.bench.workload import check_size
+    from ....kernels.bench import training
+    from ....kernels.measure import begin, take_turns
     from ....refimpl.network.train import PRESETS
 
     names = names_of("--presets", presets, PRESETS)
-    given = measuring.trainers() if trainers is None else names_of("--trainers", trainers, measuring.TRAINERS)
-    check_size(size)
-    check_count("--frames", frames, 4)
-    check_count("--repeats", repeats, 5)
+    given = training.trainers() if trainers is None else names_of("--trainers", trainers, training.TRAINERS)
+    check_counts([size], frames=(frames, 4), repeats=(repeats, 5))
     if not 0.0 < seconds <= LONGEST_S:
         rule = f"must be above 0 and at most {LONGEST_S:g}"
         raise InputError("--seconds", seconds, rule, "for example --seconds 1")
     packages = [f"{name} {value}" for name, value in machine.versions().items()]
-    say(", ".join(facts(*packages, f"{frames} frames of {size}x{size}")))
-    pairs = measuring.noise(frames, size)
-    for preset in names:
-        recipe = PRESETS[preset]
-        with progress(f"measuring {preset}", len(given) * repeats, "rounds") as advance:
-            times, sgemm = measuring.measured(recipe, pairs, given, seconds, repeats, partial(advance, 1.0))
-        _show(preset, recipe, times, sgemm)
-
-
-def _show(preset: str, recipe: Recipe, seconds: dict[str, list[float]], sgemm: float) -> None:
-    """Print one preset's table."""
-    from ....kernels.bench.measure_train import operations
-
-    work = operations(recipe)
-    say("")
-    say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {sgemm / 1e9:.0f} GFLOP/s")
-    say("")
-    head("by", "ms a step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
-    for name, times in seconds.items():
-        median = statistics.median(times)
-        row(
-            *(name, f"{1e3 * median:.2f}", extent([1e3 * time for time in times], 2)),
-            *(f"{work / median / 1e9:.0f}", f"{work / median / sgemm:.0%}"),
-            f"{median * recipe.steps:,.0f} s",
-        )
+    say_facts(*packages, f"{frames} frames of {size}x{size}")
+    pairs = training.noise(frames, size)
+    for recipe, preset in ((PRESETS[name], name) for name in names):
+        entries, product = training.entries(recipe, pairs, given, seconds), training.sgemm()
+        with progress(f"measuring {preset}", (len(given) + 1) * repeats, "rounds") as advance:
+            begin([product, *entries], warm=0)
+            take_turns([product, *entries], repeats, done=partial(advance, 1.0))
+        work, most = training.operations(recipe), product.facts["operations"] / min(product.seconds)
+        say("")
+        say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {most / 1e9:.0f} GFLOP/s")
+        head("by", "ms a step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
+        for entry in entries:
+            median = entry.times.median
+            row(
+                *(entry.name, f"{1e3 * median:.2f}", extent([1e3 * time for time in entry.seconds], 2)),
+                *(f"{work / median / 1e9:.0f}", f"{work / median / most:.0%}"),
+                f"{median * recipe.steps:,.0f} s",
+            )

@@ -12,7 +12,7 @@ import pytest
 from wamnet.compiler import variants
 from wamnet.compiler.plan import sine_contract
 from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
-from wamnet.kernels.bench.contender import FULL, Contender, Opened, Tools, Variant, parameters_of
+from wamnet.kernels.bench.contenders import FULL, Contender, Opened, Tools, Variant, parameters_of
 from wamnet.kernels.bench.cost import Stage
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame

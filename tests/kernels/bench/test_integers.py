@@ -8,7 +8,7 @@ import pytest
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.bench import contenders, workload
 from wamnet.kernels.bench.accuracy import Crop
-from wamnet.kernels.bench.contender import Tools
+from wamnet.kernels.bench.contenders import Tools
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise
 from wamnet_peers import peer_onnxruntime, peer_openvino

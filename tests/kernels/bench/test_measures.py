@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wamnet.kernels import measure
-from wamnet.kernels.bench import measure_primitives, measure_render, measure_train
+from wamnet.kernels.bench import crowd, fresh, paths, training
 from wamnet.refimpl.light.scene import primitives
 from wamnet.refimpl.network.train import PRESETS
 
@@ -20,15 +20,15 @@ def variables(names):
 
 @pytest.mark.parametrize("fails", [False, True])
 def test_environment_is_put_back(monkeypatch, fails) -> None:
-    for name in (*measure_render.CACHES, *measure_primitives.NO_CACHES):
+    for name in (*fresh.CACHES, *paths.NO_CACHES):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", "here")
     monkeypatch.setenv("POCL_KERNEL_CACHE", "1")
-    before = variables((*measure_render.CACHES, *measure_primitives.NO_CACHES))
+    before = variables((*fresh.CACHES, *paths.NO_CACHES))
     try:
-        with measure_render.empty_caches(), measure.environment(measure_primitives.NO_CACHES):
-            assert all(Path(os.environ[name]).is_dir() for name in measure_render.CACHES)
-            assert variables(measure_primitives.NO_CACHES) == measure_primitives.NO_CACHES
+        with fresh.empty_caches(), measure.environment(paths.NO_CACHES):
+            assert all(Path(os.environ[name]).is_dir() for name in fresh.CACHES)
+            assert variables(paths.NO_CACHES) == paths.NO_CACHES
             if fails:
                 raise KeyboardInterrupt
     except KeyboardInterrupt:
@@ -36,11 +36,11 @@ def test_environment_is_put_back(monkeypatch, fails) -> None:
     assert variables(before) == before
 
 
-@pytest.mark.parametrize("kind", measure_primitives.KINDS)
+@pytest.mark.parametrize("kind", crowd.KINDS)
 def test_a_crowd_is_as_large_as_stated_and_the_same_again(kind) -> None:
     """Edges of quads are at right angles and as long as the size, with 8 u of rounding for three products."""
-    scene = measure_primitives.crowd(kind, 12)
-    assert scene == measure_primitives.crowd(kind, 12)
+    scene = crowd.crowd(kind, 12)
+    assert scene == crowd.crowd(kind, 12)
     assert scene.name == f"{kind} 12"
     assert primitives(scene) == 12 + len(scene.lights)
     parts = (*scene.boxes, *scene.spheres, *scene.quads)
@@ -52,7 +52,7 @@ def test_a_crowd_is_as_large_as_stated_and_the_same_again(kind) -> None:
 
 
 def test_noise_is_other_noise_in_each_frame() -> None:
-    frames = [frame["color"] for pair in measure_train.noise(2, 4) for frame in pair]
+    frames = [frame["color"] for pair in training.noise(2, 4) for frame in pair]
     assert len({frame.tobytes() for frame in frames}) == 4
 
 
@@ -60,4 +60,4 @@ def test_operations_are_those_of_three_products() -> None:
     """Two for each weight and example; inputs of the first layer have no derivative."""
     recipe = PRESETS["short"]
     first, *_ = layers = [a * b for a, b in zip(recipe.layer_widths, recipe.layer_widths[1:], strict=False)]
-    assert measure_train.operations(recipe) == recipe.batch * (6 * sum(layers) - 2 * first)
+    assert training.operations(recipe) == recipe.batch * (6 * sum(layers) - 2 * first)

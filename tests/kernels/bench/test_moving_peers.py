@@ -13,7 +13,7 @@ import pytest
 from packages import needed
 from statistical import assert_all_plausible, welch_p
 
-from wamnet.kernels.bench import measure_pipeline, measure_primitives
+from wamnet.kernels.bench import paths, pipelines
 from wamnet.kernels.bench.workload import noise
 from wamnet.kernels.run.render_on import render_on
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
@@ -142,5 +142,5 @@ def test_a_kept_filter_is_the_filter(quality) -> None:
 
 @pytest.mark.nightly
 def test_every_peer_can_be_named() -> None:
-    assert set(measure_pipeline.PEERS) == set(table.makers)
-    assert set(measure_primitives.PEERS) == set(table.renderers)
+    assert set(pipelines.PEERS) == set(table.makers)
+    assert set(paths.PEERS) == set(table.renderers)

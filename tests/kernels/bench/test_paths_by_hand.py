@@ -10,7 +10,7 @@ from statistical import SIGNIFICANCE, assert_all_plausible, sidak, welch_p
 
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.bench.measure_primitives import crowd
+from wamnet.kernels.bench.crowd import crowd
 from wamnet.kernels.devices.kernel import Part
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes

@@ -15,7 +15,7 @@ from wamnet.compiler.core.profiles import SineContract
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.kernels.bench import workload
-from wamnet.kernels.bench.contender import Tools
+from wamnet.kernels.bench.contenders import Tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, siren
@@ -91,7 +91,7 @@ def test_another_denoiser_makes_a_picture(peer) -> None:
 
 
 def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch) -> None:
-    monkeypatch.setattr("wamnet.kernels.bench.contender.find_spec", lambda name: None)
+    monkeypatch.setattr("wamnet.kernels.bench.contenders.find_spec", lambda name: None)
     for peer in table.contenders:
         text = f"not installed: {', '.join(peer.packages)}; pip install {' '.join(peer.packages)}"
         assert peer.missing() == text
@@ -115,11 +115,11 @@ def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
 @pytest.mark.needs("programs")
 def test_first_runs_are_those_of_another_process(monkeypatch) -> None:
     """The interpreter's has two; one that fails has none."""
-    from wamnet.kernels.bench import first_run
+    from wamnet.kernels.bench import fresh
 
     network = siren.init((2 * 2 * 3, 4, 3), 3.0, 3.0, seed=1, dtype=np.float32)
     model = Model(network, ("color",), Window(2), Normalization())
-    never, later = first_run.first_runs("numpy:plain", model, 64)
+    never, later = fresh.first_runs("numpy:plain", model, 64)
     assert never is not None
     assert later is not None
-    assert first_run.first_runs("nobody", model, 64) == (None, None)
+    assert fresh.first_runs("nobody", model, 64) == (None, None)

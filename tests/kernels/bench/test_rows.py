@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.bench.result import Row, clean, front, milliseconds
+from wamnet.kernels.bench.rows import Row, clean, front, milliseconds
 
 NUMBERS = st.one_of(st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.just(math.nan), st.none())
 """Few values, so that ties are common."""
@@ -62,7 +62,7 @@ def test_times_are_told_in_milliseconds() -> None:
 
 
 def test_a_row_that_was_not_reached() -> None:
-    assert Row("a", "what", "peer").as_data() == {
+    assert Row("a", text="what", kind="peer").as_data() == {
         "name": "a",
         "text": "what",
         "kind": "peer",
@@ -75,5 +75,7 @@ def test_a_row_that_was_not_reached() -> None:
 
 def test_without_a_time_nothing_was_measured() -> None:
     """An interrupt between the first frame and the rounds."""
-    assert Row("a", "what", "peer", state="measured").as_data()["state"] == "pending"
-    assert Row("a", "what", "peer", state="measured", seconds=[1.0]).as_data()["state"] == "measured"
+    assert Row("a", text="what", kind="peer", state="measured").as_data()["state"] == "pending"
+    assert (
+        Row("a", text="what", kind="peer", state="measured", seconds=[1.0]).as_data()["state"] == "measured"
+    )

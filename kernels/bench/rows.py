@@ -1,4 +1,4 @@
-"""What a benchmark has found, as JSON's types, and which points of it are worth choosing.
+"""Rows of the benchmark of denoisers as JSON's types, and which of them are worth choosing.
 
 The keys are documented in spec/bench.md. A number that is not finite, or was not measured, is null.
 """
@@ -6,35 +6,58 @@ The keys are documented in spec/bench.md. A number that is not finite, or was no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..measure import Times
+from ...refimpl.errors import ExecutorUnavailable, WamnetError
+from ..measure import Clock, Entry, Times
 
 SCHEMA = "wamnet-bench-2"
 """Name and version of the form of the data."""
 
 MEASURED, MISSING, SKIPPED, FAILED, PENDING = "measured", "missing", "skipped", "failed", "pending"
-"""States of a contender: `pending` is one that an interrupted run has not come to."""
-
+"""States of a row: `pending` is one that an interrupted run has not come to."""
 
 KERNEL, PEER = "kernel", "peer"
-"""Kinds of contenders: what this compiler makes, and what others make."""
+"""Kinds of rows: what this compiler makes, and what others make."""
+
+MOST_TOLD = 200
+"""Characters of a peer's error that are repeated."""
 
 
 @dataclass
-class Row:
-    """What is known of a contender; `state` says how far it got, `reason` why no further."""
+class Row(Entry):
+    """An entry whose failure does not end the run: `state` says how far it got, `reason` why no further."""
 
-    name: str
-    text: str
-    kind: str
+    text: str = ""
+    kind: str = KERNEL
     state: str = PENDING
     reason: str = ""
-    facts: dict[str, Any] = field(default_factory=dict)
-    seconds: list[float] = field(default_factory=list)
     kernel_seconds: list[float] = field(default_factory=list)
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Let an error put the row out; a peer may raise what it likes, others only our errors."""
+        try:
+            yield
+            return
+        except ExecutorUnavailable as error:
+            self.state, self.reason = MISSING, str(error)
+        except (WamnetError, MemoryError) as error:
+            self.state, self.reason = FAILED, str(error) or type(error).__name__
+        except Exception as error:
+            if self.kind != PEER:
+                raise
+            told = " ".join(str(error).split())[:MOST_TOLD]
+            self.state, self.reason = FAILED, f"{type(error).__name__}: {told}"
+        self.round = None
+
+    def turn(self, number: int, clock: Clock) -> None:
+        """Do a round; one that fails is the last."""
+        with self.failing():
+            super().turn(number, clock)
 
     def as_data(self) -> dict[str, Any]:
         """Return the row as JSON's types."""
@@ -66,14 +89,11 @@ def front(points: Mapping[str, tuple[float | None, float | None]]) -> list[str]:
         for name, (time, error) in points.items()
         if time is not None and error is not None and math.isfinite(time) and math.isfinite(error)
     }
-    on_it = [
-        name
-        for name, point in known.items()
-        if not any(
-            other[0] <= point[0] and other[1] <= point[1] and other != point for other in known.values()
-        )
-    ]
-    return sorted(on_it, key=lambda name: known[name])
+
+    def beaten(point: tuple[float, float]) -> bool:
+        return any(o[0] <= point[0] and o[1] <= point[1] and o != point for o in known.values())
+
+    return sorted((name for name, point in known.items() if not beaten(point)), key=lambda name: known[name])
 
 
 def clean(value: Any) -> Any:
@@ -86,17 +106,3 @@ def clean(value: Any) -> Any:
         return value
     number = float(value)
     return number if math.isfinite(number) else None
-
-
-def median_ms(row: Mapping[str, Any]) -> float | None:
-    """Return a row's median time, if it has one."""
-    found: float | None = row["ms"] and row["ms"]["median"]
-    return found
-
-
-def of_front(
-    row: Mapping[str, Any], part: str, key: str, step: float | None = None
-) -> tuple[float | None, float | None]:
-    """Return a row's median time, and a number of one of its parts, to the nearest multiple of a step."""
-    found = (row.get(part) or {}).get(key)
-    return median_ms(row), found if step is None or found is None else step * round(found / step)

@@ -3,12 +3,10 @@
 1. Ours is one pipeline on a device. A scene that moves shows another moment in every picture: its numbers are
    inputs of one kernel [`moments`]. Its parts are each ended by waiting for the device [`_parts`].
 2. Beside it are the same pipeline of one moment, and the separate way by kernels of the same executor: trace
-   all layers, read them back, encode in float64, upload, denoise, read back.
-3. Other makers of whole pictures show the same moments: a renderer and a denoiser [`PEERS`, moving.py].
-4. All executors and makers take turns in one run, so that drift of the machine's speed affects them alike;
-   everything is compiled before, and has made a picture [`measured`].
-5. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
-   [`first_pictures`]; a process that finds empty caches compiles everything [first_picture.py].
+   all layers, read them back, encode in float64, upload, denoise, read back [`entries`].
+3. Other makers of whole pictures show the same moments: a renderer and a denoiser [`Maker`].
+4. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
+   [`first_pictures`]; a process that finds empty caches compiles everything [fresh.py].
 
 The network has random weights: speed does not depend on them [`random_model`].
 """
@@ -19,26 +17,23 @@ import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
-
-import numpy as np
 
 from ...compiler.compile import compile_plan
 from ...compiler.variants import plan_model
 from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
 from ..devices.passes import PICTURE
-from ..measure import in_turns
+from ..measure import Entry
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
 from ..run.tune import choose
+from .workload import paper_model
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -48,7 +43,6 @@ STEP_S = 0.1
 
 NEW_SCENES = 3
 """Scenes that are compiled."""
-
 
 PAUSE_S = 0.1
 """Seconds before each measurement: threads of a library that ran before may spin for a while."""
@@ -86,62 +80,31 @@ def moments(name: str) -> list[Scene]:
 
 def random_model(features: Sequence[str], size: int, hidden: Sequence[int]) -> Model:
     """Return a model with random weights for these features, windows of `size` pixels and hidden layers."""
-    dataset.check_features(features)
-    window = dataset.Window(size)
-    widths = [dataset.n_inputs(tuple(features), window), *hidden, 3]
-    network = siren.init(widths, 3.0, 3.0, seed=1, dtype=np.float32)
-    return Model(
-        network, tuple(features), window, dataset.Normalization(depth_scale=20.0, position_scale=10.0)
-    )
+    return paper_model(features, size, hidden, depth_scale=20.0, position_scale=10.0)
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Seconds of each way of one size: who makes the pictures, what is measured, and its turns."""
+def entries(by: str, ways: Mapping[str, Callable[[], Any]]) -> list[Entry]:
+    """Return what is measured of a maker of pictures; a number that is returned is seconds."""
 
-    by: str
-    way: str
-    seconds: tuple[float, ...]
+    def opened(way: Callable[[], Any]) -> Callable[[int], float | None]:
+        def work(_number: int) -> float | None:
+            own = way()
+            return own if isinstance(own, float) else None
+
+        return work
+
+    return [Entry(name, partial(opened, way), by) for name, way in ways.items()]
 
 
-def measured(
-    executors: Sequence[Executor],
-    model: Model,
-    name: str,
-    size: int,
-    repeats: int,
-    makers: Mapping[str, Maker] | None = None,
-    rays: int = 0,
-) -> list[Measured]:
-    """Return the times of all ways, in seconds: of every executor, then of other makers, by name.
+def ways_of(
+    stack: ExitStack, executor: Executor, model: Model, name: str, size: int, rays: int
+) -> dict[str, Callable[[], Any]]:
+    """Return the ways of an executor, whose pipelines are open until the stack is closed.
 
     Features are of `rays` camera rays; 0: of the paths' own.
     """
-    shots = moments(name)
-    with ExitStack() as stack:
-        ways = {
-            (executor.name, way): function
-            for executor in executors
-            for way, function in _ours(stack, executor, model, name, size, shots, rays).items()
-        }
-        for by, maker in (makers or {}).items():
-            ways |= {(by, way): function for way, function in maker.ways(shots).items()}
-        named = {f"{by}: {way}": function for (by, way), function in ways.items()}
-        found = in_turns(named, repeats, pause_s=PAUSE_S)
-    return [Measured(by, way, found[f"{by}: {way}"].seconds) for by, way in ways]
-
-
-def _ours(
-    stack: ExitStack,
-    executor: Executor,
-    model: Model,
-    name: str,
-    size: int,
-    shots: Sequence[Scene],
-    rays: int,
-) -> dict[str, Callable[[], Any]]:
-    """Return the ways of an executor, whose pipelines are open until the stack is closed."""
-    scene, job, shape = scene_source(name).at(), Job(size, size, feature_spp=rays), (size, size)
+    shots, scene, shape = moments(name), scene_source(name).at(), (size, size)
+    job = Job(size, size, feature_spp=rays)
     denoiser = compile_plan(choose(executor, plan_model(model, executor.name), shape).plan)
 
     def separate() -> None:
@@ -159,33 +122,9 @@ def _ours(
 
     ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
     if pipeline.path.images:
-        apart = stack.enter_context(opened(scene, sums=True))
-        ways["with an encoding of its own"] = apart.run
-    ways |= {MOVING: move, "of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
-    return {way: _timed(function) for way, function in (ways | _parts(moving)).items()}
-
-
-def _timed(work: Callable[[], Any]) -> Callable[[], None]:
-    """Return work that returns nothing: a picture would be read as seconds."""
-
-    def run() -> None:
-        work()
-
-    return run
-
-
-def first_pictures(executor: Executor, model: Model, name: str, size: int, rays: int = 0) -> list[float]:
-    """Return the seconds to the first picture of each of some scenes that are not known, by a known model."""
-    shots = moments(name)
-    return [_first_picture(executor, model, shot, size, rays) for shot in shots[1 : 1 + NEW_SCENES] or shots]
-
-
-def _first_picture(executor: Executor, model: Model, scene: Scene, size: int, rays: int) -> float:
-    """Return the seconds to the first picture of a scene."""
-    start = time.perf_counter()
-    with Pipeline(executor, scene, model, (size, size), feature_spp=rays) as pipeline:
-        pipeline.run()
-    return time.perf_counter() - start
+        ways["with an encoding of its own"] = stack.enter_context(opened(scene, sums=True)).run
+    numbers = {"of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
+    return ways | {MOVING: move} | numbers | _parts(moving)
 
 
 def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
@@ -206,3 +145,14 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
         "of it: denoising": waited(passes.denoise),
         "of it: reading back": lambda: passes.read(PICTURE),
     }
+
+
+def first_pictures(executor: Executor, model: Model, name: str, size: int, rays: int = 0) -> list[float]:
+    """Return the seconds to the first picture of each of some scenes that are not known, by a known model."""
+    shots, found = moments(name), []
+    for shot in shots[1 : 1 + NEW_SCENES] or shots:
+        start = time.perf_counter()
+        with Pipeline(executor, shot, model, (size, size), feature_spp=rays) as pipeline:
+            pipeline.run()
+        found.append(time.perf_counter() - start)
+    return found

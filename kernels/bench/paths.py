@@ -1,0 +1,190 @@
+"""Speed of path tracers: the NumPy reference, the kernels traced from it, and peers.
+
+1. A scene by each renderer [`renderers`]: its first frame has all that happens once, as reading the scene
+   and compiling, with empty caches of compilers [fresh.py]. A round ends when the frame is in memory: of
+   kernels all layers and the variance, of peers only colours. Rounds have different seeds: their spread gives
+   the error of a mean colour [`distance`].
+2. A scene of many primitives [crowd.py] in all forms [`forms`]: what statements for each cost, and what
+   tables with a loop or a tree do. Tracing and emitting are timed, then building by a driver without its
+   caches on disk, until it has followed a first row of paths.
+
+A sample is one path: at every vertex but the last a shadow ray and a scattering. Peers are Mitsuba 3, all
+samples in one pass, and two written by hand: in C with Embree's packets of 16 rays, and compiled by Numba.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
+from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...models.data.scene_source import scene_source
+from ...refimpl.light.render import Job
+from ...refimpl.light.scene import Scene, primitives
+from ...refimpl.light.transport import Settings
+from ..devices.executor import Executor
+from ..devices.kernel import Part
+from ..devices.registry import open_executor
+from ..measure import Entry, Round
+from ..run.render_on import render_on
+from ..run.render_pool import render_parallel
+from . import peers
+
+BY_HAND = ("embree", "numba")
+"""Path tracers that were written as peers, for scenes of matte surfaces."""
+
+PEERS = ("mitsuba", *BY_HAND)
+"""Renderers that are peers. Those of Mitsuba and Embree have trees, Numba's has lists."""
+
+BUILT = ("opencl", "opengl", "c", *PEERS)
+"""What forms are measured of: executors whose kernels a driver or a compiler builds, and peers."""
+
+BY = ("numpy", *BUILT)
+"""What can render."""
+
+VARIANT = "llvm_ad_rgb"
+"""Mitsuba's variant: compiled, on vectors and all cores."""
+
+FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
+"""What primitives become, by the name of the form; a tree is there where it seems to pay."""
+
+NO_CACHES = {
+    "POCL_KERNEL_CACHE": "0",
+    "MESA_SHADER_CACHE_DISABLE": "true",
+    "MESA_GLSL_CACHE_DISABLE": "true",
+}
+"""Environment in which drivers reuse no kernel that they built before."""
+
+MOST_STATEMENTS = 300
+"""Most primitives that are measured as statements: a driver takes minutes for those of more."""
+
+ABOUT = {"mitsuba": VARIANT, **dict.fromkeys(BY_HAND, "by hand")}
+"""What each peer is, in words."""
+
+
+def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> list[Entry]:
+    """Return what renders a scene, in the order of `by`; the fact `means` has each round's mean colour."""
+    scene, found = scene_source(name).at(), []
+
+    def add(text: str, begin: Callable[[], Callable[[int], Any]]) -> None:
+        means: list[float] = []
+        found.append(Entry(name, lambda: _noting(begin(), means), text, {"means": means}))
+
+    for kind in by:
+        if kind == "numpy":
+            for count in dict.fromkeys(workers):
+                add(
+                    f"numpy, {count} process{'es' if count > 1 else ''}",
+                    partial(_reference, scene, job, count),
+                )
+        else:
+            about = f", {ABOUT[kind]}" if kind in PEERS else ""
+            add(f"{kind}{about}", partial(_peer if kind in PEERS else _kernel, kind, scene, job))
+    return found
+
+
+def _noting(frames: Callable[[int], Any], means: list[float]) -> Round:
+    """Return a round: a frame of its seed, whose mean colour is noted."""
+
+    def work(seed: int) -> float:
+        start = time.perf_counter()
+        colors = frames(seed)
+        seconds = time.perf_counter() - start
+        if seed:
+            means.append(float(np.mean(colors, dtype=np.float64)))
+        return seconds
+
+    return work
+
+
+def _reference(scene: Scene, job: Job, workers: int) -> Callable[[int], Any]:
+    """Return how the reference makes frames; start-up of processes counts in each."""
+    return lambda seed: render_parallel(scene, replace(job, seed=seed), workers=workers).frame["color"]
+
+
+def _kernel(name: str, scene: Scene, job: Job) -> Callable[[int], Any]:
+    """Return how a kernel makes frames."""
+    executor = open_executor(name)
+    return lambda seed: render_on(executor, scene, replace(job, seed=seed)).frame["color"]
+
+
+def _peer(kind: str, scene: Scene, job: Job) -> Callable[[int], Any]:
+    """Return how another renderer makes frames."""
+    render = peers.table().renderers[kind](scene, job.width, job.height, job.settings)
+    return lambda seed: render(job.spp, seed)
+
+
+def distance(entry: Entry, other: Entry) -> float | None:
+    """Return how far a mean colour is from another's in standard errors; none without a spread."""
+    (mean, error), (its_mean, its_error) = (mean_and_error(each.facts["means"]) for each in (entry, other))
+    both = float(np.hypot(error, its_error))
+    return (mean - its_mean) / both if both > 0.0 else None
+
+
+def mean_and_error(values: Sequence[float]) -> tuple[float, float]:
+    """Return the mean of two or more numbers, and its standard error."""
+    return statistics.fmean(values), statistics.stdev(values) / len(values) ** 0.5
+
+
+# ---- forms of primitives -----------------------------------------------------------------------------------
+
+
+def forms(executor: Executor | None, name: str, scene: Scene, part: Part) -> list[Entry]:
+    """Return the forms of a scene, built, whose rounds follow a part of a picture; of a peer its own.
+
+    Facts: `source`, empty for a peer; `trace_s` and `build_s`; `chosen`: the scene has this form on the
+    executor's target.
+    """
+    if executor is None:
+        return [_peer_s(name, scene, part)]
+    chosen = _compiled(executor, scene, forms_of(executor.name)).source
+    few = primitives(scene) <= MOST_STATEMENTS + 1
+    found: dict[str, Entry] = {}
+    for form in FORMS if few else [form for form in FORMS if form != "unrolled"]:
+        start = time.perf_counter()
+        artifact = _compiled(executor, scene, FORMS[form])
+        traced = time.perf_counter()
+        executor.build(artifact)
+        executor.trace(artifact, replace(part, rows=1, samples=1))
+        facts = {
+            "source": artifact.source,
+            "trace_s": traced - start,
+            "build_s": time.perf_counter() - traced,
+        }
+        entry = Entry(form, facts={**facts, "chosen": artifact.source == chosen})
+        entry.round = partial(_follow, partial(executor.trace, artifact, part))
+        found.setdefault(artifact.source, entry)
+    return [*found.values()]
+
+
+def _peer_s(name: str, scene: Scene, part: Part) -> Entry:
+    """Return a peer's form; what it builds is built by the first picture."""
+    start = time.perf_counter()
+    render = peers.table().renderers[name](scene, part.width, part.rows, Settings())
+    follow, traced = partial(render, part.samples, 0), time.perf_counter()
+    follow()
+    facts = {
+        "source": "",
+        "trace_s": traced - start,
+        "build_s": time.perf_counter() - traced,
+        "chosen": False,
+    }
+    return Entry(ABOUT[name], facts=facts, round=partial(_follow, follow))
+
+
+def _follow(work: Callable[[], Any], _number: int) -> None:
+    """Follow the paths of a picture, which is dropped."""
+    work()
+
+
+def _compiled(executor: Executor, scene: Scene, forms: Forms) -> PathArtifact:
+    """Return the kernel of a scene for an executor."""
+    return compile_path(lower_scene(scene, Settings(), forms), executor.name, lanes=executor.lanes)

@@ -20,7 +20,7 @@ export VENV PYTHON WAMNET_REQUIRE
 
 # Seconds of processor time that the tests may take (tests/support/tiers.py).
 QUICK_S = 240
-TEST_S = 600
+TEST_S = 900
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1

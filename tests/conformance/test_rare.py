@@ -75,11 +75,13 @@ def test_windows_of_few_steps_are_decided_by_the_least_spread(monkeypatch):
     assert np.mean(np.var(reference.steps_of(np.asarray(quiet.inputs["windows"])), axis=0)) < 1.0
 
 
+@pytest.mark.nightly
 def test_the_first_of_two_equal_shapes_is_met():
     found = [int(case.expected["surface"].value) for case in of_note("path.arrive", "two equal")]
     assert found == [0, 0, 2, 2, 4]
 
 
+@pytest.mark.nightly
 def test_a_lamp_ends_a_path_and_a_dim_one_is_sampled():
     (lamp,), (floor,) = (
         of_note("path.scatter", "metal is the last kind"),

@@ -234,6 +234,7 @@ def test_variants_of_variants_agree_within_the_bound(denoiser, kit, drawn):
     assert excess(kit, denoiser, original, variant, border, artifact) <= 1
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize(
     ("target", "schedule"), [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules]

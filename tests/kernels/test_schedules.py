@@ -92,6 +92,8 @@ def executor_of(executor_named, target):
 
 
 @pytest.mark.nightly(
+    "c-fft:4",
+    "c-fft:8",
     "opencl-fft:8",
     "opencl-fft:4",
     "opencl-group:1",
@@ -173,6 +175,7 @@ FAULTS = {
 array."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("schedule", ["tile:16", "tile:4"])
 @pytest.mark.parametrize("target", ["opencl", "c"])
@@ -206,6 +209,7 @@ FOURIER_FAULTS = {
 """Pieces of a kernel of spectra, and what makes it wrong; none leaves an array."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("fault", FOURIER_FAULTS)
 @pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_a_wrong_spectrum_is_caught(executor_named, kit, target, schedule, fault):
@@ -338,6 +342,7 @@ def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
         executor.build(artifact)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
 def test_layers_of_64_neurons_have_spectra(executor_named, target, schedule):
     """Arrays of 800 kB fit a thread's stack; both kernels are within their bounds of the exact picture."""

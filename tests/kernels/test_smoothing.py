@@ -61,6 +61,7 @@ def test_frames_are_within_the_bound(device, size):
         assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 3e38, -3e38, 1e-42])
 @pytest.mark.parametrize("name", ["color", "normal", "albedo", "position", "depth"])
 def test_hard_numbers_are_within_the_bound(device, name, value):

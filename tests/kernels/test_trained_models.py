@@ -169,6 +169,7 @@ def test_whole_frames_equal_the_definition(denoiser, name):
     assert wanted.std() > 0.05, "the picture is nearly constant: it would hide a wrong kernel"
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("target", DENOISERS)
 def test_certified_bounds_are_below_a_step_of_a_display(name, target):

@@ -175,6 +175,7 @@ def test_first_derivatives_are_within_the_bound(
     assert gradient_excess(opencl, recipe) <= 1
 
 
+@pytest.mark.nightly
 def test_presets_derivatives_are_within_the_bound(opencl: Any) -> None:
     for preset in train.PRESETS.values():
         recipe = replace(preset, features=("color", "normal"), batch=130, n_windows=0)

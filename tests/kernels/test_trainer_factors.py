@@ -152,6 +152,7 @@ FAULTS = {
 """A piece of the kernels' text, and what makes it wrong."""
 
 
+@pytest.mark.nightly(but=("a rank that is left out", "a row is forgotten"))
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_found(opencl: Any, fault: str) -> None:
     """By one of the bounds, or by the first steps being others than the reference's (others)."""

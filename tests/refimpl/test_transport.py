@@ -49,6 +49,7 @@ STRATEGIES = [
 ]
 
 
+@pytest.mark.nightly("minicubes-light-power")
 @pytest.mark.product
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)
 @pytest.mark.parametrize(
@@ -104,6 +105,7 @@ def test_nothing_is_lit_from_behind_a_light(strategy):
     assert np.all(result.frame["color"] == 0.0)
 
 
+@pytest.mark.nightly("minicubes")
 @pytest.mark.parametrize("name", ["minicubes", "cornell"])
 @pytest.mark.needs("time")
 def test_russian_roulette_keeps_the_mean(name):
@@ -159,6 +161,7 @@ def test_scale_changes_nothing(name, scale):
     assert np.array_equal(difference, np.zeros_like(difference))
 
 
+@pytest.mark.nightly
 @pytest.mark.needs("time")
 def test_variance_of_the_mean_falls_as_one_over_n():
     """Means of n samples: the variance over 48 independent renders times n is constant.

@@ -19,7 +19,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Variation, varied
 from wamnet_peers import peer_mitsuba
 
-pytestmark = pytest.mark.apart
+pytestmark = [pytest.mark.nightly, pytest.mark.apart]
 
 SPP_FROM_OUTSIDE = 8
 """The same for Mitsuba's pictures from outside a room: its scalar variant asks Python for each ray."""

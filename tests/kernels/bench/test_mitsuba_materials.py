@@ -21,7 +21,7 @@ from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sk
 from wamnet.refimpl.light.transport import Settings
 from wamnet_peers import mitsuba_looks, peer_mitsuba
 
-pytestmark = pytest.mark.apart
+pytestmark = [pytest.mark.nightly, pytest.mark.apart]
 
 COMPILED = "llvm_ad_rgb"
 """Mitsuba's variant of the pictures."""

@@ -24,7 +24,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet_peers import moving, peer_cycles, table
 from wamnet_peers.peer_oidn import Kept, filtered
 
-pytestmark = [pytest.mark.apart, pytest.mark.needs("packages")]
+pytestmark = [pytest.mark.nightly, pytest.mark.apart, pytest.mark.needs("packages")]
 
 SIZE, SPP, TURNS = 24, 64, 8
 """Width of the pictures, samples per pixel, and pictures whose spread is the error of their mean."""

@@ -48,7 +48,7 @@ SCENES = {
 BY_HAND = {"embree": peer_embree.Embree, "numba": peer_numba.Numba}
 """Both programs."""
 
-pytestmark = pytest.mark.apart
+pytestmark = [pytest.mark.nightly, pytest.mark.apart]
 
 EACH = pytest.mark.parametrize("kind", BY_HAND)
 """Test both."""

@@ -24,6 +24,7 @@ from wamnet.refimpl.network.denoise import Model, denoise
 from wamnet_peers import table
 
 pytestmark = [
+    pytest.mark.nightly,
     pytest.mark.apart,
     pytest.mark.needs("programs"),
     pytest.mark.filterwarnings("default"),  # warnings of a peer are not faults of the project

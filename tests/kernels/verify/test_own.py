@@ -33,6 +33,7 @@ def first_rule(renderer, names=None, fine=""):
     return None if found is None else found.rule
 
 
+@pytest.mark.nightly
 @pytest.mark.needs("time")
 def test_the_reference_keeps_every_rule():
     found = run.verify(Own(), cheap(), pictures=6)
@@ -79,6 +80,7 @@ IN_PICTURES = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.needs("time")
 @pytest.mark.parametrize("fault", IN_PICTURES)
 def test_faults_in_pictures(fault):

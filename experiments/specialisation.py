@@ -94,7 +94,7 @@ def measured(executor: Executor, scene: Scene, part: Part, repeats: int) -> list
         executor.trace(kernel, replace(part, rows=1, samples=1))
         built = time.perf_counter() - begun
         operations = sum(
-            node.op not in ("input", "constant") for p in programs.parts().values() for node in p.nodes
+            node.op not in ("input", "constant") for p in programs.parts.values() for node in p.nodes
         )
         kernels.append(kernel)
         facts.append((f"{operations:,}", f"{kernel.source.count(chr(10)):,}", f"{built:.2f}"))

@@ -111,16 +111,17 @@ def emit_path(
 def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
     """Return the programs that groups of planes need: `see` only for its own, which it must be there for."""
     wanted = [group for group in groups if group in PAST]
-    if wanted and programs.see is None:
+    if wanted and "see" not in programs.parts:
         raise CompileError(f"planes {wanted[0]!r} need the program 'see': lower the scene with seen=True")
-    return programs if wanted else replace(programs, see=None)
+    parts = {name: part for name, part in programs.parts.items() if wanted or name != "see"}
+    return replace(programs, parts=parts)
 
 
 def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
     """Return one name for each table of each program: equal tables share theirs."""
     known: dict[tuple[str, bytes], str] = {}
     found = {}
-    for part, program in programs.parts().items():
+    for part, program in programs.parts.items():
         for name, array in tables(program).items():
             key = (str(array.dtype), array.tobytes())
             found[part, name] = known.setdefault(key, f"table_{len(known)}")
@@ -171,12 +172,12 @@ class _Kernel(Lines):
     @property
     def short(self) -> bool:
         """Whether paths may end with what is seen: nothing else is requested, and something of that."""
-        return self.programs.see is not None and not WHOLE & set(self.groups)
+        return "see" in self.programs.parts and not WHOLE & set(self.groups)
 
     @property
     def followed(self) -> bool:
         """Whether the way to what is seen is state of a path."""
-        return self.programs.see is not None and self.programs.most_followed > 0
+        return "see" in self.programs.parts and self.programs.most_followed > 0
 
     # ---- the skeleton ------------------------------------------------------------------------------------
 
@@ -184,7 +185,7 @@ class _Kernel(Lines):
         """Return what is above the kernel's function."""
         declared: dict[str, NDArray[np.generic]] = {}
         for (part, name), table in self.tables.items():
-            declared[table] = self.programs.parts()[part].parameters[name]
+            declared[table] = self.programs.parts[part].parameters[name]
         constants = [self.dialect.table_declaration(name, array) for name, array in declared.items()]
         operations = self._operations()
         helpers = dict.fromkeys(text for op, text in self.dialect.helpers.items() if op in operations)
@@ -196,7 +197,7 @@ class _Kernel(Lines):
 
     def _operations(self) -> set[str]:
         """Return the names of all operations of the programs; loops that walk along trees are of another."""
-        programs = [*self.programs.parts().values(), *([self.encoding.program] if self.encoding else [])]
+        programs = [*self.programs.parts.values(), *([self.encoding.program] if self.encoding else [])]
         nodes = [node for program in programs for node in program.nodes]
         return {"walk" if node.op == "loop" and is_walk(node) else node.op for node in nodes}
 
@@ -228,7 +229,7 @@ class _Kernel(Lines):
             self._open("if (bounce == 0u && n == 0) {" if self.programs.rays else "if (bounce == 0u) {")
             self.block("look", "the features of the first surface", summed=True)
             self._close()
-        if self.programs.see is not None:
+        if "see" in self.programs.parts:
             going = self.dialect.any_lane.format(mask="way_going")
             self._open(f"if ({going if self.followed else 'bounce == 0u'}) {{")
             self.block("see", "what is seen past mirrors and glass", summed=True)
@@ -257,7 +258,7 @@ class _Kernel(Lines):
         number = f"{self.shared['sample']} + {dialect.number(1, 'uint32')}"
         self._line(dialect.let("uint32", "sample_number", number))
         # The rays of a feature draw no further numbers; a compiler may refuse what nothing reads.
-        nodes = [*self.programs.arrive.nodes, *self.programs.look.nodes]
+        nodes = [*self.programs.parts["arrive"].nodes, *self.programs.parts["look"].nodes]
         unread = () if any(n.op == "input" and n["name"] == "pixel" for n in nodes) else ("pixel",)
         if not unread:
             self._line(dialect.var("uint32", "pixel"))
@@ -356,7 +357,7 @@ class _Kernel(Lines):
         Inputs are variables of their names, or of those that `renamed` gives. Outputs in `masked` are
         assigned where a path is alive, those that are `unread` are not.
         """
-        program = self.programs.parts()[part]
+        program = self.programs.parts[part]
         renamed = {**self._scene_numbers(), **(renamed or {})}
         self.lines.append("")
         self._line(f"/* {part}: {comment} */")

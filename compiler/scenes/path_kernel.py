@@ -141,10 +141,11 @@ def compile_path(
         known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
-    emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
+    passed = {name: pipeline.run(part, promised.passes) for name, part in programs.parts.items()}
+    emitted, dialect = replace(programs, parts=passed), chosen.paths[lanes]
     planes = tuple(emit_path.planes(groups))
     images = encoding.images if encoding else ()
-    written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
+    written = _written(images) if images else (*SUMS, *(PAST_SUMS if "see" in programs.parts else ()))
     if programs.rays:
         written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
     at_once = (dialect and dialect.at_once) or f"{lanes} {'path' if lanes == 1 else 'paths'}"
@@ -236,24 +237,16 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
         "digest": ir.sha256(text.encode()),
         "scene": {"name": programs.scene, "digest": programs.scene_digest},
         "settings": programs.settings.facts(),
-        "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
+        "programs": {part: ir.digest(program) for part, program in programs.parts.items()},
         "bound": None,
         "files": {name: ir.sha256(text.encode())},
         SIZES: {name: len(text.encode())},
     }
 
 
-def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
-    """Return the programs after the named passes."""
-    run = {name: pipeline.run(part, passes) for name, part in programs.parts().items()}
-    start, arrive, look, scatter = (run[name] for name in ("start", "arrive", "look", "scatter"))
-    ray = run.get("ray")
-    return replace(programs, start=start, arrive=arrive, look=look, scatter=scatter, ray=ray)
-
-
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:
     """Return the programs as text, which is all that the interpreter needs."""
     parts = [f"# {line}".rstrip() for line in header]
-    for name, program in programs.parts().items():
+    for name, program in programs.parts.items():
         parts += [f"# {name}", ir.text(program).rstrip("\n")]
     return "\n".join(parts) + "\n"

@@ -16,7 +16,6 @@ from .core.profiles import SineContract
 from .kernel.interface import BLOCK, DENOISE, ENCODE, PATH, TABLE
 from .languages import opencl_path, planes
 from .languages.c import C
-from .languages.c_path import CPath
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL, GLSLCompute
@@ -46,9 +45,9 @@ from .schedules.schedules import (
 class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
-    `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
-    number of paths that they follow at once, none where there are no path kernels, and `forms` says what
-    becomes of a scene's primitives. `planes` are the dialects of kernels on planes, the edge-avoiding
+    `dialect` is the language's, which the interpreter lacks; `paths` are the
+    numbers of paths that path kernels follow at once, none where there are no path kernels, and `forms` says
+    what becomes of a scene's primitives. `planes` are the dialects of kernels on planes, the edge-avoiding
     filter and the history, by the number of pixels in a work item. `widest`: most channels of an image that a
     kernel reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the
     language does not promise.
@@ -61,7 +60,7 @@ class Target:
     native_sine: SineContract
     schedules: tuple[Schedule, ...]
     dialect: Dialect | None = None
-    paths: Mapping[int, Dialect | None] = field(default_factory=dict)
+    paths: tuple[int, ...] = ()
     planes: Mapping[int, Dialect | None] = field(default_factory=dict)
     forms: Forms = USUAL
     widest: int | None = None
@@ -145,7 +144,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.native_sine,
         (Plain(dialect), *ladder),
         dialect,
-        {1: CPath() if isinstance(dialect, C) else dialect} if PATH in dialect.said else {},
+        (1,) if PATH in dialect.said else (),
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
         assumes=dialect.assumes,
@@ -195,12 +194,12 @@ TARGETS: Mapping[str, Target] = {
             "program",
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
-            paths={1: None},
+            paths=(1,),
             planes={1: None},
         ),
         replace(
             processor(OpenCL()),
-            paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
+            paths=opencl_path.LANES,
             planes={lanes: planes.of_lanes(lanes) for lanes in opencl_path.LANES},
             forms=Forms(trees=True),
         ),

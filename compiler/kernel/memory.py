@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .domain import STORED, computed
-from .kernel import FLOAT, Type
+from .kernel import Type
 from .verify import KernelError
 
 NOBODY, SEVERAL = -1, -2
@@ -51,8 +51,8 @@ class Items:
         wrong = (index < 0) | (index >= size)
         if not np.any(wrong):
             return index
-        where = np.broadcast_to(wrong, (self.count,)) & self.mask
-        number = np.broadcast_to(index, (self.count,))[np.argmax(where)]
+        where = np.broadcast_to(wrong, (*np.shape(index)[:-1], self.count)) & self.mask
+        number = np.broadcast_to(index, where.shape).flat[np.argmax(where)]
         self.refuse(wrong, f"index {number} is beyond {array}, which has {size}")
         return np.where(wrong, 0, index)
 
@@ -70,12 +70,6 @@ class Memory:
         if space in ("group", "device", "result"):
             self.writer = np.full(data.shape, NOBODY, np.int64)
             self.reader = np.full(data.shape, NOBODY, np.int64)
-
-    @classmethod
-    def of_image(cls, name: str, image: NDArray[Any]) -> Memory:
-        """Return the memory of an image."""
-        height, width, channels = image.shape
-        return cls(name, image.reshape(-1, 1), FLOAT, (height, width, channels), "read")
 
     def columns(self, items: Items) -> Any:
         """Return the column of each item."""

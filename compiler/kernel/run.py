@@ -18,14 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ops import OPS
+from . import interface
 from .domain import STORED, Domain, computed
-from .interface import IMAGE, RESULT, WEIGHTS
+from .interface import IMAGE, READ, RESULT, UNSIGNED, WEIGHTS
 from .kernel import (
     BATCH,
     FLOAT,
     INTEGERS,
     Array,
     Body,
+    Break,
     Call,
     Expr,
     For,
@@ -53,35 +55,51 @@ def run(
     kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain | None = None
 ) -> NDArray[Any]:
     """Return the result (H, W, C) for images (H, W, channels) by name, or raise a KernelError."""
+    height, width = next(iter(images.values())).shape[:2]
+    arrays = {WEIGHTS: weights, **{f"{IMAGE}{key}": image for key, image in images.items()}}
+    return run_on(kernel, arrays, {"width": width, "height": height}, domain)[RESULT]
+
+
+def run_on(
+    kernel: Kernel,
+    arrays: Mapping[str, NDArray[Any]],
+    integers: Mapping[str, int],
+    domain: Domain | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a kernel writes, by name, for those that it reads and its integers."""
     verify(kernel)
     with np.errstate(all="ignore"):
-        runner = Runner(kernel, images, weights, domain or Domain())
+        runner = Runner(kernel, arrays, integers, domain or Domain())
         runner.body(kernel.body)
-        return runner.result.image()
+        return {name: memory.image() for name, memory in runner.results.items()}
 
 
 class Runner:
     """One run: the items, what they name, and the memory that they see."""
 
     def __init__(
-        self, kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain
+        self,
+        kernel: Kernel,
+        arrays: Mapping[str, NDArray[Any]],
+        integers: Mapping[str, int],
+        domain: Domain,
     ) -> None:
         self.kernel, self.domain = kernel, domain
         self.functions = {each.name: each for each in kernel.functions}
         self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
         self.numbers: dict[int, Values] = {}
-        height, width = next(iter(images.values())).shape[:2]
-        self.items, places = self._items(width, height)
-        self.names: dict[str, Values] = {**self.constants, "width": width, "height": height, **places}
-        self.memory: dict[str, Memory | Part] = {WEIGHTS: self._weights(weights)}
-        for key, image in images.items():
-            self.memory[f"{IMAGE}{key}"] = Memory.of_image(f"{IMAGE}{key}", domain.lift(image))
-        result = kernel.interface.named(RESULT)
-        assert result is not None, "a kernel that runs has a result"
-        sizes = (height, width, int(result.shape[-1]))
-        self.result = Memory(RESULT, np.zeros((int(np.prod(sizes)), 1), domain.dtype), FLOAT, sizes, "result")
-        self.memory[RESULT] = self.result
+        self.items, places = self._items(integers["width"], integers[kernel.interface.rows])
+        self.names: dict[str, Values] = {**self.constants, **places}
+        for key, integer_value in integers.items():
+            self.names[key] = np.uint32(integer_value) if key in UNSIGNED else integer_value
+        self.memory: dict[str, Memory | Part] = {}
+        for key, array in arrays.items():
+            data = domain.lift(array) if key != WEIGHTS else array
+            read = Memory(key, data.reshape(-1, 1), FLOAT, data.shape, READ)
+            self.memory[key] = self._weights(array) if key == WEIGHTS else read
+        self.results = {each.name: self._result(each, integers) for each in kernel.interface.written}
+        self.memory |= self.results
         self.evaluators = self._evaluators()
         if kernel.batch is not None:
             self.names |= dict(zip(BATCH, (0, self.value(kernel.batch)), strict=True))
@@ -106,6 +124,11 @@ class Runner:
             places |= {"local_x": local_x, "local_y": local_y, "item": local_y * columns + local_x}
         return Items(x, y, row // rows * groups[0] + column // columns), places
 
+    def _result(self, array: interface.Array, integers: Mapping[str, int]) -> Memory:
+        """Return the memory of an array that is written."""
+        sizes = tuple(size if isinstance(size, int) else integers[size] for size in array.shape)
+        return Memory(array.name, np.zeros((int(np.prod(sizes)), 1), self.domain.dtype), FLOAT, sizes, RESULT)
+
     def _weights(self, weights: NDArray[Any]) -> Memory:
         """Return the memory of the weights, which may be words bit by bit."""
         flat, lanes = np.ascontiguousarray(weights).ravel(), self.kernel.weights.lanes
@@ -125,13 +148,15 @@ class Runner:
         """Run a statement."""
         getattr(self, f"_run_{type(statement).__name__.lower()}")(statement)
 
-    def _under(self, mask: NDArray[np.bool_], body: Body) -> None:
-        """Run statements for some of the active items."""
+    def _under(self, mask: NDArray[np.bool_], body: Body) -> NDArray[np.bool_]:
+        """Run statements for some of the active items; return those that no break has stopped."""
         before = self.items.mask
         if mask.any():
             self.items.only(mask)
             self.body(body)
+            mask = self.items.mask
             self.items.only(before)
+        return mask
 
     def _run_comment(self, statement: Statement) -> None:
         """Skip a comment."""
@@ -155,6 +180,9 @@ class Runner:
 
     def _run_store(self, statement: Store) -> None:
         """Write an element, or add to it."""
+        if statement.value.type.lanes > 1 and statement.array in self.results:
+            self._spread(statement)
+            return
         kind, value = statement.value.type, self.value(statement.value)
         memory, place = self._place(statement.array, statement.index, kind)
         if statement.add:
@@ -165,6 +193,15 @@ class Runner:
                 else read + value
             )
         memory.write(self.items, place, kind, value)
+
+    def _spread(self, statement: Store) -> None:
+        """Write the lanes of a value to pixels side by side, up to the end of a row."""
+        mask, index, axis = self.items.mask, statement.index, 1 if statement.array.startswith(IMAGE) else 2
+        for lane in range(statement.value.type.lanes):
+            there, value = index[axis] + lane, statement.value.lane(lane)
+            inside = mask & (self.value(there) < self.results[statement.array].sizes[axis])
+            store = Store(statement.array, (*index[:axis], there, *index[axis + 1 :]), value)
+            self._under(inside, (store,))
 
     def _run_write(self, statement: Write) -> None:
         """Write all channels of a pixel."""
@@ -177,7 +214,8 @@ class Runner:
         start, count, step = map(self.value, ends)
         if not np.all(np.asarray(step) > 0):
             raise KernelError(f"the loop over {statement.name} has a step that is not positive")
-        if statement.until is None and all(isinstance(each, int) for each in (start, count, step)):
+        breaks = statement.until or any(isinstance(each, Break) for each in statement.body)
+        if not breaks and all(isinstance(each, int) for each in (start, count, step)):
             for turn in range(start, count, step):
                 self.names[statement.name] = turn
                 self.body(statement.body)
@@ -193,8 +231,12 @@ class Runner:
                 self.items.only(before)
             if not mask.any():
                 return
-            self._under(mask, statement.body)
+            mask = self._under(mask, statement.body)
             turn = turn + step
+
+    def _run_break(self, statement: Break) -> None:
+        """Leave the other items in the loop."""
+        self.items.only(self.items.mask & ~np.asarray(self.value(statement.condition)))
 
     def _run_if(self, statement: If) -> None:
         """Run each branch for the items that take it."""
@@ -309,6 +351,15 @@ class Runner:
         """Return an entry of a table."""
         table, index = self.tables[value.value], self.value(value.args[0])
         return table[self.items.checked(value.value, index, len(table))]
+
+    def _value_any(self, value: Expr) -> Values:
+        """Return whether a condition holds in any lane."""
+        mask = np.asarray(self.value(value.args[0]))
+        return mask.any(axis=0) if mask.ndim == 2 else mask
+
+    def _value_lanes(self, value: Expr) -> Values:
+        """Return the number of each lane."""
+        return np.arange(value.type.lanes, dtype=np.uint32)[:, None]
 
     def _value_component(self, value: Expr) -> Values:
         """Return one component of a vector."""

@@ -11,7 +11,7 @@ the header of a denoiser's other kernel [`C.finished`, `C.apart`].
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import (
@@ -27,6 +27,7 @@ from ..kernel.instructions import (
 )
 from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, Interface
 from ..kernel.kernel import Kernel
+from .c_path import HELPERS, MASKS, NUMBERS_OF_PATHS, OPERATIONS, PATHS, TYPES
 from .dialect import Dialect, Parts
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
@@ -166,6 +167,11 @@ class C(Arguments):
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif""",
     )
+    vector_kinds: Mapping[str, str] = {"float32": "wamnet_vector", "int32": "wamnet_sums"}
+    at_once = "as many paths as a vector register of the compiler's target holds"
+    path_lanes = 16
+    sum_store = "wamnet_write(&sums[{plane} * plane + at], 1, {value}, left);"
+    painted = "wamnet_write(&image_{image}[place * {channels} + {channel}], {channels}, {value}, left);"
     types = scalars = {**Dialect.types, "int32": "int32_t", "uint32": "uint32_t"}
     table = "static const {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -208,7 +214,7 @@ class C(Arguments):
         fields = [f"    {self.typed(name)};" for name in kernel.integers]
         said = "/* What all pixels of a launch share. */"
         part = [said, "typedef struct {", *fields, "} wamnet_part;", ""]
-        return [*head, IGNORED, self.depth(parts), parts.top, *part]
+        return [*head, IGNORED, PATHS + NUMBERS_OF_PATHS + parts.top, *part]
 
     def typed(self, name: str) -> str:
         """Return the declaration of an integer, without what ends it."""
@@ -262,7 +268,10 @@ class C(Arguments):
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have."""
         found = super().fitted(kernel)
-        found.calls_vectors = not kernel.functions
+        path = kernel.interface.role == PATH
+        found.calls_vectors = not kernel.functions and not path
+        if path:
+            vars(found).update(vector_kinds=TYPES, vector_operations=OPERATIONS, helpers=HELPERS)
         return found
 
     def transform_head(self, name: str, kind: str) -> str:
@@ -275,11 +284,13 @@ class C(Arguments):
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of one value in all lanes."""
+        if kind in TYPES.values():
+            return f"wamnet_all({kind}, {MASKS.get(values[0], values[0])})"
         return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of the vector type."""
-        return {"float32": "wamnet_vector", "int32": "wamnet_sums"}[dtype]
+        return self.vector_kinds[dtype]
 
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""
@@ -312,11 +323,10 @@ class C(Arguments):
         """Return the first statements: the functions have the place of a pixel already."""
         if kernel.role == PATH:
             return [
-                "    const int samples = part->samples;",
                 "    const int left = part->width - column;",
                 "    const size_t line = (size_t)(row + part->first_row);",
                 "    const size_t place = line * (size_t)part->width + (size_t)column;",
-                *self.path_start(kernel),
+                *self.places_of_planes(kernel),
             ]
         return self.encode_start(kernel)
 

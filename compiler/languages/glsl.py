@@ -136,6 +136,7 @@ class GLSL(Dialect):
             "nothing). Draw one triangle that covers them: row 0 stays row 0"
         ),
     }
+    fragment = ("int(gl_FragCoord.x)", "int(gl_FragCoord.y)")
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result: int | None = 4
     planes_per_buffer = 4
@@ -234,7 +235,6 @@ class GLSL(Dialect):
         outputs = range(-(-planes // self.planes_per_buffer))
         scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
         return [
-            self.depth(parts),
             parts.top,
             *(f"layout(location = {number}) out vec4 sums_{number};" for number in outputs),
             *self.uniforms(kernel),
@@ -242,8 +242,12 @@ class GLSL(Dialect):
             "",
             "void main()",
             "{",
-            *self.path_start(kernel),
+            *self.places(kernel),
         ]
+
+    def places(self, kernel: Interface) -> list[str]:
+        """Return the declarations of a path's column and row."""
+        return [f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)]
 
     def uniforms(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers."""
@@ -264,10 +268,6 @@ class GLSL(Dialect):
             "    ivec2 at = ivec2(gl_FragCoord.xy);",
             "    PRECISE float samples = float(sample_count);",
         ]
-
-    def place(self, kernel: Interface) -> tuple[str, str]:
-        """Return the texts of a fragment's column and row."""
-        return ("gl_FragCoord.x", "int(gl_FragCoord.y)")
 
 
 class GLSLCompute(GLSL):

@@ -2,15 +2,12 @@
 
 Three binding styles share it: arguments of a function [`Arguments`: C, OpenCL, CUDA], arguments with numbers
 (Metal), and declarations with numbers (GLSL for Vulkan and OpenGL 4.3, WGSL). Integers that are arguments are
-read by their names; those of a structure by `size` and their names, unless they are made variables: `early`
-before the guard, `late` after it.
+read by their names; those of a structure by `size` and their names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-from ..kernel.interface import ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
+from ..kernel.interface import DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Type
 from .dialect import Dialect, Parts
 
@@ -29,21 +26,20 @@ NUMBERS = "width, height of the image; first_row; rows; first_sample; samples to
 class Buffers(Dialect):
     """Kernels whose arrays are buffers; `item` are the texts of an item's column and row.
 
-    `reach`: what a column is multiplied by where an item computes several pixels. `word`: a qualifier of
-    numbers that are read; `long`: the type of a place in memory, if it is not that of other integers.
+    `reach`: what a column is multiplied by where an item computes several pixels. `size`: what is before the
+    name of an integer. `word`: a qualifier of numbers that are read; `long`: the type of a place in memory,
+    if it is not that of other integers.
     """
 
     item: tuple[str, str]
     reach: str = ""
     size: str = ""
-    early: Mapping[str, Sequence[str]] = {}
-    late: Mapping[str, Sequence[str]] = {}
     word: str = ""
     long: str = ""
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
-        if parts.kernel is not None:
+        if parts.kernel is not None and kernel.role == DENOISE:
             return "\n".join(self.of_kernel(kernel, parts, parts.kernel))
         return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
 
@@ -78,8 +74,6 @@ class Buffers(Dialect):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
-        if kernel.role == PATH:
-            return [self.depth(parts), parts.top]
         return [] if kernel.role == ENCODE else [parts.top]
 
     def head(self, kernel: Interface) -> list[str]:
@@ -88,13 +82,12 @@ class Buffers(Dialect):
 
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the item's place, the guard, and what the role wants."""
-        early, late = self.variables(kernel, self.early), self.variables(kernel, self.late)
-        return [*early, *self.guard(kernel), *late, *self.start(kernel)]
+        return [*self.guard(kernel), *self.start(kernel)]
 
     def start(self, kernel: Interface) -> list[str]:
         """Return the first statements that a role wants."""
         if kernel.role == PATH:
-            return self.path_start(kernel)
+            return self.places_of_planes(kernel)
         return self.encode_start(kernel) if kernel.role == ENCODE else []
 
     def guard(self, kernel: Interface) -> list[str]:
@@ -110,13 +103,9 @@ class Buffers(Dialect):
             "    }",
         ]
 
-    def variables(self, kernel: Interface, named: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the declarations of integers of the structure that become variables."""
-        return [f"    {self.index(name, f'{self.size}{name}')}" for name in named.get(kernel.role, ())]
-
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""
-        return name if name in self.early.get(kernel.role, ()) else f"{self.size}{name}"
+        return f"{self.size}{name}"
 
     # ---- places in memory --------------------------------------------------------------------------------
 
@@ -128,14 +117,13 @@ class Buffers(Dialect):
         """Return a number as a factor of a place in memory."""
         return f"({self.long}){text}" if self.long else text
 
-    def path_start(self, kernel: Interface) -> list[str]:
-        """Return the first statements of a path kernel: its place in the planes, pixel and seed."""
+    def places_of_planes(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: its place in the planes."""
         rows, width = (self.factor(self.integer(kernel, name)) for name in ("rows", "width"))
         column, row = (self.factor(name) for name in kernel.place)
         return [
             f"    {self.offset('plane', f'{rows} * {width}')}",
             f"    {self.offset('at', f'{row} * {width} + {column}')}",
-            *super().path_start(kernel),
         ]
 
     def encode_start(self, kernel: Interface) -> list[str]:

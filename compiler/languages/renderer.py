@@ -13,12 +13,24 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.lines import Lines
-from ..kernel.interface import DENOISE, IMAGE, READ, RESULT, TABLE, WEIGHTS, Interface
+from ..kernel.interface import (
+    DENOISE,
+    IMAGE,
+    PATH,
+    READ,
+    RESULT,
+    SCENE_NUMBERS,
+    SUMS,
+    TABLE,
+    WEIGHTS,
+    Interface,
+)
 from ..kernel.interface import Array as Memory
 from ..kernel.kernel import (
     FLOAT,
@@ -27,6 +39,7 @@ from ..kernel.kernel import (
     Barrier,
     Block,
     Body,
+    Break,
     Call,
     Comment,
     Constant,
@@ -95,12 +108,16 @@ def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
 
 def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32]) -> Kernel:
     """Return a kernel whose weights and integers are where a language has them."""
+    role = kernel.interface.role
+    if role != DENOISE:
+        interface = replace(kernel.interface, integers=tuple(dialect.integers[role]))
+        return replace(kernel, interface=interface)
     images = [array for array in kernel.interface.arrays if array.is_image]
     result = kernel.interface.named(RESULT)
     assert result is not None
     weights = [] if dialect.home == TABLE else [Memory(WEIGHTS, READ, (packed.size,), dialect.home)]
     tables = kernel.tables if weights else (*kernel.tables, (WEIGHTS, packed))
-    interface = Interface(DENOISE, (*images, *weights, result), tuple(dialect.integers[DENOISE]))
+    interface = Interface(role, (*images, *weights, result), tuple(dialect.integers[role]))
     return replace(kernel, interface=interface, tables=tables)
 
 
@@ -112,6 +129,8 @@ class Renderer(Lines):
         kernel = self.kernel = housed(kernel, dialect, packed)
         self.lines: list[str] = []
         self.depth = 1
+        bound, path = kernel.interface, kernel.interface.role == PATH
+        self.given = {each: self.dialect.integer(bound, each) for each in bound.integers if path}
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
         self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
         self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
@@ -129,7 +148,7 @@ class Renderer(Lines):
         if kernel.launches:
             self.depth = 0
         self.body(kernel.body)
-        top = [*map(self.constant, kernel.constants), *self.tables(), *functions]
+        top = [*map(self.constant, kernel.constants), *self.tables(), *self.helpers(), *functions]
         begin = dialect.begin(kernel.interface, Parts("\n".join(top), self.bounded, kernel=kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         end = "#endif" if kernel.launches else dialect.ends[kernel.interface.role]
@@ -146,6 +165,13 @@ class Renderer(Lines):
     def tables(self) -> list[str]:
         """Return the declarations of constant tables."""
         return [self.dialect.table_declaration(name, array) for name, array in self.kernel.tables]
+
+    def helpers(self) -> list[str]:
+        """Return the functions that operations on vectors call."""
+        used = [e for s in walk(self.kernel.body) for v in values(s) for e in parts(v)]
+        operations = {e.op for e in used if max(e.type.lanes, *(a.type.lanes for a in e.args), 1) > 1}
+        wanted = [text for operation, text in self.dialect.helpers.items() if operation in operations]
+        return list(dict.fromkeys(wanted))
 
     def function(self, function: Function) -> None:
         """Write a function above the kernel."""
@@ -189,7 +215,7 @@ class Renderer(Lines):
 
     def _name(self, value: Expr) -> tuple[str, int]:
         """Return a name."""
-        return str(value.value), ATOM
+        return self.given.get(value.value, str(value.value)), ATOM
 
     def _component(self, value: Expr) -> tuple[str, int]:
         """Return one component of a vector."""
@@ -219,7 +245,13 @@ class Renderer(Lines):
 
     def _take(self, value: Expr) -> tuple[str, int]:
         """Return an entry of a table."""
+        if value.type.lanes > 1:
+            return self._filled(self.dialect.vector_operations["take"], value)
         return f"{value.value}[{self.text(value.args[0])}]", ATOM
+
+    def _lanes(self, value: Expr) -> tuple[str, int]:
+        """Return the numbers of the lanes."""
+        return self._filled(self.dialect.vector_operations["lanes"], value)
 
     def _operation(self, value: Expr) -> tuple[str, int]:
         """Return an operation of the program."""
@@ -236,10 +268,15 @@ class Renderer(Lines):
         binds, infix = binding(template), bool(INFIX.match(template))
         args = list(value.args)
         if infix and self.dialect.widens:  # a language with such operators widens a single value by itself
-            single = [a.args[0] if a.op == "splat" else a for a in args]
+            single = [a.args[0] if a.op == "splat" and a.type.dtype != "bool" else a for a in args]
             args = single if any(a.type.lanes > 1 for a in single) else args
         texts = [self.text(a, place) for a, place in zip(args, self._places(template, value), strict=False)]
-        return template.format(*texts, type=self.kind(value.type), lanes=value.type.lanes), binds
+        shown: dict[str, Any] = {
+            "type": self.kind(value.type),
+            "lanes": value.type.lanes,
+            "table": value.value,
+        }
+        return template.format(*texts, **shown), binds
 
     def _places(self, template: str, value: Expr) -> list[int]:
         """Return how strongly each operand of a template must bind."""
@@ -258,6 +295,10 @@ class Renderer(Lines):
         array, index = str(value.value), value.args
         if array.startswith(IMAGE):
             return self._pixel(array, index, value.type.lanes), ATOM
+        if array == SCENE_NUMBERS:
+            number = int(index[0].value)
+            where = {"number": number, "vector": number // 4, "component": "xyzw"[number % 4]}
+            return self.dialect.scene_number.format(**where), ATOM
         if array == WEIGHTS:
             lanes = value.type.lanes
             place = self.text(index[0])
@@ -345,6 +386,9 @@ class Renderer(Lines):
         if statement.array == RESULT:
             self._result(index, value)
             return
+        if self.kernel.interface.named(statement.array):
+            self._pixels(statement.array, int(index[0 if statement.array == SUMS else -1].value), value)
+            return
         target = self.element(statement.array, index, value.type.lanes)
         if value.op == "dot4":
             self._line(self._dotted(target, *value.args))
@@ -356,6 +400,16 @@ class Renderer(Lines):
         if sign and value.op == "negative":
             sign, value = "-", value.args[0]
         self._line(f"{target} {sign}= {self.text(value)};")
+
+    def _pixels(self, array: str, number: int, value: Expr) -> None:
+        """Write a path's sum to its plane, or a channel of its image: of pixels side by side."""
+        dialect, channels = self.dialect, self.kernel.interface.named(array)
+        assert channels is not None, array
+        buffer, component = divmod(number, dialect.planes_per_buffer)
+        shown = {"plane": number, "buffer": buffer, "component": component, "lanes": value.type.lanes}
+        image = {"image": array.removeprefix(IMAGE), "channels": channels.shape[-1], "channel": number}
+        template = dialect.sum_store if array == SUMS else dialect.painted
+        self._line(template.format(value=self.text(value), **shown, **image))
 
     def _dotted(self, total: str, weights: Expr, four: Expr) -> str:
         """Return the statement that adds products of bytes to a sum."""
@@ -456,8 +510,14 @@ class Renderer(Lines):
         """Return whether a loop chooses among results that no variable may choose of."""
         dialect = self.dialect
         stores = all(isinstance(each, Store) and each.array == RESULT for each in statement.body)
-        several = dialect.channels_per_result and self.channels > dialect.channels_per_result
-        return stores and bool(several or not dialect.indexes_results)
+        most = dialect.channels_per_result
+        return stores and bool((most and self.channels > most) or not dialect.indexes_results)
+
+    def _write_break(self, statement: Break) -> None:
+        """Write the end of a loop."""
+        self._open(f"if ({self.text(statement.condition)}) {{")
+        self._line("break;")
+        self._close()
 
     def _write_if(self, statement: If) -> None:
         """Write a branch."""

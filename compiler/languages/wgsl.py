@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, UNSIGNED, WRITE, Array, Interface
-from .dialect import Dialect, Parts
+from ..kernel.interface import BLOCK, UNSIGNED, WRITE, Array, Interface
+from .dialect import Dialect
 from .glsl_buffers import GROUP, SAID, Declared
 
 ASSUMES = (
@@ -47,15 +47,9 @@ class WGSL(Declared):
     instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
-    early = {
-        DENOISE: ("width", "height"),
-        PATH: ("width", "samples"),
-        ENCODE: ("width", "height"),
-    }
     types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
     define = "const {name}: i32 = {value};"
-    choice = "select({2}, {1}, {0})"
     table = "const {name} = array<{type}, {count}>({values});"
     load = "let {name}: f32 = sums[{plane} * plane + at];"
     operations = {
@@ -64,17 +58,9 @@ class WGSL(Declared):
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
         "convert": "{type}({0})",
-        "select": choice,
+        "select": "select({2}, {1}, {0})",
     }
     said = SAID
-
-    def depth(self, parts: Parts) -> str:
-        """Return the definition of the number of scatterings."""
-        return f"const MAX_DEPTH: u32 = {parts.max_depth}u; /* scatterings of a path */"
-
-    def bounces(self) -> str:
-        """Return the line that opens the loop over a path's bounces."""
-        return "for (var bounce: u32 = 0u; bounce <= MAX_DEPTH; bounce++) {"
 
     def declared(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers and of all arrays."""

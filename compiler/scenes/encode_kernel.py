@@ -212,19 +212,6 @@ def _body(program: Program, dialect: Dialect, planes: Sequence[str], images: Seq
     return lines
 
 
-def encode_source(
-    features: Sequence[str],
-    normalization: Normalization,
-    dialect: Dialect,
-    profile: str = "ieee",
-    whole: bool = False,
-) -> str:
-    """Return only the statements, for a kernel that has the sums of these features in variables."""
-    found = encoding_of(features, normalization, profile, whole)
-    body = _body(found.program, dialect, planes_of(features), found.images)
-    return "\n".join(f"    {line}" for line in body)
-
-
 def statements(program: Program, dialect: Dialect, lines: list[str]) -> list[str]:
     """Write one statement for each operation; return the text of each value."""
     texts: list[str] = []

@@ -315,7 +315,7 @@ def _walk(found: Found, view: View) -> None:
         "CAM-3",
         given,
         wanted,
-        ranges.evaluate(programs.start, _counted(given)),
+        ranges.evaluate(programs.parts["start"], _counted(given)),
     )
     kept = {name: given[name] for name in ("scene", "settings")}
     counters = {"seed": view.seed, "pixel": wanted.pop("pixel"), "sample": view.sample}
@@ -324,7 +324,7 @@ def _walk(found: Found, view: View) -> None:
     for depth in range(view.depth, view.depth + view.steps):
         state = {name: rounded(state[name]) for name in PATH}
         wanted = arrive(_with_scene({**kept, **state}, view))
-        sent = ranges.evaluate(programs.arrive, _flat(state, PATH))
+        sent = ranges.evaluate(programs.parts["arrive"], _flat(state, PATH))
         inputs = {**kept, **state}
         of_light = _of_emission(view, state["direction"], wanted)
         _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, sent, of_light)
@@ -339,7 +339,7 @@ def _walk(found: Found, view: View) -> None:
         }
         wanted = scatter(_with_scene(inputs, view))
         flat = {**_flat(inputs, PATH), **_flat(inputs, SURFACE), **_counted(inputs)}
-        sent = ranges.evaluate(programs.scatter, flat)
+        sent = ranges.evaluate(programs.parts["scatter"], flat)
         _add(
             found.scatter,
             "path.scatter",
@@ -360,12 +360,12 @@ def _sent_midway(found: Found) -> None:
         inputs = midway(scene, settings, direction)
         view = View(scene, settings, 0, 0, 0)
         wanted = arrive(_with_scene(inputs, view))
-        reach = ranges.evaluate(programs_of(scene, settings).arrive, _flat(inputs, PATH))
+        reach = ranges.evaluate(programs_of(scene, settings).parts["arrive"], _flat(inputs, PATH))
         of_light = _of_emission(view, inputs["direction"], wanted)
         _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light)
     for view, inputs, note in aimed():
         wanted = arrive(_with_scene(inputs, view))
-        reach = ranges.evaluate(programs_of(view.scene, view.settings).arrive, _flat(inputs, PATH))
+        reach = ranges.evaluate(programs_of(view.scene, view.settings).parts["arrive"], _flat(inputs, PATH))
         of_light = _of_emission(view, inputs["direction"], wanted)
         _add(found.arrive, "path.arrive", "LTR-2", inputs, wanted, reach, of_light, note)
 
@@ -438,15 +438,15 @@ def followed(view: View) -> Iterator[tuple[dict[str, Range], bool]]:
     """Yield the ranges of each vertex of a path while all decisions are sure, and whether it surely ends."""
     given, programs = view.inputs(), programs_of(view.scene, view.settings)
     counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
-    state = dict(ranges.evaluate(programs.start, counters))
+    state = dict(ranges.evaluate(programs.parts["start"], counters))
     for depth in range(MOST_VERTICES):
-        state |= ranges.evaluate(programs.arrive, state)
+        state |= ranges.evaluate(programs.parts["arrive"], state)
         if not all(
             np.all(state[name].sure & state[name].known) for name in {**kinds(PATH), **kinds(SURFACE)}
         ):
             return
         sent = dict(
-            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+            ranges.evaluate(programs.parts["scatter"], {**state, **counters, "depth": rng.counter(depth)}),
         )
         alive = sent.pop("alive")
         yield dict(state), bool(np.all(alive.sure) and not np.any(alive.high))
@@ -459,15 +459,15 @@ def gathered(view: View) -> tuple[Any, Any] | None:
     """Return the ends (3,) of what a whole path gathers, or None where some decision is not sure."""
     given, programs = view.inputs(), programs_of(view.scene, view.settings)
     counters = _counted({**given, "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
-    state = dict(ranges.evaluate(programs.start, counters))
+    state = dict(ranges.evaluate(programs.parts["start"], counters))
     for depth in range(view.settings.max_depth + 1):
-        state |= ranges.evaluate(programs.arrive, state)
+        state |= ranges.evaluate(programs.parts["arrive"], state)
         if depth == view.settings.max_depth:
             break
         if not all(np.all(state[name].sure & state[name].known) for name in kinds(SURFACE)):
             return None
         sent = dict(
-            ranges.evaluate(programs.scatter, {**state, **counters, "depth": rng.counter(depth)}),
+            ranges.evaluate(programs.parts["scatter"], {**state, **counters, "depth": rng.counter(depth)}),
         )
         alive = sent.pop("alive")
         state = {**state, **sent}

@@ -98,7 +98,7 @@ def _twins() -> list[Case]:
         inputs = midway("twins", VARIANTS[0], direction, origin)
         view = View("twins", VARIANTS[0], 0, 0, 0)
         wanted = paths.arrive(paths._with_scene(inputs, view))
-        program = paths.programs_of(view.scene, view.settings).arrive
+        program = paths.programs_of(view.scene, view.settings).parts["arrive"]
         found = ranges.evaluate(program, paths._flat(inputs, PATH), guided=True)
         expected = {}
         for name, value in wanted.items():
@@ -138,7 +138,7 @@ def _far() -> list[Case]:
         wanted = paths.scatter(paths._with_scene(inputs, view))
         assert np.all(wanted["radiance"] > state["radiance"]), "the lamp must be seen"
         flat = {**paths._flat(inputs, PATH), **paths._flat(inputs, SURFACE), **paths._counted(inputs)}
-        found = ranges.evaluate(paths.programs_of(view.scene, view.settings).scatter, flat)
+        found = ranges.evaluate(paths.programs_of(view.scene, view.settings).parts["scatter"], flat)
         note = f"a lamp a thousand units below 0 along {'xyz'[axis]}"
         count = len(cases)
         paths._add(cases, "path.scatter", "LTR-7", inputs, wanted, found, "LTR-3", note)
@@ -152,7 +152,9 @@ def _settings() -> list[Case]:
     view = View("foundry", Settings(max_depth=most, roulette_depth=most), 3, 8, 0)
     given, cases = view.inputs(), list[Case]()
     wanted = paths.start(paths._with_scene(given, view))
-    found = ranges.evaluate(paths.programs_of(view.scene, view.settings).start, paths._counted(given))
+    found = ranges.evaluate(
+        paths.programs_of(view.scene, view.settings).parts["start"], paths._counted(given)
+    )
     paths._add(cases, "path.start", "LTR-8", given, wanted, found, note=f"both depths {most}")
     return cases
 
@@ -166,7 +168,9 @@ def _arrivals() -> list[Case]:
         view = View("terrace", settings, 0, 0, 0)
         inputs = midway(view.scene, settings, tuple(direction), start)
         wanted = paths.arrive(paths._with_scene(inputs, view))
-        found = ranges.evaluate(paths.programs_of(view.scene, settings).arrive, paths._flat(inputs, PATH))
+        found = ranges.evaluate(
+            paths.programs_of(view.scene, settings).parts["arrive"], paths._flat(inputs, PATH)
+        )
         note = f"a block that shines under a sky, {settings.strategy}"
         paths._add(cases, "path.arrive", "LTR-2", inputs, wanted, found, "LTR-10", note)
     return [*_twins(), *cases]
@@ -209,7 +213,7 @@ def _scatterings() -> list[Case]:
         }
         wanted = paths.scatter(paths._with_scene(inputs, view))
         flat = {**paths._flat(inputs, PATH), **paths._flat(inputs, SURFACE), **paths._counted(inputs)}
-        found = ranges.evaluate(paths.programs_of(view.scene, view.settings).scatter, flat)
+        found = ranges.evaluate(paths.programs_of(view.scene, view.settings).parts["scatter"], flat)
         paths._add(cases, "path.scatter", "LTR-7", inputs, wanted, found, clause, note)
     tie = paths.Found([], [], [])
     paths._walk(tie, View("night", VARIANTS[0], 8, 13, HALF, "ENV-4", steps=1))

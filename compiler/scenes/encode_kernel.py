@@ -25,7 +25,7 @@ from ..core.passes import pipeline
 from ..kernel import interface
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS
 from ..kernel.interface import SUMS as SUMS_ARRAY
-from ..kernel.kernel import Kernel, Let, Store, apply, const, load, name
+from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
 from ..plan import sine_contract
 from ..proof import bounds
 from ..schedules.common import X, Y
@@ -96,7 +96,7 @@ def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
     """Return the kernel of one pixel, of sums whose planes these are."""
     used = planes_of([image.name for image in encoding.images])
     lines, outputs = lets(encoding.program)
-    body = (
+    body: Body = (
         Let(SAMPLES, apply("convert", name("sample_count"), value="float32"), kept=True),
         *reads(used, lambda i: load(SUMS_ARRAY, planes.index(used[i]), Y, X)),
         *lines,

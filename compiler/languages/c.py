@@ -167,7 +167,7 @@ class C(Arguments):
     at_once = "as many paths as a vector register of the compiler's target holds"
     path_lanes = 16
     paints = True
-    types = scalars = {**Dialect.types, "int32": "int32_t", "uint32": "uint32_t"}
+    scalars = {**Dialect.scalars, "int32": "int32_t", "uint32": "uint32_t"}
     table = "static const {type} {name}[{count}] = {{{values}}};"
     operations = {
         **Dialect.operations,
@@ -329,7 +329,7 @@ class C(Arguments):
         return [
             "    const int left = part->width - column;",
             "    const size_t line = (size_t)(row + part->first_row);",
-            "    const size_t pixel = line * (size_t)part->width + (size_t)column;",
+            "    const size_t place = line * (size_t)part->width + (size_t)column;",
             *self.places_of_planes(kernel),
         ]
 

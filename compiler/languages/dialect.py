@@ -2,13 +2,13 @@
 
 A dialect is all that the emitters know of a language, for every role of a kernel:
 
-1. Statements are made by methods [`Dialect.let`, `Dialect.loop`, ...] and by templates of one line. Names in
-   braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an output
-   channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its result,
-   `table` the name of its table, `name`, `count` and `values` of a table's declaration; of sums, `plane` the
-   number of a plane, `buffer` and `component` its place where a texture holds several. An operation's
-   template may differ for a kind of operand: `minimum.int32`. The text between is the language's own, its
-   braces doubled.
+1. Statements are made by methods [`Dialect.let_value`, `Dialect.for_loop`, ...] and by templates of one line.
+   Names in braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an
+   output channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its
+   result, `table` the name of its table, `name`, `count` and `values` of a table's declaration. An
+   operation's template may differ for a kind of operand: `minimum.int32`. The text between is the language's
+   own, its braces doubled. Arrays of other kernels than denoisers are accessed by a pair of methods
+   [`Dialect.read`, `Dialect.written`].
 2. A kernel opens with what it is bound to [`Dialect.begin`]: each binding style declares an interface
    [interface.py] in its own way [openings.py for buffers, glsl.py for textures], and ends with [`ends`].
 """
@@ -70,7 +70,7 @@ class Dialect:
     channel. A path kernel has `path_lanes` paths at once where the target's compiler chooses their number,
     which `at_once` describes; it takes `most_numbers` of a scene, and callers read `said_numbers`. `paints`:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
-    `types` are those of values; `scalars` those of single numbers, where values are vectors.
+    `scalars`: the types of single numbers.
     """
 
     target: str
@@ -96,9 +96,8 @@ class Dialect:
     first: tuple[str, ...] = ()
     define: str = "#define {name} {value}"
     clamp: str = "clamp"
-    types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    scalars: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
     byte: str = "uchar"
-    scalars: Mapping[str, str] = types
     qualifiers: Mapping[str, str] = {}
     table: str
     at_once: str = ""

@@ -82,7 +82,7 @@ class Declared(Buffers):
         """Return an array's name in the kernel, and the type of its elements."""
         if array.name == WEIGHTS and self.vectors and self.vectors.lanes > 1:
             return "w", self.vector_kind(self.vectors.dtype, self.vectors.lanes)
-        return array.name, self.types["float32"]
+        return array.name, self.scalars["float32"]
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""

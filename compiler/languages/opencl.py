@@ -207,7 +207,7 @@ class OpenCL(Arguments):
         left = "(int)row + first_row < height ? width - (int)column : 0"
         images = [
             f"    int left = {left}; /* pixels of the row from here on: whole groups are larger */",
-            "    size_t pixel = (size_t)((int)row + first_row) * (size_t)width + column;",
+            "    size_t place = (size_t)((int)row + first_row) * (size_t)width + column;",
         ]
         return [
             "    size_t column = get_global_id(0) * LANES;",

@@ -134,7 +134,7 @@ class Buffers(Dialect):
         strided = "plane_stride" in kernel.integers
         places["plane"] = self.factor("plane_stride") if strided else f"{height} * stride"
         places["at"] = f"{row} * stride + {column}"
-        places |= {"pixel": f"{row} * {width} + {column}"} if kernel.images else {}
+        places |= {"place": f"{row} * {width} + {column}"} if kernel.images else {}
         return [f"    {self.offset(name, value)}" for name, value in places.items()]
 
     def about(self, array: Array) -> str:
@@ -154,7 +154,7 @@ class Buffers(Dialect):
             place = f"{index[0]} * plane + {'at' if own else f'{row} * stride + {column}'}"
         elif array.is_image:
             assert index[1] in ("x", "column"), "an item uses its own pixel of an image"
-            place = f"pixel * {array.shape[-1]} + {place}"
+            place = f"place * {array.shape[-1]} + {place}"
         elif len(index) == 2:
             place = f"{index[0]} * {array.shape[-1]} + {place}"
         return f"{array.name}[{place}]"

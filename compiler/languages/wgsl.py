@@ -47,7 +47,7 @@ class WGSL(Declared):
     instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
-    types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
+    scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     define = "const {name}: i32 = {value};"
     table = "const {name} = array<{type}, {count}>({values});"
     operations = {

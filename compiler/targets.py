@@ -7,16 +7,14 @@ take those in [`TARGETS`]. Targets whose kernels other programs run are in [`EXP
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
 from .core.profiles import SineContract
 from .kernel.interface import BLOCK, DENOISE, PATH, TABLE
-from .languages import opencl_path
 from .languages.c import C
-from .languages.c_path import CPath
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL, GLSLCompute
@@ -24,7 +22,7 @@ from .languages.glsl_buffers import Compute, Vulkan
 from .languages.glsl_es import GLSLES
 from .languages.hosts import GodotDenoise, ShadertoyDenoise
 from .languages.metal import Metal
-from .languages.opencl import OpenCL
+from .languages.opencl import LANES, OpenCL
 from .languages.wgsl import WGSL
 from .schedules.names import parse
 from .schedules.passes import FourierPasses
@@ -46,9 +44,9 @@ from .schedules.schedules import (
 class Target:
     """Something that runs kernels: how its source is made, and what its own sine promises.
 
-    `dialect` is the language's, which the interpreter lacks; `paths` are the dialects of path kernels by the
-    number of paths that they follow at once, none where there are no path kernels, and `forms` says what
-    becomes of a scene's primitives. `planes`: for how many pixels in a work item there are kernels of the
+    `dialect` is the language's, which the interpreter lacks; `paths` are the numbers of paths that path
+    kernels follow at once, none where there are no path kernels, and `forms` says what becomes of a scene's
+    primitives. `planes`: for how many pixels in a work item there are kernels of the
     edge-avoiding filter; with 1 there is a history. `widest`: most channels of an image that a
     kernel reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the
     language does not promise.
@@ -61,7 +59,7 @@ class Target:
     native_sine: SineContract
     schedules: tuple[Schedule, ...]
     dialect: Dialect | None = None
-    paths: Mapping[int, Dialect | None] = field(default_factory=dict)
+    paths: tuple[int, ...] = ()
     planes: tuple[int, ...] = ()
     forms: Forms = USUAL
     widest: int | None = None
@@ -145,7 +143,7 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
         dialect.native_sine,
         (Plain(dialect), *ladder),
         dialect,
-        {1: CPath() if isinstance(dialect, C) else dialect} if PATH in dialect.said else {},
+        (1,) if PATH in dialect.said else (),
         widest=dialect.channels_per_result,
         most=dialect.max_output_channels,
         assumes=dialect.assumes,
@@ -195,13 +193,13 @@ TARGETS: Mapping[str, Target] = {
             "program",
             SineContract("np.sin, whose documentation promises nothing", None),
             (Printed(),),
-            paths={1: None},
+            paths=(1,),
             planes=(1,),
         ),
         replace(
             processor(OpenCL()),
-            paths={lanes: opencl_path.of_lanes(lanes) for lanes in opencl_path.LANES},
-            planes=opencl_path.LANES,
+            paths=LANES,
+            planes=LANES,
             forms=Forms(trees=True),
         ),
         replace(

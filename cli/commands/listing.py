@@ -72,7 +72,7 @@ def _lines(model: str, target: str, profile: str) -> list[Line]:
         scene = load_scene(model, None, [])
         programs = lower_scene(scene, Settings(), forms_of(target), keep_places=True)
         path_kernel = compile_path(programs, target, profile)
-        return lines_of(path_kernel.source, path_kernel.programs.parts())
+        return lines_of(path_kernel.source, path_kernel.programs.parts)
     kernel = compile_program(lower(load_model(Path(model), imported=True), keep_places=True), target, profile)
     return lines_of(kernel.source, {"": kernel.program})
 

@@ -114,6 +114,11 @@ class Interface:
         return tuple(array for array in self.arrays if array.is_image)
 
     @property
+    def written(self) -> tuple[Array, ...]:
+        """Return the arrays that the kernel writes."""
+        return tuple(array for array in self.arrays if array.access == WRITE)
+
+    @property
     def place(self) -> tuple[str, str]:
         """Return the names of an item's column and row; a path's `x` and `y` are those of each lane."""
         return ("column", "row") if self.role == PATH else ("x", "y")

@@ -17,7 +17,7 @@ accessed from the index of the first one on, or read at an index with as many la
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 from .interface import Interface
@@ -37,7 +37,7 @@ class Type:
         return Type(self.dtype, lanes)
 
 
-FLOAT, INT, BOOL, BYTE = Type(), Type("int32"), Type("bool"), Type("uint8")
+FLOAT, INT, WORD, BOOL, BYTE = Type(), Type("int32"), Type("uint32"), Type("bool"), Type("uint8")
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Expr:
     """A value without effect.
 
     `const` and `name` have a `value`; `load` has an array's name and its index as arguments; `component` has
-    the lane, `convert` the kind, `call` a function's name; `splat` repeats a value in all lanes.
-    `clamp` limits an index, or several that follow each other, one per lane. All others are rows of
-    core/ops.py.
+    the lane, `convert` the kind, `call` a function's name; `splat` repeats a value in all lanes, `lanes` are
+    their numbers, and `any` tells whether one of them is true. `clamp` limits an index, or several that
+    follow each other, one per lane. All others are rows of core/ops.py.
     """
 
     op: str
@@ -168,6 +168,13 @@ class For:
 
 
 @dataclass(frozen=True)
+class Break:
+    """The end of the loop in whose own body it is, where its condition holds."""
+
+    condition: Expr
+
+
+@dataclass(frozen=True)
 class If:
     """A branch."""
 
@@ -217,7 +224,7 @@ class Call:
     views: tuple[View, ...]
 
 
-Statement = Comment | Let | Array | Store | Write | For | If | Block | Barrier | Launch | Call
+Statement = Comment | Let | Array | Store | Write | For | Break | If | Block | Barrier | Launch | Call
 Body = tuple[Statement, ...]
 
 
@@ -330,6 +337,16 @@ def splat(value: Expr, lanes: int) -> Expr:
     return value if value.type.lanes == lanes else Expr("splat", (value,), value.type.of(lanes))
 
 
+def lanes(count: int) -> Expr:
+    """Return the number of each lane."""
+    return Expr("lanes", (), WORD.of(count)) if count > 1 else const(0, WORD)
+
+
+def any_lane(mask: Expr) -> Expr:
+    """Return whether a condition holds in any lane."""
+    return Expr("any", (mask,), BOOL)
+
+
 def stack(values: Sequence[Expr]) -> Expr:
     """Return a vector of single values."""
     return Expr("stack", tuple(values), values[0].type.of(len(values)))
@@ -391,29 +408,18 @@ def walk(body: Body) -> list[Statement]:
 
 def values(statement: Statement) -> list[Expr]:
     """Return the expressions of a statement itself."""
-    if isinstance(statement, Let):
-        return [statement.value]
-    if isinstance(statement, Store):
-        return [*statement.index, statement.value]
-    if isinstance(statement, Write):
-        return [statement.row, statement.column, *statement.values]
-    if isinstance(statement, Array):
-        sizes = [size for size in statement.sizes if isinstance(size, Expr)]
-        return [*sizes, *([statement.value] if statement.value else [])]
-    if isinstance(statement, For):
-        return [
-            statement.start,
-            statement.count,
-            statement.step,
-            *([statement.until] if statement.until else []),
-        ]
-    if isinstance(statement, If):
-        return [statement.condition]
-    if isinstance(statement, Launch):
-        return list(statement.counts)
-    if isinstance(statement, Call):
-        return [each for view in statement.views for each in (*view.index, view.step)]
-    return []
+    found: list[Expr] = []
+
+    def note(part: Any) -> None:
+        if isinstance(part, Expr):
+            found.append(part)
+        elif isinstance(part, tuple | View):
+            for each in part if isinstance(part, tuple) else (part.index, part.step):
+                note(each)
+
+    for each in fields(statement):
+        note(getattr(statement, each.name))
+    return found
 
 
 def parts(value: Expr) -> list[Expr]:
@@ -432,41 +438,16 @@ def operations(kernel: Kernel) -> set[str]:
 def rewritten(body: Body, change: Callable[[Expr], Expr]) -> Body:
     """Return statements with a function applied to each of their expressions."""
 
-    def each(statement: Statement) -> Statement:
-        if isinstance(statement, Let):
-            return replace(statement, value=change(statement.value))
-        if isinstance(statement, Store):
-            index = tuple(map(change, statement.index))
-            return replace(statement, index=index, value=change(statement.value))
-        if isinstance(statement, Write):
-            return Write(
-                change(statement.row), change(statement.column), tuple(map(change, statement.values))
-            )
-        if isinstance(statement, Array):
-            return replace(statement, value=statement.value and change(statement.value))
-        if isinstance(statement, For):
-            until = statement.until and change(statement.until)
-            ends = {"count": change(statement.count), "start": change(statement.start), "until": until}
-            return replace(statement, body=rewritten(statement.body, change), **ends)  # type: ignore[arg-type]
-        if isinstance(statement, If):
-            bodies = {
-                "body": rewritten(statement.body, change),
-                "otherwise": rewritten(statement.otherwise, change),
-            }
-            return replace(statement, condition=change(statement.condition), **bodies)
-        if isinstance(statement, Block):
-            return Block(rewritten(statement.body, change))
-        if isinstance(statement, Launch):
-            across, down = map(change, statement.counts)
-            return replace(statement, counts=(across, down), body=rewritten(statement.body, change))
-        if isinstance(statement, Call):
-            views = (
-                replace(v, index=tuple(map(change, v.index)), step=change(v.step)) for v in statement.views
-            )
-            return replace(statement, views=tuple(views))
-        return statement
+    def anew(part: Any) -> Any:
+        if isinstance(part, Expr):
+            return change(part)
+        if isinstance(part, tuple):
+            return tuple(map(anew, part))
+        if isinstance(part, Statement | View):
+            return replace(part, **{each.name: anew(getattr(part, each.name)) for each in fields(part)})
+        return part
 
-    return tuple(map(each, body))
+    return tuple(map(anew, body))
 
 
 def substituted(value: Expr, known: Mapping[str, Expr]) -> Expr:

@@ -201,14 +201,15 @@ class Memory:
             self.reader[:, groups] = NOBODY
 
     def image(self, planes: bool, width: int) -> NDArray[Any]:
-        """Return the result (H, W, C), or planes (C, H, stride); all of the image must be written."""
+        """Return the result (H, W, C), or planes (C, H, W) of it; all of the image must be written."""
         assert self.written is not None, "a result is written"
-        written = self.written.reshape(self.sizes)
-        written = np.moveaxis(written[..., :width], 0, -1) if planes else written
+        written, data = self.written.reshape(self.sizes), self.data.reshape(self.sizes)
+        if planes:  # whose rows may be longer
+            written, data = np.moveaxis(written[..., :width], 0, -1), data[..., :width]
         if not written.all():
             row, column, channel = np.unravel_index(int(np.argmin(written)), written.shape)
             raise KernelError(f"channel {channel} of pixel ({column}, {row}) of the result is never written")
-        return self.data.reshape(self.sizes)
+        return data
 
 
 class Part:

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from ..core.ops import OPS
 from .domain import STORED, Domain, computed
-from .interface import IMAGE, READ, RESULT, WEIGHTS, WRITE
+from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .kernel import (
     BATCH,
     FLOAT,
     INTEGERS,
     Array,
     Body,
+    Break,
     Call,
     Expr,
     For,
@@ -53,25 +54,24 @@ def run(
     kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain | None = None
 ) -> NDArray[Any]:
     """Return the result (H, W, C) for images (H, W, channels) by name, or raise a KernelError."""
-    arrays = {f"{IMAGE}{key}": image for key, image in images.items()}
     height, width = next(iter(images.values())).shape[:2]
-    return run_on(kernel, arrays, {"width": width, "height": height}, weights, domain)[RESULT]
+    arrays = {WEIGHTS: weights, **{f"{IMAGE}{key}": image for key, image in images.items()}}
+    return run_on(kernel, arrays, {"width": width, "height": height}, domain)[RESULT]
 
 
 def run_on(
     kernel: Kernel,
     arrays: Mapping[str, NDArray[Any]],
     integers: Mapping[str, int],
-    weights: NDArray[Any] | None = None,
     domain: Domain | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays that a kernel writes, by name, for those that it reads and for its integers."""
     verify(kernel)
     with np.errstate(all="ignore"):
-        runner = Runner(kernel, arrays, integers, weights, domain or Domain())
+        runner = Runner(kernel, arrays, integers, domain or Domain())
         runner.body(kernel.body)
-    written = [each for each in kernel.interface.arrays if each.access == WRITE]
-    return {a.name: runner.given[a.name].image(bool(a.planes), integers["width"]) for a in written}
+    width, results = integers["width"], runner.results
+    return {a.name: results[a.name].image(bool(a.planes), width) for a in kernel.interface.written}
 
 
 class Runner:
@@ -82,7 +82,6 @@ class Runner:
         kernel: Kernel,
         arrays: Mapping[str, NDArray[Any]],
         integers: Mapping[str, int],
-        weights: NDArray[Any] | None,
         domain: Domain,
     ) -> None:
         self.kernel, self.domain = kernel, domain
@@ -90,18 +89,19 @@ class Runner:
         self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
         self.numbers: dict[int, Values] = {}
-        self.items, places = self._items(integers["width"], integers["height"])
-        self.names: dict[str, Values] = {**self.constants, **integers, **places}
-        self.given: dict[str, Memory] = {}
-        for array in kernel.interface.arrays:
-            if array.access == READ and array.name != WEIGHTS:
-                self.given[array.name] = Memory.of(array.name, domain.lift(arrays[array.name]), "read")
-            elif array.access == WRITE:
-                shape = [integers[each] if isinstance(each, str) else each for each in array.shape]
-                self.given[array.name] = Memory.of(array.name, np.zeros(shape, domain.dtype), "result")
-        self.memory: dict[str, Memory | Part] = {**self.given}
-        if weights is not None:
-            self.memory[WEIGHTS] = self._weights(weights)
+        self.items, places = self._items(integers["width"], integers[kernel.interface.rows])
+        self.names: dict[str, Values] = {**self.constants, **places}
+        for key, number in integers.items():
+            self.names[key] = np.uint32(number) if key in UNSIGNED else number
+        self.memory: dict[str, Memory | Part] = {}
+        for key, array in arrays.items():
+            weights = key == WEIGHTS
+            self.memory[key] = self._weights(array) if weights else Memory.of(key, domain.lift(array), "read")
+        self.results: dict[str, Memory] = {}
+        for each in kernel.interface.written:
+            shape = [size if isinstance(size, int) else integers[size] for size in each.shape]
+            self.results[each.name] = Memory.of(each.name, np.zeros(shape, domain.dtype), "result")
+        self.memory |= self.results
         self.evaluators = self._evaluators()
         if kernel.batch is not None:
             self.names |= dict(zip(BATCH, (0, self.value(kernel.batch)), strict=True))
@@ -145,13 +145,15 @@ class Runner:
         """Run a statement."""
         getattr(self, f"_run_{type(statement).__name__.lower()}")(statement)
 
-    def _under(self, mask: NDArray[np.bool_], body: Body) -> None:
-        """Run statements for some of the active items."""
+    def _under(self, mask: NDArray[np.bool_], body: Body) -> NDArray[np.bool_]:
+        """Run statements for some of the active items; return those that no break has stopped."""
         before = self.items.mask
         if mask.any():
             self.items.only(mask)
             self.body(body)
+            mask = self.items.mask
             self.items.only(before)
+        return mask
 
     def _run_comment(self, statement: Statement) -> None:
         """Skip a comment."""
@@ -175,6 +177,9 @@ class Runner:
 
     def _run_store(self, statement: Store) -> None:
         """Write an element, or add to it."""
+        if statement.value.type.lanes > 1 and statement.array in self.results:
+            self._spread(statement)
+            return
         kind, value = statement.value.type, self.value(statement.value)
         memory, place = self._place(statement.array, statement.index, kind)
         if statement.add:
@@ -185,6 +190,15 @@ class Runner:
                 else read + value
             )
         memory.write(self.items, place, kind, value)
+
+    def _spread(self, statement: Store) -> None:
+        """Write the lanes of a value to pixels side by side, up to the end of a row."""
+        mask, index, axis = self.items.mask, statement.index, 1 if statement.array.startswith(IMAGE) else 2
+        for lane in range(statement.value.type.lanes):
+            there, value = index[axis] + lane, statement.value.lane(lane)
+            inside = mask & (self.value(there) < self.results[statement.array].sizes[axis])
+            store = Store(statement.array, (*index[:axis], there, *index[axis + 1 :]), value)
+            self._under(inside, (store,))
 
     def _run_write(self, statement: Write) -> None:
         """Write all channels of a pixel."""
@@ -197,7 +211,8 @@ class Runner:
         start, count, step = map(self.value, ends)
         if not np.all(np.asarray(step) > 0):
             raise KernelError(f"the loop over {statement.name} has a step that is not positive")
-        if statement.until is None and all(isinstance(each, int) for each in (start, count, step)):
+        breaks = statement.until or any(isinstance(each, Break) for each in statement.body)
+        if not breaks and all(isinstance(each, int) for each in (start, count, step)):
             for turn in range(start, count, step):
                 self.names[statement.name] = turn
                 self.body(statement.body)
@@ -213,8 +228,12 @@ class Runner:
                 self.items.only(before)
             if not mask.any():
                 return
-            self._under(mask, statement.body)
+            mask = self._under(mask, statement.body)
             turn = turn + step
+
+    def _run_break(self, statement: Break) -> None:
+        """Leave the other items in the loop."""
+        self.items.only(self.items.mask & ~np.asarray(self.value(statement.condition)))
 
     def _run_if(self, statement: If) -> None:
         """Run each branch for the items that take it."""
@@ -329,6 +348,15 @@ class Runner:
         """Return an entry of a table."""
         table, index = self.tables[value.value], self.value(value.args[0])
         return table[self.items.checked(value.value, index, len(table))]
+
+    def _value_any(self, value: Expr) -> Values:
+        """Return whether a condition holds in any lane."""
+        mask = np.asarray(self.value(value.args[0]))
+        return mask.any(axis=0) if mask.ndim == 2 else mask
+
+    def _value_lanes(self, value: Expr) -> Values:
+        """Return the number of each lane."""
+        return np.arange(value.type.lanes, dtype=np.uint32)[:, None]
 
     def _value_component(self, value: Expr) -> Values:
         """Return one component of a vector."""

@@ -22,9 +22,11 @@ from .kernel import (
     FLOAT,
     INT,
     INTEGERS,
+    WORD,
     Array,
     Barrier,
     Body,
+    Break,
     Call,
     Expr,
     For,
@@ -81,6 +83,7 @@ class Verifier:
         self.functions: dict[str, Function] = {}
         self.tables = {key: np.asarray(table) for key, table in kernel.tables}
         self.branches = 0
+        self.loops: list[int] = []
         self.rules: dict[str, Callable[[Expr], Type]] = {
             key.removeprefix("_type_"): getattr(self, key) for key in dir(self) if key.startswith("_type_")
         }
@@ -245,7 +248,9 @@ class Verifier:
         array, kind = statement.array, self.type(statement.value)
         if not self.array(array).written:
             raise KernelError(f"{array} is written, which is read only")
-        self.element(array, statement.index, kind)
+        # Lanes of planes and images are pixels of a row, of which those beyond its end are not written.
+        pixels = self.kernel.interface.role != DENOISE and self.kernel.interface.named(array) is not None
+        self.element(array, statement.index, kind.of(1) if pixels else kind)
         if statement.add and (array == RESULT or kind.dtype not in ("float32", "int32", "uint32")):
             raise KernelError(f"a value of type {kind} is added to {array}")
 
@@ -270,10 +275,23 @@ class Verifier:
         self.declare(name, Declared(INT))
         if statement.until is not None:
             self.check(statement.until, BOOL, f"the condition of the loop over {name}")
+        apart |= any(isinstance(each, Break) for each in statement.body)
         self.branches += apart
-        self.body(statement.body, depth + 1)
+        self.turns(statement.body, depth + 1)
         self.branches -= apart
         self.scopes.pop()
+
+    def turns(self, body: Body, depth: int) -> None:
+        """Check the body of a loop."""
+        self.loops.append(depth)
+        self.body(body, depth)
+        self.loops.pop()
+
+    def _check_break(self, statement: Break, depth: int) -> None:
+        """Check the condition that ends a loop."""
+        self.check(statement.condition, BOOL, "the condition that ends a loop")
+        if self.loops[-1:] != [depth]:
+            raise KernelError("a break outside of a loop's own body")
 
     def _check_if(self, statement: If, depth: int) -> None:
         """Check a branch."""
@@ -420,11 +438,21 @@ class Verifier:
         """Return the type of an entry of a table."""
         if value.value not in self.tables:
             raise KernelError(f"{value.value} is not a table")
-        self.check(value.args[0], INT, f"the index of {value.value}")
+        self.check(value.args[0], INT.of(value.type.lanes), f"the index of {value.value}")
         number, size = self.constant(value.args[0]), len(self.tables[value.value])
         if number is not None and not 0 <= number < size:
             raise KernelError(f"index {number} is beyond {value.value}, which has {size}")
-        return Type(str(self.tables[value.value].dtype))
+        return Type(str(self.tables[value.value].dtype), value.type.lanes)
+
+    def _type_any(self, value: Expr) -> Type:
+        """Return the type of what holds in any lane."""
+        self.arity(value, 1)
+        self.check(value.args[0], BOOL.of(value.args[0].type.lanes), "what may hold in any lane")
+        return BOOL
+
+    def _type_lanes(self, value: Expr) -> Type:
+        """Return the type of the numbers of lanes."""
+        return WORD.of(value.type.lanes)
 
     def _type_dot4(self, value: Expr) -> Type:
         """Return the type of products of bytes of words with four bytes, or with those of a word."""

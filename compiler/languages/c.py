@@ -11,7 +11,7 @@ the header of a denoiser's other kernel [`C.finished`, `C.apart`].
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import (
@@ -25,8 +25,9 @@ from ..kernel.instructions import (
     VECTORS,
     gnu_vectors,
 )
-from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Interface
+from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Array, Interface
 from ..kernel.kernel import Kernel, operations
+from .c_path import HELPERS, MASKS, NUMBERS_OF_PATHS, OPERATIONS, PATHS, TYPES
 from .dialect import Dialect, Parts
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
 
@@ -162,7 +163,11 @@ class C(Arguments):
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif""",
     )
-    types = scalars = {**Dialect.types, "int32": "int32_t", "uint32": "uint32_t"}
+    vector_kinds: Mapping[str, str] = {"float32": "wamnet_vector", "int32": "wamnet_sums"}
+    at_once = "as many paths as a vector register of the compiler's target holds"
+    path_lanes = 16
+    paints = True
+    scalars = {**Dialect.scalars, "int32": "int32_t", "uint32": "uint32_t"}
     table = "static const {type} {name}[{count}] = {{{values}}};"
     operations = {
         **Dialect.operations,
@@ -202,7 +207,7 @@ class C(Arguments):
         fields = [f"    {self.typed(name)};" for name in kernel.integers]
         said = "/* What all pixels of a launch share. */"
         part = [said, "typedef struct {", *fields, "} wamnet_part;", ""]
-        return [*head, IGNORED, self.depth(parts), parts.top, *part]
+        return [*head, IGNORED, PATHS + NUMBERS_OF_PATHS + parts.top, *part]
 
     def typed(self, name: str) -> str:
         """Return the declaration of an integer, without what ends it."""
@@ -268,8 +273,10 @@ class C(Arguments):
         Headers of several roles may be in one source, and share no name.
         """
         found, role = super().fitted(kernel), kernel.interface.role
-        found.calls_vectors = not kernel.functions
+        found.calls_vectors = not kernel.functions and role != PATH
         found.clamp = self.clamp if role == DENOISE else f"wamnet_{role}_clamp"
+        if role == PATH:
+            vars(found).update(vector_kinds=TYPES, vector_operations=OPERATIONS, helpers=HELPERS)
         return found
 
     def transform_head(self, name: str, kind: str) -> str:
@@ -282,11 +289,13 @@ class C(Arguments):
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of one value in all lanes."""
+        if kind in TYPES.values():
+            return f"wamnet_all({kind}, {MASKS.get(values[0], values[0])})"
         return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of the vector type."""
-        return {"float32": "wamnet_vector", "int32": "wamnet_sums"}[dtype]
+        return self.vector_kinds[dtype]
 
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""
@@ -318,12 +327,18 @@ class C(Arguments):
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the functions have the place of a pixel already."""
         return [
-            "    const int samples = part->samples;",
             "    const int left = part->width - column;",
             "    const size_t line = (size_t)(row + part->first_row);",
             "    const size_t place = line * (size_t)part->width + (size_t)column;",
-            *self.path_start(kernel),
+            *self.places_of_planes(kernel),
         ]
+
+    def written(self, array: Array, index: Sequence[str], value: str, lanes: int) -> str:
+        """Return the statement that writes an element, or those of pixels that are left of a row."""
+        if lanes == 1:
+            return super().written(array, index, value, lanes)
+        step = 1 if array.planes else array.shape[-1]
+        return f"wamnet_write(&{self.read(array, index, lanes)}, {step}, {value}, left);"
 
 
 Two = tuple[str, str]

@@ -7,12 +7,6 @@ Sums are bit-identical either way.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from ..kernel.interface import Interface
-from .c import C
-from .dialect import Parts
-
 PATHS = """\
 /* Paths traced at once: the floats of a vector register, where GCC or clang has vectors and aligns them. */
 #if defined(WAMNET_PORTABLE) || !defined(__GNUC__) || (__GNUC__ < 9 && !defined(__clang__)) || \\
@@ -119,39 +113,35 @@ def _look_up(type_name: str, element: str) -> str:
     return EACH.format(type_name, f"{type_name}_at", taken, "table[wamnet_lane(index, i)]")
 
 
-class CPath(C):
-    """The dialect's table."""
+TYPES = {"float32": "wamnet_reals", "int32": "wamnet_ints", "uint32": "wamnet_words", "bool": "wamnet_masks"}
+"""The types of values."""
 
-    at_once = "as many paths as a vector register of the compiler's target holds"
-    any_lane = any_enters = "wamnet_any({mask})"
-    lane_numbers = "wamnet_numbers()"
-    splatted = "wamnet_all({type}, {value})"
-    types = dict(zip(C.types, ("wamnet_reals", "wamnet_ints", "wamnet_words", "wamnet_masks"), strict=True))
-    sum_store = "wamnet_write(&sums[{plane} * plane + at], 1, {value}, left);"
-    painted = "wamnet_write(&image_{image}[place * {channels} + {channel}], {channels}, {value}, left)"
-    operations = {
-        **C.operations,
-        **{name: f"wamnet_{name}({{0}})" for name in ("absolute", "floor", "sqrt")},
-        **{name: f"wamnet_{name}f({{0}})" for name in ("exp", "sin", "cos")},
-        "power": "wamnet_powf({0}, {1})",
-        "minimum": "wamnet_select({type}, {1} < {0}, {1}, {0})",
-        "maximum": "wamnet_select({type}, {1} > {0}, {1}, {0})",
-        "convert": "wamnet_convert({type}, {0})",
-        "logical_and": "{0} & {1}",
-        "logical_or": "{0} | {1}",
-        "logical_not": "wamnet_not({0})",
-        "select": "wamnet_select({type}, {0}, {1}, {2})",
-        "take": "{type}_at({table}, {0})",
-        "row": "wamnet_all({type}, {table}[{0}])",
-    }
-    helpers = {
-        **{name: _on_each(f"{name}f", "a") for name in ("exp", "sin", "cos")},
-        "sqrt": _on_each("sqrtf", "a") + ROOTS,
-        "power": _on_each("powf", "a", "b"),
-        "take": _look_up("wamnet_reals", "float") + _look_up("wamnet_ints", "int32_t"),
-    }
+MASKS = {"true": "-1", "false": "0"}
+"""A boolean in all lanes."""
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return the lines above the functions."""
-        numbers = EACH.format("wamnet_words", "wamnet_numbers", "void", "(uint32_t)i")
-        return super().top(kernel, replace(parts, top=f"{PATHS}{numbers}{parts.top}"))
+NUMBERS_OF_PATHS = EACH.format("wamnet_words", "wamnet_numbers", "void", "(uint32_t)i")
+"""The function that numbers the lanes."""
+
+OPERATIONS = {
+    **{name: f"wamnet_{name}({{0}})" for name in ("absolute", "floor", "sqrt", "any")},
+    **{name: f"wamnet_{name}f({{0}})" for name in ("exp", "sin", "cos")},
+    "power": "wamnet_powf({0}, {1})",
+    "minimum": "wamnet_select({type}, {1} < {0}, {1}, {0})",
+    "maximum": "wamnet_select({type}, {1} > {0}, {1}, {0})",
+    "convert": "wamnet_convert({type}, {0})",
+    "logical_and": "{0} & {1}",
+    "logical_or": "{0} | {1}",
+    "logical_not": "wamnet_not({0})",
+    "select": "wamnet_select({type}, {0}, {1}, {2})",
+    "take": "{type}_at({table}, {0})",
+    "lanes": "wamnet_numbers()",
+}
+"""Operations on values of several paths that are not the operators of single ones."""
+
+HELPERS = {
+    **{name: _on_each(f"{name}f", "a") for name in ("exp", "sin", "cos")},
+    "sqrt": _on_each("sqrtf", "a") + ROOTS,
+    "power": _on_each("powf", "a", "b"),
+    "take": _look_up("wamnet_reals", "float") + _look_up("wamnet_ints", "int32_t"),
+}
+"""The functions that operations call."""

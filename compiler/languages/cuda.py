@@ -56,7 +56,7 @@ class CUDA(Arguments):
     writes = "float *__restrict__ {name}"
     long = "size_t"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
-    types = scalars = {**Dialect.types, "uint32": "unsigned int"}
+    scalars = {**Dialect.scalars, "uint32": "unsigned int"}
     clamp = "wamnet_clamp"
     max_output_channels = 2**16
     group = (16, 8)

@@ -2,13 +2,13 @@
 
 A dialect is all that the emitters know of a language, for every role of a kernel:
 
-1. Statements are made by methods [`Dialect.let`, `Dialect.loop`, ...] and by templates of one line. Names in
-   braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an output
-   channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its result,
-   `table` the name of its table, `name`, `count` and `values` of a table's declaration; of sums, `plane` the
-   number of a plane, `buffer` and `component` its place where a texture holds several. An operation's
-   template may differ for a kind of operand: `minimum.int32`. The text between is the language's own, its
-   braces doubled.
+1. Statements are made by methods [`Dialect.let_value`, `Dialect.for_loop`, ...] and by templates of one line.
+   Names in braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an
+   output channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its
+   result, `table` the name of its table, `name`, `count` and `values` of a table's declaration. An
+   operation's template may differ for a kind of operand: `minimum.int32`. The text between is the language's
+   own, its braces doubled. Arrays of other kernels than denoisers are accessed by a pair of methods
+   [`Dialect.read`, `Dialect.written`].
 2. A kernel opens with what it is bound to [`Dialect.begin`]: each binding style declares an interface
    [interface.py] in its own way [openings.py for buffers, glsl.py for textures], and ends with [`ends`].
 """
@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import Node
 from ..core.profiles import SineContract
 
 if TYPE_CHECKING:
@@ -53,12 +52,11 @@ class Parts:
     """What a kernel's first lines hold in addition to its interface.
 
     `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must keep
-    the order of operations; `max_depth`: scatterings of a path.
+    the order of operations.
     """
 
     top: str = ""
     bounded: bool = False
-    max_depth: int = 0
     kernel: Kernel | None = None
 
 
@@ -69,14 +67,10 @@ class Dialect:
     `assumes`: what a bound rests on that the language does not promise.
     `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
-    channel. A path kernel follows `lanes` paths at once; where that is more than one, a value has a component
-    for each, written `splatted` if it is the same for all, and `single` declares what is the same for all.
-    `at_once` describes their number if the target's compiler chooses it. `helpers`: functions that an
-    operation calls. `scene_number` reads an input of the scene, by its `number`, or the `vector` of four and
-    the `component`; a kernel takes `most_numbers`, and callers read `said_numbers`. `painted`
-    writes a channel of an image in a path kernel, by the function `painter` if that is there; a language
-    without it writes sums.
-    `types` are those of values; `scalars` those of single numbers, where values are vectors.
+    channel. A path kernel has `path_lanes` paths at once where the target's compiler chooses their number,
+    which `at_once` describes; it takes `most_numbers` of a scene, and callers read `said_numbers`. `paints`:
+    it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
+    `scalars`: the types of single numbers.
     """
 
     target: str
@@ -100,32 +94,21 @@ class Dialect:
     unordered: tuple[str, str] = ("", "")
     assumes: str = ""
     first: tuple[str, ...] = ()
-    counted: str = "for (int {i} = {start}; {i} < {count}; ++{i}) {{"
-    stepped: str = "for (int {i} = 0; {i} < {count};) {{"
     define: str = "#define {name} {value}"
-    choice: str = "{0} ? {1} : {2}"
     clamp: str = "clamp"
-    types: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
+    scalars: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
     byte: str = "uchar"
-    scalars: Mapping[str, str] = types
     qualifiers: Mapping[str, str] = {}
     table: str
-    lanes: int = 1
-    splatted: str = ""
-    lane_numbers: str = "0u"
     at_once: str = ""
-    any_lane: str = "{mask}"
-    any_enters: str = "{mask}"
+    path_lanes: int = 0
     helpers: Mapping[str, str] = {}
     said_numbers: str = f"{SCENE_NUMBERS}: {{count}} floats, after the sums in the list of arguments"
     most_numbers: int = 2**16
-    scene_number: str = f"{SCENE_NUMBERS}[{{number}}]"
     planes_per_buffer: int = 1
     max_planes: int = 2**16
     max_images: int = 2**16
-    sum_store: str = "sums[{plane} * plane + at] = {value};"
-    painted: str = ""
-    painter: str = ""
+    paints: bool = False
     unroll: str = ""
     casts: bool = False
     numbered: bool = False
@@ -180,8 +163,7 @@ class Dialect:
         "bitwise_xor": "{0} ^ {1}",
         "right_shift": "{0} >> {1}",
         "select": "{0} ? {1} : {2}",
-        "take": "{table}[{0}]",
-        "row": "{table}[{0}]",
+        "any": "{0}",
     }
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
@@ -223,66 +205,12 @@ class Dialect:
         """Return the text of an integer that the kernel is given."""
         return name
 
-    def place(self, kernel: Interface) -> tuple[str, str]:
-        """Return the texts of an item's column and row."""
-        return kernel.place
-
-    def shared(self, kernel: Interface) -> Mapping[str, str]:
-        """Return the texts of the numbers that all lanes of a path kernel share, by name."""
-        column, row = self.place(kernel)
-        below = f"{row} + {self.integer(kernel, 'first_row')}"
-        texts = {"column": self.cast("uint32", column), "row": self.cast("uint32", below)}
-        texts["seed"] = self.integer(kernel, "seed_number")
-        for name in ("width", "height"):
-            texts[name] = self.cast("float32", self.integer(kernel, name))
-        texts["sample"] = f"{self.integer(kernel, 'first_sample')} + {self.cast('uint32', 'n')}"
-        floats = ("width", "height")
-        return {n: self.splat(text, "float32" if n in floats else "uint32") for n, text in texts.items()}
-
-    def splat(self, value: str, dtype: str) -> str:
-        """Return the text of a number that is the same in all lanes."""
-        return self.splatted.format(type=self.types[dtype], value=value) if self.splatted else value
-
-    def depth(self, parts: Parts) -> str:
-        """Return the definition of the number of scatterings."""
-        return f"#define MAX_DEPTH {parts.max_depth}u /* scatterings of a path */"
-
-    def bounces(self) -> str:
-        """Return the line that opens the loop over a path's bounces."""
-        return f"for ({self.scalars['uint32']} bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {{"
-
-    def path_start(self, kernel: Interface) -> list[str]:
-        """Return the first statements of a path kernel: pixel and seed, in all lanes."""
-        shared = self.shared(kernel)
-        texts = {"x": f"{shared['column']} + {self.lane_numbers}", "y": shared["row"], "seed": shared["seed"]}
-        return [f"    {self.let('uint32', name, text)}" for name, text in texts.items()]
-
-    def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the last statements of a path kernel: the channels of each image's pixel, by name."""
-        return [
-            f"    {self.painted.format(image=name, channels=len(texts), channel=channel, value=text)};"
-            for name, texts in values.items()
-            for channel, text in enumerate(texts)
-        ]
-
     def results(self, channels: int) -> list[str]:
         """Return what is written into, in order; a language with one result for all channels has one."""
         most = self.channels_per_result
         if most is None or channels <= most:
             return ["result"]
         return [f"result_{number}" for number in range(-(-channels // most))]
-
-    def variable(self, dtype: str) -> str:
-        """Return the words before the name of a variable of this kind."""
-        return self.qualifiers.get(dtype, "") + self.types[dtype]
-
-    def let(self, dtype: str, name: str, value: str, kept: bool = False) -> str:
-        """Return the declaration of a value; `kept`: its operations stay in order where the language can."""
-        return self.let_value(self.variable(dtype) if kept else self.types[dtype], name, value)
-
-    def single(self, name: str, value: str) -> str:
-        """Return the declaration of one number, also in a language whose values are vectors."""
-        return self.let_value(self.scalars["float32"], name, value)
 
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
@@ -402,41 +330,8 @@ class Dialect:
         """Return the declaration of a place in an image or a window."""
         return f"int {name} = {value};"
 
-    def var(self, dtype: str, name: str, value: str = "", kept: bool = False) -> str:
-        """Return the declaration of a variable that is assigned later, or again."""
-        return self.memory(self.variable(dtype) if kept else self.types[dtype], name, [], value)
-
-    def loop(self, counter: str, count: int | str, start: int | str = 0) -> str:
-        """Return the line that opens a loop of a counter from `start` on."""
-        return self.counted.format(i=counter, count=count, start=start)
-
-    def walk(self, counter: str, count: int) -> str:
-        """Return the line that opens a loop whose body moves the counter from 0 on."""
-        return self.stepped.format(i=counter, count=count)
-
-    def select(self, condition: str, yes: str, no: str) -> str:
-        """Return the text of a choice between two numbers."""
-        return self.choice.format(condition, yes, no)
-
-    def expression(self, node: Node, kind: str, operands: Sequence[str]) -> str:
-        """Return the text of an operation on operands, the last of which is of the given kind."""
-        template = self.operations.get(f"{node.op}.{kind}") or self.operations[node.op]
-        kinds = {"type": self.types[node.type.dtype], "lanes": self.lanes}
-        return template.format(*operands, **kinds, table=node.get("table"))
-
-    def constant(self, node: Node) -> str:
-        """Return the text of a constant."""
-        return self.number(node["value"], node.type.dtype)
-
     def number(self, value: Any, dtype: str) -> str:
-        """Return the text of a number of the given kind, in all lanes where values are vectors."""
-        text = self.single_number(value, dtype)
-        if self.splatted:
-            return self.splat({"true": "-1", "false": "0"}.get(text, text.strip("()")), dtype)
-        return text
-
-    def single_number(self, value: Any, dtype: str) -> str:
-        """Return the text of one number."""
+        """Return the text of a number of the given kind."""
         if dtype == "float32":
             return self.literal(float(value))
         if dtype == "bool":
@@ -447,7 +342,7 @@ class Dialect:
     def table_declaration(self, name: str, array: NDArray[Any]) -> str:
         """Return the declaration of a constant table."""
         dtype = str(array.dtype)
-        texts = [self.single_number(value, dtype) for value in array]
+        texts = [self.number(value, dtype) for value in array]
         values = ", ".join(texts)
         if len(texts) > LONG_TABLE:
             rows = (", ".join(texts[i : i + TABLE_ROW]) for i in range(0, len(texts), TABLE_ROW))

@@ -137,6 +137,7 @@ class GLSL(Dialect):
             "Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y"
         ),
     }
+    fragment = ("int(gl_FragCoord.x)", "int(gl_FragCoord.y)")
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result: int | None = 4
     planes_per_buffer = 4
@@ -144,8 +145,6 @@ class GLSL(Dialect):
     max_images = MOST_RESULTS  # of GLSL ES too: most devices draw into more buffers than it promises
     most_numbers = 4 * MOST_UNIFORMS
     said_numbers = f"uniform vec4 {SCENE_NUMBERS}[]: {{count}} floats, four to a vector, the last one padded"
-    scene_number = f"{SCENE_NUMBERS}[{{vector}}].{{component}}"
-    sum_store = "sums_{buffer}[{component}] = {value};"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"
@@ -235,7 +234,6 @@ class GLSL(Dialect):
         outputs = range(-(-planes // self.planes_per_buffer))
         scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
         return [
-            self.depth(parts),
             parts.top,
             *(f"layout(location = {number}) out vec4 sums_{number};" for number in outputs),
             *self.uniforms(kernel),
@@ -243,8 +241,12 @@ class GLSL(Dialect):
             "",
             "void main()",
             "{",
-            *self.path_start(kernel),
+            *self.places(kernel),
         ]
+
+    def places(self, kernel: Interface) -> list[str]:
+        """Return the declarations of a fragment's column and row."""
+        return [f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)]
 
     def uniforms(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers."""
@@ -263,8 +265,7 @@ class GLSL(Dialect):
             "",
             "void main()",
             "{",
-            "    int x = int(gl_FragCoord.x);",
-            "    int y = int(gl_FragCoord.y);",
+            *self.places(kernel),
             *(f"    {name} = vec4(0.0);" for name in written),
         ]
 
@@ -290,8 +291,11 @@ class GLSL(Dialect):
         return [f"{array.name}_{number}" for number in range(count)] or [array.name]
 
     def read(self, array: Given, index: Sequence[str], lanes: int) -> str:
-        """Return an element of a texture, or a component of a colour buffer."""
+        """Return an element of a texture, a component of a colour buffer, or a number of the scene."""
         name, part = array.name, "[0]"
+        if name == SCENE_NUMBERS:
+            number, component = divmod(int(index[0]), 4)
+            return f"{name}[{number}].{'xyzw'[component]}"
         row, column = ("0", *index)[-2:]
         if array.planes:
             number, component = divmod(int(index[0]), self.planes_per_buffer)
@@ -300,10 +304,6 @@ class GLSL(Dialect):
             row, column, part = index[0], index[1], f"[{index[2]}]"
         written = array.access == WRITE
         return f"{name}{part}" if written else f"texelFetch({name}, ivec2({column}, {row}), 0){part}"
-
-    def place(self, kernel: Interface) -> tuple[str, str]:
-        """Return the texts of a fragment's column and row."""
-        return ("gl_FragCoord.x", "int(gl_FragCoord.y)")
 
 
 class GLSLCompute(GLSL):

@@ -82,15 +82,14 @@ class Declared(Buffers):
         """Return an array's name in the kernel, and the type of its elements."""
         if array.name == WEIGHTS and self.vectors and self.vectors.lanes > 1:
             return "w", self.vector_kind(self.vectors.dtype, self.vectors.lanes)
-        return array.name, self.types["float32"]
+        return array.name, self.scalars["float32"]
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
-        tables = [parts.top] if kernel.role == PATH else []
-        above = {PATH: [self.depth(parts)], DENOISE: [parts.top]}.get(kernel.role, [])
+        above = [] if kernel.role == ENCODE else [parts.top]
         shared = self.group_memory(parts.kernel) if parts.kernel else []
         words = parts.kernel is not None and parts.kernel.weights.dtype == "int32"
-        return [*above, *self.declared(kernel), *tables, *shared, "", *([self.instructions] if words else [])]
+        return [*above, *self.declared(kernel), *shared, "", *([self.instructions] if words else [])]
 
     def in_function(self, kernel: Kernel) -> list[str]:
         """Return nothing: a group's memory is declared above."""

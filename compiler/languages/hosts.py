@@ -3,7 +3,7 @@
 1. A denoiser reads feature images, and writes the host's colour. Shadertoy can hold weights only
    in constants [schedules/inlined.py]; Godot has a texture.
 2. A noisy picture's features come from passes of their own, one feature each, since a pass of either host has
-   one colour: a path kernel whose sums stay in variables, then the feature's encoding [host_pass.py].
+   one colour: a path kernel that encodes its sums [host_pass.py].
 
 Rows: what a pass writes into texel row 0 is the picture's top row. Shadertoy shows row 0 at the bottom, so
 the tab that is shown turns the picture.

@@ -49,7 +49,6 @@ class Metal(Buffers):
     threads: Sequence[str] = ("uint2 thread_place [[thread_position_in_grid]]",)
     item = ("thread_place.x", "thread_place.y")
     size = "size."
-    early, late = {PATH: ("width",)}, {PATH: ("samples",)}
     max_output_channels = 2**16
     group = (16, 8)
     grouped = {
@@ -99,8 +98,6 @@ class Metal(Buffers):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function: the structure of the integers is a kernel's own."""
         sizes = ["struct Size {", *(f"    {self.typed(name)};" for name in kernel.integers), "};", ""]
-        if kernel.role == PATH:
-            return [self.depth(parts), TOP, *sizes, parts.top]
         return [TOP, *super().top(kernel, parts), *sizes]
 
     def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:

@@ -6,18 +6,60 @@ so that a path kernel is not given their number; an encoding reads planes of any
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ..core.profiles import OPENCL_SINE
 from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
-from ..kernel.kernel import Type
+from ..kernel.kernel import Kernel, Type
+from .c_path import MASKS
 from .dialect import Dialect, Parts
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
 
+MASKED = """\
+#if defined(__AVX512DQ__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_cvtd2mask512)
+    return (ushort)__builtin_ia32_cvtd2mask512(mask);
+#endif
+#endif"""
+"""Whether any of 16 lanes holds, by one instruction of AVX-512: the `or` of halves takes four steps, each of
+which waits for the one before."""
+
+PAINTER = """\
+void paint(__global float *restrict to, int step, float{lanes} values, int left)
+{{
+    float all[LANES];
+    vstore{lanes}(values, 0, all);
+    for (int i = 0; i < LANES && i < left; ++i) {{
+        to[i * step] = all[i];
+    }}
+}}"""
+"""The function that writes a channel of the pixels of an item, or of those that are left of its row."""
+
+LANES = (1, 4, 8, 16)
+"""Numbers of paths that a work item follows at once, or of pixels that it filters."""
+
+
+def any_lane(lanes: int) -> str:
+    """Return the function that tells whether any component of a boolean holds: `or` of halves."""
+    head = "/* Whether any component is true. The library's any() is a call, which saves all registers. */\n"
+    lines, name = [f"{head}int any_lane(int{lanes} mask)\n{{", *[MASKED] * (lanes == 16)], "mask"
+    while lanes > 2:
+        lanes //= 2
+        lines.append(f"    int{lanes} of_{lanes} = {name}.lo | {name}.hi;")
+        name = f"of_{lanes}"
+    return "\n".join([*lines, f"    return {name}.lo | {name}.hi;", "}"])
+
 
 class OpenCL(Arguments):
-    """The dialect's table."""
+    """The dialect's table; a path kernel has `lanes` paths an item, and `inside` is before what it paints.
+
+    `min` and `max` are single instructions where `fmin` and `fmax`, which must treat NaN, are three. Vectors
+    use operators in place of `min`, `max` and `fabs`, with the same values, and clang's builtins for others
+    [`vector_operations`]: PoCL's library may be compiled for another processor than the kernel, LLVM then
+    inlines none of its functions, and each call saves all vector registers. With the functions the mini cubes
+    took twice the time. A boolean in a vector is an integer with all bits set, or none.
+    """
 
     target = "opencl"
     language = "OpenCL C 1.2"
@@ -32,11 +74,13 @@ class OpenCL(Arguments):
     writes = "__global float *restrict {name}"
     long = "size_t"
     row_reader = OPENCL_ROW
+    lanes = 1
+    inside = ""
+    paints = True
     item = ("get_global_id(0)", "get_global_id(1)")
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    painted = "image_{image}[place * {channels} + {channel}] = {value}"
     said = {
         DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
         PATH: (
@@ -97,7 +141,7 @@ class OpenCL(Arguments):
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of values, or of one in all lanes."""
-        return f"({kind})({', '.join(values)})"
+        return f"({kind})({', '.join(MASKS.get(value, value) for value in values)})"
 
     def weights_as_vectors(self, kind: Type) -> list[str]:
         """Return the declaration of the weights as vectors."""
@@ -134,24 +178,49 @@ class OpenCL(Arguments):
                 return [BUILTINS, OPENCL_GROUP, *named]
             # Which instruction there is depends on LANES.
             return [BUILTINS, *named, OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")]
-        lanes = [f"#define LANES {self.lanes}"] if kernel.role == PATH else []
-        return [*lanes, *super().top(kernel, parts)]
+        if kernel.role != PATH:
+            return super().top(kernel, parts)
+        painter = [PAINTER.format(lanes=self.lanes)] if kernel.images and self.lanes > 1 else []
+        return [f"#define LANES {self.lanes}", *super().top(kernel, parts), *painter]
+
+    def fitted(self, kernel: Kernel) -> Dialect:
+        """Return the dialect for a kernel: a path kernel has operators in place of functions."""
+        found = super().fitted(kernel)
+        if kernel.interface.role == PATH:
+            lanes = int(kernel.step[0].value)
+            vars(found).update(lanes=lanes, inside="if (left > 0) ")
+            found.operations = {**self.operations, "minimum": "min({0}, {1})", "maximum": "max({0}, {1})"}
+            numbers, entries = range(lanes), (f"{{table}}[{{0}}.s{lane:x}]" for lane in range(lanes))
+            found.vector_operations = {
+                **self.vector_operations,
+                "any": "any_lane({0})",
+                "lanes": f"({{type}})({', '.join(map(str, numbers))})",
+                "take": f"({{type}})({', '.join(entries)})",
+            }
+            found.helpers = {**dict.fromkeys(("floor", "convert"), BUILTINS), "any": any_lane(lanes)}
+        return found
 
     def guard(self, kernel: Interface) -> list[str]:
         """Return the item's place; items of a path kernel beyond the picture compute on."""
         if kernel.role != PATH:
             return super().guard(kernel)
+        left = "(int)row + first_row < height ? width - (int)column : 0"
+        images = [
+            f"    int left = {left}; /* pixels of the row from here on: whole groups are larger */",
+            "    size_t place = (size_t)((int)row + first_row) * (size_t)width + column;",
+        ]
         return [
             "    size_t column = get_global_id(0) * LANES;",
             "    size_t stride = get_global_size(0) * LANES;",
             "    size_t row = get_global_id(1);",
             "    size_t plane = get_global_size(1) * stride;",
             "    size_t at = row * stride + column;",
+            *(images if kernel.images else []),
         ]
 
-    def path_start(self, kernel: Interface) -> list[str]:
-        """Return the first statements of a path kernel: pixel and seed."""
-        return Dialect.path_start(self, kernel)
+    def places_of_planes(self, kernel: Interface) -> list[str]:
+        """Return nothing: rows of planes are whole items."""
+        return []
 
     def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
         """Return an element of an array that a kernel is given, or several of a row."""
@@ -161,22 +230,11 @@ class OpenCL(Arguments):
         return f"row_at({array.name} + {plane} * plane + {self.factor(row)} * stride, {column}, width)"
 
     def written(self, array: Array, index: Sequence[str], value: str, lanes: int) -> str:
-        """Return the statement that writes such elements."""
+        """Return the statement that writes such elements; a path's image ends before a whole group does."""
+        place = super().read(array, index, lanes)
         if lanes == 1:
-            return super().written(array, index, value, lanes)
-        place = super().read(array, index, lanes).removesuffix("]").replace("[", " + ", 1)
+            return f"{self.inside if array.is_image else ''}{place} = {value};"
+        place = place.removesuffix("]").replace("[", " + ", 1)
+        if array.is_image:
+            return f"paint({place}, {array.shape[-1]}, {value}, left);"
         return f"vstore{lanes}({value}, 0, {place});"
-
-    def images_end(self, kernel: Interface, values: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the last statements of a path kernel: whole groups are larger than the picture."""
-        return [
-            "    int left = width - (int)column; /* pixels of the row from here on */",
-            "    if ((int)row + first_row < height && left > 0) {",
-            "        size_t place = (size_t)((int)row + first_row) * (size_t)width + column;",
-            *(f"    {line}" for line in super().images_end(kernel, values)),
-            "    }",
-        ]
-
-    def place(self, kernel: Interface) -> tuple[str, str]:
-        """Return the texts of an item's column and row."""
-        return ("column", "(int)row")

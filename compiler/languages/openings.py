@@ -2,13 +2,12 @@
 
 Three binding styles share it: arguments of a function [`Arguments`: C, OpenCL, CUDA], arguments with numbers
 (Metal), and declarations with numbers (GLSL for Vulkan and OpenGL 4.3, WGSL). Integers that are arguments are
-read by their names; those of a structure by `size` and their names, unless they are made variables: `early`
-before the guard, `late` after it.
+read by their names; those of a structure by `size` and their names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ..kernel.interface import DENOISE, PATH, UNSIGNED, WRITE, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Type
@@ -25,22 +24,24 @@ WEIGHTS_RESULT = (
 NUMBERS = "width, height of the image; first_row; rows; first_sample; samples to add up"
 """What the integers of a path kernel are."""
 
+OWN = (("y", "x"), ("row", "column"))
+"""Texts of an item's own row and column [`Interface.place`]."""
+
 
 class Buffers(Dialect):
     """Kernels whose arrays are buffers; `item` are the texts of an item's column and row.
 
-    `long`: the type of a place in memory, if it is not that of other integers.
+    `size`: what is before the name of an integer. `long`: the type of a place in memory, if it is not that
+    of other integers.
     """
 
     item: tuple[str, str]
     size: str = ""
-    early: Mapping[str, Sequence[str]] = {}
-    late: Mapping[str, Sequence[str]] = {}
     long: str = ""
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
-        if parts.kernel is not None:
+        if parts.kernel is not None and kernel.role != PATH:
             return "\n".join(self.of_kernel(kernel, parts, parts.kernel))
         return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
 
@@ -75,8 +76,6 @@ class Buffers(Dialect):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
-        if kernel.role == PATH:
-            return [self.depth(parts), parts.top]
         return [parts.top] if parts.top or kernel.role == DENOISE else []
 
     def head(self, kernel: Interface) -> list[str]:
@@ -84,13 +83,8 @@ class Buffers(Dialect):
         raise NotImplementedError
 
     def opening(self, kernel: Interface) -> list[str]:
-        """Return the first statements: the item's place, the guard, and what the role wants."""
-        early, late = self.variables(kernel, self.early), self.variables(kernel, self.late)
-        return [*early, *self.guard(kernel), *late, *self.start(kernel)]
-
-    def start(self, kernel: Interface) -> list[str]:
-        """Return the first statements that a role wants."""
-        return self.path_start(kernel) if kernel.role == PATH else []
+        """Return the first statements of a path kernel: the item's place, the guard, the place in planes."""
+        return [*self.guard(kernel), *self.places_of_planes(kernel)]
 
     def guard(self, kernel: Interface) -> list[str]:
         """Return the item's place, and the end of an item outside of the picture."""
@@ -105,13 +99,9 @@ class Buffers(Dialect):
             "    }",
         ]
 
-    def variables(self, kernel: Interface, named: Mapping[str, Sequence[str]]) -> list[str]:
-        """Return the declarations of integers of the structure that become variables."""
-        return [f"    {self.index(name, f'{self.size}{name}')}" for name in named.get(kernel.role, ())]
-
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""
-        return name if name in self.early.get(kernel.role, ()) else f"{self.size}{name}"
+        return f"{self.size}{name}"
 
     # ---- places in memory --------------------------------------------------------------------------------
 
@@ -123,14 +113,13 @@ class Buffers(Dialect):
         """Return a number as a factor of a place in memory."""
         return f"({self.long}){text}" if self.long else text
 
-    def path_start(self, kernel: Interface) -> list[str]:
-        """Return the first statements of a path kernel: its place in the planes, pixel and seed."""
+    def places_of_planes(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: its place in the planes."""
         rows, width = (self.factor(self.integer(kernel, name)) for name in ("rows", "width"))
         column, row = (self.factor(name) for name in kernel.place)
         return [
             f"    {self.offset('plane', f'{rows} * {width}')}",
             f"    {self.offset('at', f'{row} * {width} + {column}')}",
-            *super().path_start(kernel),
         ]
 
     def strides(self, kernel: Interface) -> list[str]:
@@ -145,7 +134,7 @@ class Buffers(Dialect):
         strided = "plane_stride" in kernel.integers
         places["plane"] = self.factor("plane_stride") if strided else f"{height} * stride"
         places["at"] = f"{row} * stride + {column}"
-        places |= {"pixel": f"{row} * {width} + {column}"} if kernel.images else {}
+        places |= {"place": f"{row} * {width} + {column}"} if kernel.images else {}
         return [f"    {self.offset(name, value)}" for name, value in places.items()]
 
     def about(self, array: Array) -> str:
@@ -161,11 +150,11 @@ class Buffers(Dialect):
         place = index[-1]
         if array.planes:
             row, column = map(self.factor, index[1:])
-            own = tuple(index[1:]) == ("y", "x")
+            own = tuple(index[1:]) in OWN
             place = f"{index[0]} * plane + {'at' if own else f'{row} * stride + {column}'}"
         elif array.is_image:
-            assert tuple(index[:2]) == ("y", "x"), "an item uses its own pixel of an image"
-            place = f"pixel * {array.shape[-1]} + {place}"
+            assert index[1] in ("x", "column"), "an item uses its own pixel of an image"
+            place = f"place * {array.shape[-1]} + {place}"
         elif len(index) == 2:
             place = f"{index[0]} * {array.shape[-1]} + {place}"
         return f"{array.name}[{place}]"

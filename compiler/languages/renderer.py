@@ -13,12 +13,22 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.lines import Lines
-from ..kernel.interface import DENOISE, IMAGE, READ, RESULT, TABLE, WEIGHTS, Interface
+from ..kernel.interface import (
+    DENOISE,
+    IMAGE,
+    PATH,
+    READ,
+    RESULT,
+    TABLE,
+    WEIGHTS,
+    Interface,
+)
 from ..kernel.interface import Array as Memory
 from ..kernel.kernel import (
     FLOAT,
@@ -27,6 +37,7 @@ from ..kernel.kernel import (
     Barrier,
     Block,
     Body,
+    Break,
     Call,
     Comment,
     Constant,
@@ -75,15 +86,6 @@ def binding(template: str) -> int:
     return UNARY if template[0] in "-!" else ATOM
 
 
-def framed(
-    dialect: Dialect, kernel: Interface, parts: Parts, header: Sequence[str], lines: Sequence[str]
-) -> str:
-    """Return a kernel's source: a comment, what the kernel is bound to, its statements, its end."""
-    comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-    begin, end = dialect.begin(kernel, parts), dialect.ends[kernel.role]
-    return dialect.finished("\n".join([*dialect.first, *comment, begin, *lines, end])) + "\n"
-
-
 def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
     """Yield the arrays that statements read and write, and the types of what is read and written."""
     for statement in walk(body):
@@ -122,6 +124,8 @@ class Renderer(Lines):
         self.lines: list[str] = []
         self.depth = 1
         self.readers: dict[str, None] = {}
+        bound, path = kernel.interface, kernel.interface.role == PATH
+        self.integers = {each: self.dialect.integer(bound, each) for each in bound.integers if path}
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
         self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
         self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
@@ -139,8 +143,9 @@ class Renderer(Lines):
         if kernel.launches:
             self.depth = 0
         self.body(kernel.body)
-        top = [*map(self.constant, kernel.constants), *self.tables(), *self.readers, *functions]
-        begin = dialect.begin(kernel.interface, Parts("\n".join(top), self.bounded, kernel=kernel))
+        above = [*map(self.constant, kernel.constants), *self.tables(), *self.readers, *self.helpers()]
+        top = "\n".join([*above, *functions])
+        begin = dialect.begin(kernel.interface, Parts(top, self.bounded, kernel=kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         end = "#endif" if kernel.launches else dialect.ends[kernel.interface.role]
         lines = [*dialect.first, *comment, begin, *self.lines, end]
@@ -156,6 +161,13 @@ class Renderer(Lines):
     def tables(self) -> list[str]:
         """Return the declarations of constant tables."""
         return [self.dialect.table_declaration(name, array) for name, array in self.kernel.tables]
+
+    def helpers(self) -> list[str]:
+        """Return the functions that operations on vectors call."""
+        used = [e for s in walk(self.kernel.body) for v in values(s) for e in parts(v)]
+        operations = {e.op for e in used if max(e.type.lanes, *(a.type.lanes for a in e.args), 1) > 1}
+        wanted = [text for operation, text in self.dialect.helpers.items() if operation in operations]
+        return list(dict.fromkeys(wanted))
 
     def function(self, function: Function) -> None:
         """Write a function above the kernel."""
@@ -199,7 +211,7 @@ class Renderer(Lines):
 
     def _name(self, value: Expr) -> tuple[str, int]:
         """Return a name."""
-        return str(value.value), ATOM
+        return self.integers.get(value.value, str(value.value)), ATOM
 
     def _component(self, value: Expr) -> tuple[str, int]:
         """Return one component of a vector."""
@@ -229,7 +241,13 @@ class Renderer(Lines):
 
     def _take(self, value: Expr) -> tuple[str, int]:
         """Return an entry of a table."""
+        if value.type.lanes > 1:
+            return self._filled(self.dialect.vector_operations["take"], value)
         return f"{value.value}[{self.text(value.args[0])}]", ATOM
+
+    def _lanes(self, value: Expr) -> tuple[str, int]:
+        """Return the numbers of the lanes."""
+        return self._filled(self.dialect.vector_operations["lanes"], value)
 
     def _operation(self, value: Expr) -> tuple[str, int]:
         """Return an operation of the program."""
@@ -246,10 +264,15 @@ class Renderer(Lines):
         binds, infix = binding(template), bool(INFIX.match(template))
         args = list(value.args)
         if infix and self.dialect.widens:  # a language with such operators widens a single value by itself
-            single = [a.args[0] if a.op == "splat" else a for a in args]
+            single = [a.args[0] if a.op == "splat" and a.type.dtype != "bool" else a for a in args]
             args = single if any(a.type.lanes > 1 for a in single) else args
         texts = [self.text(a, place) for a, place in zip(args, self._places(template, value), strict=False)]
-        return template.format(*texts, type=self.kind(value.type), lanes=value.type.lanes), binds
+        shown: dict[str, Any] = {
+            "type": self.kind(value.type),
+            "lanes": value.type.lanes,
+            "table": value.value,
+        }
+        return template.format(*texts, **shown), binds
 
     def _places(self, template: str, value: Expr) -> list[int]:
         """Return how strongly each operand of a template must bind."""
@@ -483,6 +506,12 @@ class Renderer(Lines):
         stores = all(isinstance(each, Store) and each.array == RESULT for each in statement.body)
         most = dialect.channels_per_result
         return stores and bool((most and self.channels > most) or not dialect.indexes_results)
+
+    def _write_break(self, statement: Break) -> None:
+        """Write the end of a loop."""
+        self._open(f"if ({self.text(statement.condition)}) {{")
+        self._line("break;")
+        self._close()
 
     def _write_if(self, statement: If) -> None:
         """Write a branch."""

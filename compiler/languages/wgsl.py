@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, PATH, UNSIGNED, WRITE, Array, Interface
-from .dialect import Dialect, Parts
+from ..kernel.interface import BLOCK, UNSIGNED, WRITE, Array, Interface
+from .dialect import Dialect
 from .glsl_buffers import GROUP, SAID, Declared
 
 ASSUMES = (
@@ -47,11 +47,8 @@ class WGSL(Declared):
     instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
-    early = {PATH: ("width", "samples")}
-    types = scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
-    counted = "for (var {i}: i32 = 0; {i} < {count}; {i}++) {{"
+    scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     define = "const {name}: i32 = {value};"
-    choice = "select({2}, {1}, {0})"
     table = "const {name} = array<{type}, {count}>({values});"
     operations = {
         **Dialect.operations,
@@ -59,17 +56,9 @@ class WGSL(Declared):
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
         "convert": "{type}({0})",
-        "select": choice,
+        "select": "select({2}, {1}, {0})",
     }
     said = SAID
-
-    def depth(self, parts: Parts) -> str:
-        """Return the definition of the number of scatterings."""
-        return f"const MAX_DEPTH: u32 = {parts.max_depth}u; /* scatterings of a path */"
-
-    def bounces(self) -> str:
-        """Return the line that opens the loop over a path's bounces."""
-        return "for (var bounce: u32 = 0u; bounce <= MAX_DEPTH; bounce++) {"
 
     def declared(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers and of all arrays."""
@@ -119,4 +108,4 @@ class WGSL(Declared):
 
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""
-        return self.let("int32", name, value)
+        return self.let_value("i32", name, value)

@@ -1,4 +1,4 @@
-"""From the programs of a path to the text of a kernel, for any dialect.
+"""From the programs of a path to a kernel: the skeleton around them, as statements of the kernel IR.
 
     for each sample
         start: the path at the camera
@@ -9,37 +9,61 @@
             depth MAX_DEPTH: done
             scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
-    for each ray of the features beyond the first sample's [`_Kernel._rays`]
+    for each ray of the features beyond the first sample's [`_Builder._rays`]
         ray: the path at the camera; arrive; look
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
-   [`_Kernel.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
-   on a counter that all paths share, so that a row is read once for all of them [`_Kernel._loop`].
-2. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
-3. With an encoding, sums stay variables, and become channels of images at the end [`_Kernel._images`].
-4. A path that has ended is computed on with the others of its work item, and changes nothing: radiance is
-   assigned where it is alive.
+   [`_Builder.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
+   on a counter that all paths share, so that a row is read once for all of them [`_Statements._loop`].
+2. An item follows as many paths as values have lanes, those of pixels side by side. A path that has ended is
+   computed on with the others of its item, and changes nothing: radiance is assigned where it is alive.
+3. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
+4. With an encoding, sums stay variables, and become channels of images at the end [`_Builder._images`].
 5. `see` is in a kernel that has a plane of it, and no other [`asked`].
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError, choice
-from ..core.ir import Image, Node, Program, Type, attributes
-from ..core.lines import Lines
-from ..core.loops import Loop, Part, Walk, is_walk, loops
+from ..core.ir import Image, Node, Program
+from ..core.loops import Loop, Part, Walk, loops
 from ..core.weights import tables
 from ..kernel import interface
-from ..kernel.interface import ENCODE
-from ..languages.dialect import Dialect, Parts
-from ..languages.renderer import framed
-from .lower_scene import LAYERS, PATH, SEEN, SURFACE, WAY, PathPrograms, kinds, names
+from ..kernel.interface import IMAGE, INTEGERS, PATH, SCENE_NUMBERS, SUMS
+from ..kernel.kernel import (
+    BOOL,
+    FLOAT,
+    WORD,
+    Array,
+    Block,
+    Break,
+    Comment,
+    Constant,
+    Expr,
+    For,
+    If,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    Type,
+    any_lane,
+    apply,
+    const,
+    expr,
+    lanes,
+    load,
+    name,
+    splat,
+)
+from .lower_scene import LAYERS, SEEN, SURFACE, WAY, PathPrograms, kinds, names
+from .lower_scene import PATH as STATE
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
 """Planes of the first surface: outputs of `look`, by group."""
@@ -49,7 +73,7 @@ PAST = {layer: names({layer: value}) for layer, value in SEEN.items()}
 
 END = {
     "alive": ["alive"],
-    **{f"last_{name}": names({name: value}) for name, value in {**SURFACE, **PATH}.items()},
+    **{f"last_{each}": names({each: value}) for each, value in {**SURFACE, **STATE}.items()},
 }
 """Planes of the path's state after its last arrival, by group: for comparing paths."""
 
@@ -80,6 +104,8 @@ FRAME_GROUPS = ("color", "deviation", *LAYERS)
 WHOLE = {"color", "deviation", *END}
 """What needs paths to their end."""
 
+N, BOUNCE, MAX_DEPTH = name("n"), name("bounce"), name("MAX_DEPTH")
+
 
 def planes(groups: Sequence[str]) -> list[str]:
     """Return the names of all planes of some groups, in the order in which a kernel writes them."""
@@ -97,385 +123,328 @@ class Encoding:
     images: tuple[Image, ...]
 
 
-def emit_path(
-    programs: PathPrograms,
-    dialect: Dialect,
-    groups: Sequence[str],
-    header: Sequence[str],
-    encoding: Encoding | None = None,
-) -> str:
-    """Return the kernel's source; `header` are the lines of the comment at its top."""
-    return _Kernel(asked(programs, groups), dialect, groups, encoding).text(header)
+def path_kernel(
+    programs: PathPrograms, width: int, groups: Sequence[str], encoding: Encoding | None = None
+) -> Kernel:
+    """Return the kernel that follows `width` paths at once and adds up groups of planes."""
+    return _Builder(asked(programs, groups), width, groups, encoding).built()
 
 
 def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
     """Return the programs that groups of planes need: `see` only for its own, which it must be there for."""
     wanted = [group for group in groups if group in PAST]
-    if wanted and programs.see is None:
+    if wanted and "see" not in programs.parts:
         raise CompileError(f"planes {wanted[0]!r} need the program 'see': lower the scene with seen=True")
-    return programs if wanted else replace(programs, see=None)
+    parts = {part: program for part, program in programs.parts.items() if wanted or part != "see"}
+    return replace(programs, parts=parts)
 
 
-def renamed_tables(programs: PathPrograms) -> Mapping[tuple[str, str], str]:
-    """Return one name for each table of each program: equal tables share theirs."""
-    known: dict[tuple[str, bytes], str] = {}
-    found = {}
-    for part, program in programs.parts().items():
-        for name, array in tables(program).items():
-            key = (str(array.dtype), array.tobytes())
-            found[part, name] = known.setdefault(key, f"table_{len(known)}")
-    return found
+# ---- one program -------------------------------------------------------------------------------------------
+
+
+class _Statements:
+    """The statements of a program, one an operation, and the value of each node.
+
+    Inputs are variables of their names, or what `given` has for them; `tables` are the names of tables.
+    """
+
+    def __init__(
+        self, program: Program, given: Mapping[str, Expr], tables: Mapping[str, str], width: int
+    ) -> None:
+        self.program, self.given, self.tables, self.width = program, given, tables, width
+        self.values: list[Expr] = []
+        self.body: list[Statement] = []
+        ends, in_bodies = loops(program)
+        for index, node in enumerate(program.nodes):
+            if index in ends:
+                self.body.append(self._loop(ends[index]))
+            self.values.append(self._value(index, node))
+            if node.op not in ("input", "constant", "loop") and index not in in_bodies:
+                self.body.append(self._statement(index))
+
+    def _value(self, index: int, node: Node) -> Expr:
+        """Return a node's value: a constant, or a name."""
+        kind = Type(node.type.dtype, self.width)
+        if node.op == "input":
+            return self.given.get(str(node["name"]), name(str(node["name"]), kind))
+        if node.op == "constant":
+            return splat(const(node["value"], kind.of(1)), self.width)  # type: ignore[arg-type]
+        if node.op == "loop":
+            return self.values[node.args[int(node["index"])]]  # type: ignore[arg-type]
+        return name(f"t{index}", kind)
+
+    def _statement(self, index: int) -> Statement:
+        """Return the statement that computes a value."""
+        node, own = self.program.nodes[index], self.values[index]
+        args = [self.values[arg] for arg in node.args]
+        if node.op == "carried":
+            return Array(own.value, own.type, kept=True, value=args[0])
+        if node.op in ("row", "branch"):
+            value = splat(self._entry(node["table"], name(TRIP if node.op == "row" else BRANCH)), self.width)
+        elif node.op == "take":
+            value = self._entry(node["table"], args[0])
+        else:
+            value = apply(node.op, *args, value=node.get("dtype"))
+        return Let(own.value, value, kept=True)
+
+    def _entry(self, table: object, index: Expr) -> Expr:
+        """Return the entry of a table."""
+        kind = Type(str(self.program.parameters[str(table)].dtype), index.type.lanes)
+        return Expr("take", (index,), kind, self.tables[str(table)])
+
+    def _loop(self, loop: Loop) -> Statement:
+        """Return a loop over the rows of tables."""
+        if loop.walk is not None:
+            return self._walk(loop, loop.walk)
+        return For(TRIP, const(loop.trips), self._trip(loop, Part(loop.body, loop.after)))
+
+    def _walk(self, loop: Loop, walk: Walk) -> Statement:
+        """Return a walk along a tree: a node is entered where any of the paths enters it."""
+        nodes, node = len(self.program.parameters[walk.skip]), name(BRANCH)
+        parts = []
+        for number, part in enumerate(walk.parts):
+            start, end = (self._entry(walk.first, node + (number * (nodes + 1) + more)) for more in (0, 1))
+            parts.append(For(TRIP, end, self._trip(loop, part), start=start))
+        entered = Store(BRANCH, (), node + 1)
+        left_out = Store(BRANCH, (), self._entry(walk.skip, node))
+        branch = If(any_lane(self.values[walk.enters]), (*parts, entered), (left_out,))
+        guard = [self._statement(index) for index in walk.guard]
+        visit = For("visit", const(nodes), (Break(apply("equal", node, nodes)), *guard, branch))
+        return Block((Array(BRANCH, node.type, value=const(0)), visit))
+
+    def _trip(self, loop: Loop, done: Part) -> tuple[Statement, ...]:
+        """Return a trip of a loop: its body, then the assignments of what it carries."""
+        changed = {
+            self.values[c].value: self.values[n] for c, n in zip(loop.carried, done.after, strict=True)
+        }
+        body = [self._statement(index) for index in done.body]
+        return (*body, *_assigned(changed, [self.values[c].value for c in loop.carried]))
+
+
+def _assigned(
+    values: Mapping[str, Expr], variables: Collection[str], masked: Collection[str] = ()
+) -> list[Statement]:
+    """Return the assignments of values to variables, to those in `masked` where a path is alive."""
+    before: list[Statement] = []
+    after: list[Statement] = []
+    for variable, value in values.items():
+        old, alive = name(variable, value.type), name("alive", BOOL.of(value.type.lanes))
+        if value == old:
+            continue
+        if value.op == "name" and value.value in variables:  # which may be assigned before it is read
+            before.append(Let(f"new_{variable}", value, kept=True))
+            value = name(f"new_{variable}", value.type)
+        if variable == "alive":
+            value = alive & value
+        elif variable in masked:
+            value = apply("select", alive, value, old)
+        after.append(Store(variable, (), value))
+    return before + after
+
+
+# ---- the skeleton ------------------------------------------------------------------------------------------
 
 
 @dataclass
-class _Kernel(Lines):
-    """The text of one kernel as it is written."""
+class _Builder:
+    """Builds one kernel of `width` paths at once."""
 
     programs: PathPrograms
-    dialect: Dialect
+    width: int
     groups: Sequence[str]
     encoding: Encoding | None
-    lines: list[str] = field(default_factory=list)
-    depth: int = 1
 
-    def text(self, header: Sequence[str]) -> str:
-        """Return the whole source."""
-        self.tables = renamed_tables(self.programs)
+    def built(self) -> Kernel:
+        """Return the kernel."""
         self.planes = planes(self.groups)
-        integers, numbers = self.dialect.integers[interface.PATH], len(self.programs.inputs)
+        self.tables: dict[tuple[str, bytes], tuple[str, NDArray[Any]]] = {}  # equal ones have one name
         images = self.encoding.images if self.encoding else ()
-        self.kernel = interface.paths(len(self.planes), integers, numbers, images)
-        self.shared = self.dialect.shared(self.kernel)
-        if len(self.planes) > self.dialect.max_planes:
-            raise CompileError(
-                f"the kernel adds up {len(self.planes)} planes: {self.dialect.language} writes at most "
-                f"{self.dialect.max_planes}; request fewer groups"
-            )
-        if len(self.programs.inputs) > self.dialect.most_numbers:
-            raise CompileError(
-                f"{self.dialect.language}: its path kernels take at most {self.dialect.most_numbers} scene "
-                f"parameters, and {len(self.programs.inputs)} move: compile for fewer times, or one"
-            )
-        if images and not self.dialect.painted:
-            raise CompileError(
-                f"{self.dialect.language}: its path kernels write sums, not encoded images: compile the "
-                "encoding as a separate kernel"
-            )
-        self._sums()
-        self._samples()
-        self._rays()
-        self._stores()
-        self._images()
-        return framed(self.dialect, self.kernel, self._parts(), header, self.lines)
+        bound = interface.paths(len(self.planes), INTEGERS[PATH], len(self.programs.inputs), images)
+        self.column, self.row = map(name, bound.place)
+        depth = self.programs.settings.max_depth if self.followed or not self.short else 0
+        body = (*self._begin(), self._samples(), *self._rays(), *self._end())
+        return Kernel(
+            bound,
+            body,
+            (Constant("MAX_DEPTH", const(depth), "scatterings of a path"),),
+            step=(const(self.width), const(1)),
+            place=bound.place,
+            tables=tuple(self.tables.values()),
+        )
 
     @property
     def short(self) -> bool:
         """Whether paths may end with what is seen: nothing else is requested, and something of that."""
-        return self.programs.see is not None and not WHOLE & set(self.groups)
+        return "see" in self.programs.parts and not WHOLE & set(self.groups)
 
     @property
     def followed(self) -> bool:
         """Whether the way to what is seen is state of a path."""
-        return self.programs.see is not None and self.programs.most_followed > 0
+        return "see" in self.programs.parts and self.programs.most_followed > 0
 
-    # ---- the skeleton ------------------------------------------------------------------------------------
+    def of(self, variable: str, kind: Type = FLOAT) -> Expr:
+        """Return the variable of all paths."""
+        return name(variable, kind.of(self.width))
 
-    def _parts(self) -> Parts:
-        """Return what is above the kernel's function."""
-        declared: dict[str, NDArray[np.generic]] = {}
-        for (part, name), table in self.tables.items():
-            declared[table] = self.programs.parts()[part].parameters[name]
-        constants = [self.dialect.table_declaration(name, array) for name, array in declared.items()]
-        operations = self._operations()
-        helpers = dict.fromkeys(text for op, text in self.dialect.helpers.items() if op in operations)
-        painter = [self.dialect.painter] if self.kernel.images and self.dialect.painter else []
-        return Parts(
-            top="\n".join([*constants, *helpers, *painter]),
-            max_depth=self.programs.settings.max_depth if self.followed or not self.short else 0,
-        )
+    def all(self, value: Expr | float) -> Expr:
+        """Return a value that all paths share."""
+        return splat(expr(value), self.width)
 
-    def _operations(self) -> set[str]:
-        """Return the names of all operations of the programs; loops that walk along trees are of another."""
-        programs = [*self.programs.parts().values(), *([self.encoding.program] if self.encoding else [])]
-        nodes = [node for program in programs for node in program.nodes]
-        return {"walk" if node.op == "loop" and is_walk(node) else node.op for node in nodes}
+    def variables(self, kinds_of: Mapping[str, str]) -> list[Statement]:
+        """Return the declarations of variables of all paths."""
+        return [Array(each, Type(kind, self.width)) for each, kind in kinds_of.items()]
 
-    def _sums(self) -> None:
-        """Declare the image's size in lanes, and the sums."""
-        zero = self.dialect.number(0.0, "float32")
-        for name in ("width", "height"):
-            self._line(self.dialect.let("float32", f"image_{name}", self.shared[name]))
-        for plane in self.planes:
-            self._line(self.dialect.var("float32", f"sum_{plane}", zero))
+    def _begin(self) -> list[Statement]:
+        """Return the pixel, the image's size in lanes, and the sums."""
+        shared = {
+            "y": apply("convert", self.row + name("first_row"), value="uint32"),
+            "seed": name("seed_number", WORD),
+            **{f"image_{n}": apply("convert", name(n), value="float32") for n in ("width", "height")},
+        }
+        x = self.all(apply("convert", self.column, value="uint32"))
+        return [
+            Let("x", apply("add", x, lanes(self.width)) if self.width > 1 else x),
+            *(Let(each, self.all(value)) for each, value in shared.items()),
+            *(Array(f"sum_{plane}", FLOAT.of(self.width), value=self.all(0.0)) for plane in self.planes),
+        ]
 
-    def _samples(self) -> None:
-        """Write the loop over the samples."""
-        dialect = self.dialect
-        self._open(dialect.loop("n", "samples"))
-        self._line(dialect.let("uint32", "sample_number", self.shared["sample"]))
-        self._line(dialect.var("uint32", "pixel"))
-        for name, kind in kinds({**PATH, **SURFACE}).items():
-            self._line(dialect.var(kind, name))
-        self._line(dialect.var("bool", "alive", dialect.number(True, "bool")))
-        if self.followed:
-            self._line(dialect.var("bool", "way_going", dialect.number(True, "bool")))
-            self._line(dialect.var("float32", "way_length", dialect.number(0.0, "float32")))
-        self.block("start", "the path at the camera", {"width": "image_width", "height": "image_height"})
-        self._open(dialect.bounces())
-        self._line(dialect.let("uint32", "depth", dialect.splat("bounce", "uint32")))
-        self.block("arrive", "the next surface", masked=("radiance_r", "radiance_g", "radiance_b"))
+    def _sample(self) -> Let:
+        """Return the number of a sample or of a ray."""
+        first, n = name("first_sample", WORD), apply("convert", N, value="uint32")
+        return Let("sample_number", self.all(apply("add", first, n)))
+
+    def _samples(self) -> For:
+        """Return the loop over the samples."""
+        true = Array("alive", BOOL.of(self.width), value=self.all(True))
+        way = [
+            replace(true, name="way_going"),
+            Array("way_length", FLOAT.of(self.width), value=self.all(0.0)),
+        ]
+        body = [
+            self._sample(),
+            *self.variables({"pixel": "uint32", **kinds({**STATE, **SURFACE})}),
+            true,
+            *(way if self.followed else []),
+            *self.block("start", "the path at the camera"),
+            self._bounces(),
+            *self._gathered(),
+        ]
+        return For("n", name("samples"), tuple(body))
+
+    def _bounces(self) -> For:
+        """Return the loop over a path's surfaces."""
+        alive, going = self.of("alive", BOOL), self.of("way_going", BOOL)
+        first, radiance = apply("equal", BOUNCE, 0), names({"radiance": STATE["radiance"]})
+        body: list[Statement] = [Let("depth", self.all(apply("convert", BOUNCE, value="uint32")))]
+        body += self.block("arrive", "the next surface", masked=radiance)
         if set(self.groups) & set(FIRST):
-            self._open("if (bounce == 0u && n == 0) {" if self.programs.rays else "if (bounce == 0u) {")
-            self.block("look", "the features of the first surface", summed=True)
-            self._close()
-        if self.programs.see is not None:
-            going = self.dialect.any_lane.format(mask="way_going")
-            self._open(f"if ({going if self.followed else 'bounce == 0u'}) {{")
-            self.block("see", "what is seen past mirrors and glass", summed=True)
-            self._close()
-        self._open("if (bounce == MAX_DEPTH) {")
-        self._line("break;")
-        self._close()
-        self.block("scatter", "the path goes on", masked=("radiance_r", "radiance_g", "radiance_b"))
-        both = self.dialect.operations["logical_and"]
-        mask = f"({both.format('alive', 'way_going')})" if self.short and self.followed else "alive"
-        self._open(f"if (!{self.dialect.any_lane.format(mask=mask)}) {{")
-        self._line("break;")
-        self._close()
-        self._close()
-        self._gather()
-        self._close()
+            when = first & apply("equal", N, 0) if self.programs.rays else first
+            body.append(If(when, self.block("look", "the features of the first surface", summed=True)))
+        if "see" in self.programs.parts:
+            when = any_lane(going) if self.followed else first
+            body.append(If(when, self.block("see", "what is seen past mirrors and glass", summed=True)))
+        body.append(Break(apply("equal", BOUNCE, MAX_DEPTH)))
+        body += self.block("scatter", "the path goes on", masked=radiance)
+        left = any_lane(alive & going if self.short and self.followed else alive)
+        body.append(Break(apply("logical_not", left)))
+        return For("bounce", MAX_DEPTH + 1, tuple(body))
 
-    def _rays(self) -> None:
-        """Write the loop over the features' own rays; the path of the first sample has been one of them."""
-        rays, dialect = self.programs.rays, self.dialect
+    def _rays(self) -> list[Statement]:
+        """Return the loop over the features' own rays; the path of the first sample has been one of them."""
+        rays = self.programs.rays
         if rays is None or not set(self.groups) & set(FIRST):
-            return
-        self.lines.append("")
-        self._line("/* the features of further camera rays */")
-        self._open(dialect.loop("n", rays.count - 1))
-        number = f"{self.shared['sample']} + {dialect.number(1, 'uint32')}"
-        self._line(dialect.let("uint32", "sample_number", number))
+            return []
         # The rays of a feature draw no further numbers; a compiler may refuse what nothing reads.
-        nodes = [*self.programs.arrive.nodes, *self.programs.look.nodes]
+        nodes = [*self.programs.parts["arrive"].nodes, *self.programs.parts["look"].nodes]
         unread = () if any(n.op == "input" and n["name"] == "pixel" for n in nodes) else ("pixel",)
-        if not unread:
-            self._line(dialect.var("uint32", "pixel"))
-        for name, kind in kinds({**PATH, **SURFACE}).items():
-            self._line(dialect.var(kind, name))
-        size = {"width": "image_width", "height": "image_height"}
-        self.block("ray", "the ray at the camera", size, unread=unread)
-        self.block("arrive", "the first surface")
-        self.block("look", "its features", summed=True)
-        self._close()
+        known = {"pixel": "uint32", **kinds({**STATE, **SURFACE})}
+        body = (
+            self._sample(),
+            *self.variables({each: kind for each, kind in known.items() if each not in unread}),
+            *self.block("ray", "the ray at the camera", unread=unread),
+            *self.block("arrive", "the first surface"),
+            *self.block("look", "its features", summed=True),
+        )
+        return [
+            Comment("the features of further camera rays"),
+            For("n", const(rays.count), body, start=const(1)),
+        ]
 
-    def _gather(self) -> None:
-        """Add what a path has gathered."""
-        self.lines.append("")
-        self._line("/* what the path has gathered */")
+    def _gathered(self) -> list[Statement]:
+        """Return what adds what a path has gathered."""
+        found: list[Statement] = [Comment("what the path has gathered")]
         if "deviation" in self.groups:
-            # Single numbers, also where paths are vectors.
-            share = self.dialect.select("n > 0", "1.0f / (count * (count + 1.0f))", "0.0f")
-            self._line(self.dialect.single("count", self.dialect.cast("float32", "n")))
-            self._line(self.dialect.single("weight", share))
+            count, weight = name("count", FLOAT), name("weight", FLOAT)
+            share = apply("divide", 1.0, apply("multiply", count, apply("add", count, 1.0)))
+            found.append(Let("count", apply("convert", N, value="float32")))
+            found.append(Let("weight", apply("select", apply("greater", N, 0), share, 0.0)))
             for c in "rgb":
-                difference = f"radiance_{c} * count - sum_color_{c}"
-                self._line(self.dialect.let("float32", f"difference_{c}", difference))
-                self._line(f"sum_deviation_{c} += difference_{c} * difference_{c} * weight;")
+                scaled = apply("multiply", self.of(f"radiance_{c}"), self.all(count))
+                found.append(Let(f"difference_{c}", apply("subtract", scaled, self.of(f"sum_color_{c}"))))
+                square = apply("multiply", *[self.of(f"difference_{c}")] * 2)
+                found.append(self._added(f"deviation_{c}", apply("multiply", square, self.all(weight))))
         for group in self.groups:
             for plane in GROUPS[group]:
                 if group == "color":
-                    self._line(f"sum_{plane} += {plane.replace('color', 'radiance')};")
+                    found.append(self._added(plane, self.of(plane.replace("color", "radiance"))))
                 elif group in END:
-                    self._line(f"sum_{plane} += {self._as_float(plane.removeprefix('last_'))};")
-
-    def _as_float(self, name: str) -> str:
-        """Return a state variable as a float."""
-        kind = {**kinds({**PATH, **SURFACE}), "alive": "bool"}[name]
-        if kind == "bool":
-            one, zero = (self.dialect.number(value, "float32") for value in (1.0, 0.0))
-            return "(" + self._select(name, one, zero) + ")"
-        if kind == "float32":
-            return name
-        node = Node("convert", (0,), Type(), attributes(dtype="float32"))
-        return self.dialect.expression(node, kind, [name])
-
-    def _select(self, mask: str, yes: str, no: str) -> str:
-        """Return the text of a choice between two floats of each path."""
-        kind = self.dialect.types["float32"]
-        return self.dialect.operations["select"].format(mask, yes, no, type=kind)
-
-    def _stores(self) -> None:
-        """Write the sums out, unless images are made of them."""
-        self.lines.append("")
-        if self.encoding:
-            return
-        for number, plane in enumerate(self.planes):
-            buffer, component = divmod(number, self.dialect.planes_per_buffer)
-            store = self.dialect.sum_store
-            self._line(store.format(plane=number, buffer=buffer, component=component, value=f"sum_{plane}"))
-
-    def _images(self) -> None:
-        """Write the encoding of the sums, and its channels out."""
-        if self.encoding is None:
-            return
-        program = self.encoding.program
-        self._line("/* the features, encoded */")
-        samples = self.dialect.splat(self.dialect.cast("float32", "samples"), "float32")
-        self._line(self.dialect.let("float32", "encoded_samples", samples))
-        named = {plane: f"sum_{plane}" for plane in self.planes} | {"samples": "encoded_samples"}
-        outputs = dict(program.outputs)
-        texts = self._statements(ENCODE, program, named)
-        values = {
-            image.name: [texts[outputs[f"{image.name}_{channel}"]] for channel in range(image.channels)]
-            for image in self.encoding.images
-        }
-        self.lines += self.dialect.images_end(self.kernel, values)
-
-    def _scene_numbers(self) -> dict[str, str]:
-        """Return the text of each of the scene's numbers that are inputs, in all lanes."""
-        dialect, found = self.dialect, {}
-        for number, name in enumerate(self.programs.inputs):
-            place = {"number": number, "vector": number // 4, "component": "xyzw"[number % 4]}
-            found[name] = dialect.splat(dialect.scene_number.format(**place), "float32")
+                    found.append(self._added(plane, self._as_float(plane.removeprefix("last_"))))
         return found
 
-    # ---- one program -------------------------------------------------------------------------------------
+    def _added(self, plane: str, value: Expr) -> Store:
+        """Return the statement that adds to a sum."""
+        return Store(f"sum_{plane}", (), value, add=True)
+
+    def _as_float(self, variable: str) -> Expr:
+        """Return a state variable as a float."""
+        kind = {**kinds({**STATE, **SURFACE}), "alive": "bool"}[variable]
+        value = self.of(variable, Type(kind))
+        if kind == "bool":
+            return apply("select", value, self.all(1.0), self.all(0.0))
+        return value if kind == "float32" else apply("convert", value, value="float32")
+
+    def _end(self) -> list[Statement]:
+        """Return what writes the sums out, or the channels of their encoding."""
+        if self.encoding is None:
+            sums = enumerate(self.of(f"sum_{plane}") for plane in self.planes)
+            return [Store(SUMS, (const(number), self.row, self.column), value) for number, value in sums]
+        program, outputs = self.encoding.program, dict(self.encoding.program.outputs)
+        given = {plane: self.of(f"sum_{plane}") for plane in self.planes}
+        given["samples"] = self.of("encoded_samples")
+        samples = self.all(apply("convert", name("samples"), value="float32"))
+        made = _Statements(program, given, {}, self.width)
+        place = self.row + name("first_row"), self.column
+        stores = [
+            Store(f"{IMAGE}{image.name}", (*place, const(c)), made.values[outputs[f"{image.name}_{c}"]])
+            for image in self.encoding.images
+            for c in range(image.channels)
+        ]
+        return [Comment("the features, encoded"), Let("encoded_samples", samples), *made.body, *stores]
 
     def block(
         self,
         part: str,
         comment: str,
-        renamed: Mapping[str, str] | None = None,
         masked: Sequence[str] = (),
         summed: bool = False,
         unread: Sequence[str] = (),
-    ) -> None:
-        """Write the statements of a program, and assign its outputs or add them up.
+    ) -> tuple[Statement, ...]:
+        """Return the statements of a program, which assign its outputs or add them up.
 
-        Inputs are variables of their names, or of those that `renamed` gives. Outputs in `masked` are
-        assigned where a path is alive, those that are `unread` are not.
+        Outputs in `masked` are assigned where a path is alive, those that are `unread` are not.
         """
-        program = self.programs.parts()[part]
-        renamed = {**self._scene_numbers(), **(renamed or {})}
-        self.lines.append("")
-        self._line(f"/* {part}: {comment} */")
-        self._open("{")
-        texts = self._statements(part, program, renamed)
-        for name, index in program.outputs:
-            if summed and name in self.planes:
-                self._line(f"sum_{name} += {texts[index]};")
-        left = [name for name, _ in program.outputs if name not in unread]
-        for line in self._assignments(program, texts, masked, WAY if summed else left):
-            self._line(line)
-        self._close()
-
-    def _statements(self, part: str, program: Program, renamed: Mapping[str, str]) -> list[str]:
-        """Write one statement for each operation; return the text of each value."""
-        texts: list[str] = []
-        ends, in_bodies = loops(program)
-        for index, node in enumerate(program.nodes):
-            if node.op == "input":
-                name = str(node["name"])
-                texts.append(renamed.get(name, name))
-            elif node.op == "constant":
-                texts.append(self.dialect.constant(node))
-            elif node.op == "loop":
-                if index in ends:
-                    self._loop(part, program, texts, ends[index])
-                texts.append(texts[node.args[int(node["index"])]])  # type: ignore[arg-type]
-            else:
-                texts.append(f"t{index}")
-                if index not in in_bodies:
-                    self._statement(part, program, texts, index)
-        return texts
-
-    def _statement(self, part: str, program: Program, texts: Sequence[str], index: int) -> None:
-        """Write the statement that computes a value."""
-        node = program.nodes[index]
-        expression = self._expression(part, program, node, texts)
-        declared = self.dialect.var if node.op == "carried" else self.dialect.let
-        self._line(declared(node.type.dtype, texts[index], expression, kept=True))
-
-    def _loop(self, part: str, program: Program, texts: Sequence[str], loop: Loop) -> None:
-        """Write a loop over the rows of tables."""
-        if loop.walk is not None:
-            self._walk(part, program, texts, loop, loop.walk)
-            return
-        self._open(self.dialect.loop(TRIP, loop.trips))
-        self._trip(part, program, texts, loop, Part(loop.body, loop.after))
-        self._close()
-
-    def _walk(self, part: str, program: Program, texts: Sequence[str], loop: Loop, walk: Walk) -> None:
-        """Write a walk along a tree: a node is entered where any of the paths enters it."""
-        first, skip = (self.tables[part, name] for name in (walk.first, walk.skip))
-        nodes = len(program.parameters[walk.skip])
-        self._open(self.dialect.walk(BRANCH, nodes))
-        for index in walk.guard:
-            self._statement(part, program, texts, index)
-        entered = self.dialect.any_enters.format(mask=texts[walk.enters])
-        self._open(f"if ({entered}) {{")
-        for number, each in enumerate(walk.parts):
-            start, end = (f"{first}[{BRANCH} + {number * (nodes + 1) + more}]" for more in (0, 1))
-            self._open(self.dialect.loop(TRIP, end, start.replace(" + 0]", "]")))
-            self._trip(part, program, texts, loop, each)
-            self._close()
-        self._line(f"++{BRANCH};")
-        self._close()
-        self._open("else {")
-        self._line(f"{BRANCH} = {skip}[{BRANCH}];")
-        self._close()
-        self._close()
-
-    def _trip(self, part: str, program: Program, texts: Sequence[str], loop: Loop, done: Part) -> None:
-        """Write a trip of a loop: its body, then the assignments of what it carries."""
-        for index in done.body:
-            self._statement(part, program, texts, index)
-        before, after = [], []
-        for carried, new in zip(loop.carried, done.after, strict=True):
-            value = texts[new]
-            if new in loop.carried and new != carried:
-                # Another carried number, which may be assigned before it is read: keep its value.
-                kind, name = program.nodes[new].type.dtype, f"new_{texts[carried]}"
-                before.append(self.dialect.let(kind, name, value, kept=True))
-                value = name
-            if new != carried:
-                after.append(f"{texts[carried]} = {value};")
-        for line in before + after:
-            self._line(line)
-
-    def _expression(self, part: str, program: Program, node: Node, texts: Sequence[str]) -> str:
-        """Return the right side of a statement."""
-        if node.op == "carried":
-            return texts[node.args[0]]
-        if node.op in ("take", "row", "branch"):
-            table = self.tables[part, str(node["table"])]
-            node = Node(node.op, node.args, node.type, attributes(table=table))
-        if node.op in ("row", "branch"):
-            counter = TRIP if node.op == "row" else BRANCH
-            return self.dialect.expression(replace(node, op="row"), node.type.dtype, [counter])
-        kind = program.nodes[node.args[-1]].type.dtype
-        return self.dialect.expression(node, kind, [texts[arg] for arg in node.args])
-
-    def _assignments(
-        self, program: Program, texts: Sequence[str], masked: Sequence[str], only: Collection[str]
-    ) -> list[str]:
-        """Return the assignments of a program's outputs, or of some, to the variables of their names."""
+        program = self.programs.parts[part]
+        numbers = enumerate(self.programs.inputs)
+        given = {each: self.all(load(SCENE_NUMBERS, number)) for number, each in numbers}
+        given |= {each: self.of(f"image_{each}") for each in ("width", "height")}
+        own = {}
+        for table, array in tables(program).items():
+            key = str(array.dtype), array.tobytes()
+            own[table], _ = self.tables.setdefault(key, (f"table_{len(self.tables)}", array))
+        made = _Statements(program, given, own, self.width)
+        values = {output: made.values[index] for output, index in program.outputs}
+        sums = [self._added(each, value) for each, value in values.items() if summed and each in self.planes]
+        kept = {e: value for e, value in values.items() if (e in WAY if summed else e not in unread)}
         inputs = {str(node["name"]) for node in program.nodes if node.op == "input"}
-        before, after = [], []
-        for name, index in program.outputs:
-            if name not in only:
-                continue
-            value = texts[index]
-            if value in inputs and value != name:
-                # The variable may be assigned before it is read: keep its value.
-                kind = program.nodes[index].type.dtype
-                before.append(self.dialect.let(kind, f"new_{name}", value, kept=True))
-                value = f"new_{name}"
-            if name == "alive":
-                after.append(f"alive = {self.dialect.operations['logical_and'].format('alive', value)};")
-            elif name in masked and value != name:
-                after.append(f"{name} = {self._select('alive', value, name)};")
-            elif value != name:
-                after.append(f"{name} = {value};")
-        return before + after
+        body = (*made.body, *sums, *_assigned(kept, inputs, masked))
+        return Comment(f"{part}: {comment}"), Block(body)

@@ -25,9 +25,7 @@ from ..core.passes import pipeline
 from ..kernel import interface
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS
 from ..kernel.interface import SUMS as SUMS_ARRAY
-from ..kernel.kernel import Kernel, Let, Store, apply, const, load, name
-from ..languages.dialect import Dialect
-from ..languages.renderer import Renderer
+from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
 from ..plan import sine_contract
 from ..proof import bounds
 from ..schedules.common import X, Y
@@ -98,7 +96,7 @@ def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
     """Return the kernel of one pixel, of sums whose planes these are."""
     used = planes_of([image.name for image in encoding.images])
     lines, outputs = lets(encoding.program)
-    body = (
+    body: Body = (
         Let(SAMPLES, apply("convert", name("sample_count"), value="float32"), kept=True),
         *reads(used, lambda i: load(SUMS_ARRAY, planes.index(used[i]), Y, X)),
         *lines,
@@ -139,17 +137,3 @@ def error_at(
         image.name: np.stack([errors[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
         for image in artifact.images
     }
-
-
-def encode_source(
-    features: Sequence[str],
-    normalization: Normalization,
-    dialect: Dialect,
-    profile: str = "ieee",
-    whole: bool = False,
-) -> str:
-    """Return only the statements, for a kernel that has the sums of these features in variables."""
-    kernel = encode_kernel(encoding_of(features, normalization, profile, whole), planes_of(features))
-    renderer = Renderer(dialect, kernel, False)
-    renderer.body(kernel.body)
-    return "\n".join(renderer.lines)

@@ -23,7 +23,7 @@ from ..kernel.interface import CAMERAS as CAMERAS_ARRAY
 from ..kernel.interface import FIRST as FIRST_ARRAY
 from ..kernel.interface import FOLLOW, IMAGE, INTEGERS, MOTIONS, RESULT
 from ..kernel.interface import PAST as PAST_ARRAY
-from ..kernel.kernel import FLOAT, Array, Expr, For, If, Kernel, Let, Store, apply, const, load, name
+from ..kernel.kernel import FLOAT, Array, Body, Expr, For, If, Kernel, Let, Store, apply, const, load, name
 from ..schedules.common import HEIGHT, WIDTH, X, Y, loop
 from .lower_history import (
     BEYOND,
@@ -94,7 +94,7 @@ def history_kernel(programs: HistoryPrograms) -> Kernel:
     find, found = lets(programs.find, prefix="f")
     blend, mean = lets(programs.blend, prefix="b")
     values = {each: mean.get(each) or name(each, FLOAT) for each in PAST}
-    body = (
+    body: Body = (
         *reads(FIRST, lambda i: load(FIRST_ARRAY, i, Y, X)),
         *reads(COLOR, lambda i: load(f"{IMAGE}color", Y, X, i)),
         Let("row", apply("convert", name(NUMBER, FLOAT), value="int32")),
@@ -122,7 +122,7 @@ def _taken(programs: HistoryPrograms, found: dict[str, Expr]) -> For:
     line, column = name("line"), name("column")
     take, sums = lets(programs.take, found)
     there = name(f"{THERE}row")
-    body = (
+    body: Body = (
         *reads(PAST, lambda i: load(PAST_ARRAY, i, line, column), THERE),
         Let(f"{THERE}row", apply("convert", name(f"{THERE}{NUMBER}", FLOAT), value="int32")),
         Let(f"{THERE}{RESTS}", load(MOTIONS, there, MOTION.index(RESTS))),

@@ -1,7 +1,6 @@
-"""A feature of a noisy picture in one pass of a host: paths whose sums stay in a variable, then the encoding.
+"""A feature of a noisy picture in one pass of a host: a path kernel that encodes what it adds up.
 
-1. The path kernel adds up the planes of the feature's layer, one sample a pixel [`HOSTS`].
-2. The statements of the encoding follow in the same text, and the pass writes the image [`feature_pass`].
+It adds up the planes of the feature's layer, one sample per pixel, and returns channels [`HOSTS`].
 """
 
 from __future__ import annotations
@@ -13,44 +12,53 @@ from ..kernel.interface import PATH, Array, Interface
 from ..languages.dialect import Parts
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise
-from .emit_path import emit_path
-from .encode_kernel import encode_source
+from .encode_kernel import encoding_of
 from .lower_encode import layers_of
 from .lower_scene import PathPrograms
+from .path_kernel import source_of
 
 
 class _ShadertoyPath(GLSLES):
-    """The words of a path whose sums stay in a variable, and of the encoding that follows it."""
+    """The words of a path, and of the encoding at its end, whose channels are those of a variable."""
 
     target = "shadertoy"
     language = "Shadertoy (GLSL ES 3.00), one buffer a feature"
     suffix = ".glsl"
     first: tuple[str, ...] = ()
     preamble = NO_PRECISE
-    max_planes = 4
     most_numbers = 0
-    said = {PATH: "{planes}"}
+    said = {PATH: ""}
+    paints = True
+    fragment = ("at.x", "at.y")
+    ends = {
+        PATH: """\
+    return image;
+}
 
-    def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
-        """Return a plane of the sums, or a channel of the image."""
-        return f"sums_0[{index[0]}]" if array.planes else f"image[{index[-1]}]"
+void mainImage(out vec4 fragColor, in vec2 fragCoord)
+{
+    fragColor = wamnet_trace(ivec2(fragCoord), int(iResolution.x), int(iResolution.y), uint(iFrame));
+}"""
+    }
+    takes = "ivec2 at, int width, int height, uint seed_number"
+    uniforms_of_host: tuple[str, ...] = ()
 
     def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return what follows the first lines of a path kernel."""
         return [
-            self.depth(parts),
             parts.top,
-            "vec4 sums_0;",
+            *self.uniforms_of_host,
             "",
-            "void wamnet_trace(ivec2 at, int width, int height, uint seed_number)",
+            f"vec4 wamnet_trace({self.takes})",
             "{",
+            "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
             *ONE_SAMPLE,
-            *self.path_start(kernel),
+            *self.places(kernel),
         ]
 
-    def place(self, kernel: Interface) -> tuple[str, str]:
-        """Return the texts of a pixel's column and row."""
-        return ("at.x", "at.y")
+    def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
+        """Return a channel of the image."""
+        return f"image[{index[-1]}]"
 
 
 ONE_SAMPLE = (
@@ -72,61 +80,31 @@ class _GodotPath(_ShadertoyPath):
     suffix = ".gdshader"
     first = GodotDenoise.first
     qualifiers = {}
-    ends = {PATH: "    return sums_0;\n}"}
+    ends = {
+        PATH: """\
+    return image;
+}
+
+void fragment()
+{
+    ivec2 at = ivec2(UV * vec2(float(width), float(height)));
+    COLOR = wamnet_trace(at, uint(seed_number));
+}"""
+    }
+    takes = "ivec2 at, uint seed_value"
+    uniforms_of_host = tuple(f"uniform int {name} = {value};" for name, value in NUMBERS)
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
-        return "\n".join(
-            [
-                self.depth(parts),
-                parts.top,
-                *(f"uniform int {name} = {value};" for name, value in NUMBERS),
-                "",
-                "vec4 wamnet_trace(ivec2 at, uint seed_value)",
-                "{",
-                "    vec4 sums_0 = vec4(0.0, 0.0, 0.0, 1.0);",
-                *ONE_SAMPLE,
-                *self.path_start(kernel),
-            ]
-        )
+        return "\n".join(self.path_begin(kernel, parts))
 
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""
         return "seed_value" if name == "seed_number" else name
 
 
-SHADERTOY_END = """\
-
-void mainImage(out vec4 fragColor, in vec2 fragCoord)
-{{
-    wamnet_trace(ivec2(fragCoord), int(iResolution.x), int(iResolution.y), uint(iFrame));
-    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);
-    const int sample_count = 1;
-{statements}
-    fragColor = image;
-}}
-"""
-"""The end of a buffer's tab: every frame has random numbers of its own."""
-
-GODOT_END = """\
-
-void fragment()
-{{
-    ivec2 at = ivec2(UV * vec2(float(width), float(height)));
-    vec4 sums_0 = wamnet_trace(at, uint(seed_number));
-    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);
-    const int sample_count = 1;
-{statements}
-    COLOR = image;
-}}
-"""
-"""The end of a feature's shader."""
-
-STATEMENTS = _GodotPath()
-"""The words of an encoding in every host: its statements need no order."""
-
-HOSTS = {"shadertoy": (_ShadertoyPath(), SHADERTOY_END), "godot": (_GodotPath(), GODOT_END)}
-"""By target: the dialect of a path, and the text after the path."""
+HOSTS = {"shadertoy": _ShadertoyPath(), "godot": _GodotPath()}
+"""The dialect of a pass, by target; every frame of a host has random numbers of its own."""
 
 
 def feature_pass(
@@ -138,7 +116,5 @@ def feature_pass(
     whole: bool = False,
 ) -> str:
     """Return the pass that traces one sample a pixel and writes one encoded feature; `whole`: in integers."""
-    dialect, end = HOSTS[target]
-    text = emit_path(programs, dialect, layers_of((feature,)), header)
-    statements = encode_source((feature,), normalization, STATEMENTS, whole=whole)
-    return text + end.format(statements=statements)
+    encoding = encoding_of((feature,), normalization, whole=whole)
+    return source_of(programs, HOSTS[target], layers_of((feature,)), header, encoding=encoding)

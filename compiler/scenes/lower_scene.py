@@ -107,30 +107,21 @@ class FeatureRays:
 class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
-    `see` is there where it was requested; the path is followed past `most_followed` surfaces at most.
-    `inputs` are the names of the scene's numbers that all four are given [scene_inputs.py], `places` where
-    they are in its tables, `values` those of this scene. `ray` starts the features' own `rays`, if any.
+    `parts` are the programs by name: `see` is there where it was requested, and the path is followed past
+    `most_followed` surfaces at most; `ray` starts the features' own `rays`, if any. `inputs` are the names of
+    the scene's numbers that all of them are given [scene_inputs.py], `places` where they are in its tables,
+    `values` those of this scene.
     """
 
     scene: str
     scene_digest: str
     settings: Settings
-    start: Program
-    arrive: Program
-    look: Program
-    scatter: Program
+    parts: Mapping[str, Program]
     inputs: tuple[str, ...] = ()
     places: tuple[Places, ...] = ()
     values: tuple[float, ...] = ()
-    see: Program | None = None
     most_followed: int = 0
-    ray: Program | None = None
     rays: FeatureRays | None = None
-
-    def parts(self) -> Mapping[str, Program]:
-        """Return the programs by name."""
-        all_parts = {n: getattr(self, n) for n in ("start", "arrive", "look", "scatter", "see", "ray")}
-        return {name: program for name, program in all_parts.items() if program is not None}
 
 
 def lower_scene(
@@ -175,21 +166,20 @@ def lower_scene(
     start, started = partial(_started, laid, moving), {**numbers, **size, **scene_numbers}
     arriving = lowered("arrive", arrive, {**PATH, **scene_numbers})
     scattering = lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers})
-    return PathPrograms(
-        scene.name,
-        scene_digest(scene),
-        settings,
-        lowered("start", partial(start, settings.sampler), started),
-        arriving,
-        lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
-        _reached(scattering, arriving),
-        moving.names,
-        moving.places,
-        tuple(map(float, values)),
-        *_seen(lowered, world_of, _most_followed(laid["world"], moving), scene_numbers, seen),
-        lowered("ray", partial(start, rays.sampler), started) if rays else None,
-        rays,
-    )
+    parts = {
+        "start": lowered("start", partial(start, settings.sampler), started),
+        "arrive": arriving,
+        "look": lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
+        "scatter": _reached(scattering, arriving),
+    }
+    most = _most_followed(laid["world"], moving)
+    if seen:
+        parts["see"] = lowered("see", *_see(world_of, most, scene_numbers))
+    if rays:
+        parts["ray"] = lowered("ray", partial(start, rays.sampler), started)
+    numbers_of_scene = moving.names, moving.places, tuple(map(float, values))
+    identity = scene.name, scene_digest(scene), settings
+    return PathPrograms(*identity, parts, *numbers_of_scene, most if seen else 0, rays)
 
 
 def _reached(scatter: Program, arrive: Program) -> Program:
@@ -228,17 +218,6 @@ def _most_followed(world: World, moving: SceneInputs) -> int:
     if any(path.startswith(MATERIALS) for places in moving.places for path, _ in places):
         return min(following.MOST_FOLLOWED, world.settings.max_depth)
     return following.most_followed(world)
-
-
-def _seen(
-    lowered: Callable[..., Program],
-    world_of: Callable[[Mapping[str, Any]], World],
-    most: int,
-    scene_numbers: Values,
-    wanted: bool,
-) -> tuple[Program | None, int]:
-    """Return the program that sees, if it is wanted, and how many surfaces it is followed past at most."""
-    return (lowered("see", *_see(world_of, most, scene_numbers)), most) if wanted else (None, 0)
 
 
 def _see(

@@ -32,7 +32,9 @@ from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
 from ..kernel.interface import Interface
+from ..languages.dialect import Dialect
 from ..languages.openings import IMAGES
+from ..languages.renderer import Renderer
 from ..plan import sine_contract
 from ..schedules.schedules import PRINTED
 from ..targets import integers_of, target_named
@@ -104,8 +106,8 @@ def forms_of(target: str) -> Forms:
 
 def most_planes(target: str, lanes: int) -> int:
     """Return how many planes a path kernel of a target adds up at most; NumPy's has no limit."""
-    dialect = target_named(target).paths.get(lanes)
-    return dialect.max_planes if dialect else NO_LIMIT
+    chosen = target_named(target)
+    return chosen.dialect.max_planes if chosen.dialect and lanes in chosen.paths else NO_LIMIT
 
 
 def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
@@ -115,7 +117,7 @@ def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> 
     scene's primitives, these do not move.
     """
     chosen = target_named(target)
-    if any(dialect and len(inputs.places) > dialect.most_numbers for dialect in chosen.paths.values()):
+    if chosen.dialect and len(inputs.places) > chosen.dialect.most_numbers:
         return False
     if not inputs.move_rows(tables):
         return True
@@ -141,10 +143,11 @@ def compile_path(
         known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
-    emitted, dialect = _passed(programs, promised.passes), chosen.paths[lanes]
+    passed = {name: pipeline.run(part, promised.passes) for name, part in programs.parts.items()}
+    emitted, dialect = replace(programs, parts=passed), chosen.dialect
     planes = tuple(emit_path.planes(groups))
     images = encoding.images if encoding else ()
-    written = _written(images) if images else (*SUMS, *(PAST_SUMS if programs.see is not None else ()))
+    written = _written(images) if images else (*SUMS, *(PAST_SUMS if "see" in programs.parts else ()))
     if programs.rays:
         written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
     at_once = (dialect and dialect.at_once) or f"{lanes} {'path' if lanes == 1 else 'paths'}"
@@ -160,7 +163,7 @@ def compile_path(
     else:
         first, *others = arguments.split("\n")
         header += [f"arguments {first}", *(f"          {line}" for line in others)]
-        text = emit_path.emit_path(emitted, dialect, groups, header, encoding)
+        text = source_of(emitted, dialect, groups, header, lanes, encoding)
         suffix, entry = dialect.suffix, dialect.entries[interface.PATH]
     facts = {
         "target": target,
@@ -179,6 +182,36 @@ def compile_path(
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
     return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest, images)
+
+
+def source_of(
+    programs: PathPrograms,
+    dialect: Dialect,
+    groups: Sequence[str],
+    header: Sequence[str],
+    lanes: int = 1,
+    encoding: Encoding | None = None,
+) -> str:
+    """Return the kernel's source; `header` are the lines of the comment at its top."""
+    count, language = len(emit_path.planes(groups)), dialect.language
+    if count > dialect.max_planes:
+        raise CompileError(
+            f"the kernel adds up {count} planes: {language} writes at most {dialect.max_planes}; request "
+            "fewer groups"
+        )
+    if len(programs.inputs) > dialect.most_numbers:
+        raise CompileError(
+            f"{language}: its path kernels take at most {dialect.most_numbers} scene parameters, and "
+            f"{len(programs.inputs)} move: compile for fewer times, or one"
+        )
+    kernel = emit_path.path_kernel(programs, dialect.path_lanes or lanes, groups, encoding)
+    renderer = Renderer(dialect, kernel, False)
+    if kernel.interface.images and not dialect.paints:
+        raise CompileError(
+            f"{language}: its path kernels write sums, not encoded images: compile the encoding as a "
+            "separate kernel"
+        )
+    return renderer.source(header)
 
 
 def numbers_of(programs: PathPrograms) -> list[dict[str, Any]]:
@@ -236,24 +269,16 @@ def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
         "digest": ir.sha256(text.encode()),
         "scene": {"name": programs.scene, "digest": programs.scene_digest},
         "settings": programs.settings.facts(),
-        "programs": {part: ir.digest(program) for part, program in programs.parts().items()},
+        "programs": {part: ir.digest(program) for part, program in programs.parts.items()},
         "bound": None,
         "files": {name: ir.sha256(text.encode())},
         SIZES: {name: len(text.encode())},
     }
 
 
-def _passed(programs: PathPrograms, passes: Sequence[str]) -> PathPrograms:
-    """Return the programs after the named passes."""
-    run = {name: pipeline.run(part, passes) for name, part in programs.parts().items()}
-    start, arrive, look, scatter = (run[name] for name in ("start", "arrive", "look", "scatter"))
-    ray = run.get("ray")
-    return replace(programs, start=start, arrive=arrive, look=look, scatter=scatter, ray=ray)
-
-
 def _printed(programs: PathPrograms, header: Sequence[str]) -> str:
     """Return the programs as text, which is all that the interpreter needs."""
     parts = [f"# {line}".rstrip() for line in header]
-    for name, program in programs.parts().items():
+    for name, program in programs.parts.items():
         parts += [f"# {name}", ir.text(program).rstrip("\n")]
     return "\n".join(parts) + "\n"

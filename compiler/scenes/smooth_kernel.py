@@ -27,7 +27,21 @@ from ..core.ir import Program
 from ..core.passes import pipeline
 from ..kernel import interface
 from ..kernel.interface import GUIDE, GUIDES, IMAGE, INTEGERS, LIGHT, RESULT, SMOOTH
-from ..kernel.kernel import FLOAT, INT, Array, Expr, Kernel, Let, Store, const, load, name, splat
+from ..kernel.kernel import (
+    FLOAT,
+    INT,
+    Array,
+    Body,
+    Expr,
+    Kernel,
+    Let,
+    Statement,
+    Store,
+    const,
+    load,
+    name,
+    splat,
+)
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
@@ -89,11 +103,8 @@ def compile_smoothing(
     several = f", a multiple of {lanes}" if lanes > 1 else ""
     notes |= {"row_stride": "at least width" + several, "gap": "pixels between taps"}
     lists = {GUIDES: programs.guides, LIGHT: LIGHT_PLANES, RESULT: LIGHT_PLANES}
-    made = []
-    for kernel, used in (
-        (guide_kernel(programs), [programs.guide]),
-        (smooth_kernel(programs, lanes), [programs.tap, programs.mean]),
-    ):
+
+    def made(kernel: Kernel, *used: Program) -> PlaneArtifact:
         draft = Draft(
             f"edge-avoiding filter: {TITLES[kernel.interface.role]}",
             used,
@@ -104,8 +115,12 @@ def compile_smoothing(
             lists,
             notes,
         )
-        made.append(compiled(draft, target, profile))
-    return SmoothKernels(*made, compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES))
+        return compiled(draft, target, profile)
+
+    guide = made(guide_kernel(programs), programs.guide)
+    smooth = made(smooth_kernel(programs, lanes), programs.tap, programs.mean)
+    encode = compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES)
+    return SmoothKernels(guide, smooth, encode)
 
 
 def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothPrograms:
@@ -125,8 +140,8 @@ def guide_kernel(programs: SmoothPrograms) -> Kernel:
         body += reads(names, lambda c, image=f"{IMAGE}{layer.name}": load(image, Y, X, c))  # type: ignore[misc]
     lines, outputs = lets(programs.guide)
     body += lines
-    for array, names in ((LIGHT, LIGHT_PLANES), (GUIDES, programs.guides)):
-        body += [Store(array, (const(i), Y, X), outputs[each]) for i, each in enumerate(names)]
+    for array, planes in ((LIGHT, LIGHT_PLANES), (GUIDES, programs.guides)):
+        body += [Store(array, (const(i), Y, X), outputs[each]) for i, each in enumerate(planes)]
     counts = len(programs.guides), len(LIGHT_PLANES)
     return Kernel(interface.guiding(LAYERS_READ, *counts, INTEGERS[GUIDE]), tuple(body))
 
@@ -147,7 +162,7 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
     half = len(smoothing.SPLINE) // 2
     spline = [Expr("take", (each,), FLOAT, TABLE) for each in (dy, dx)]
     sums, after = lets(programs.tap, lanes=lanes)
-    tap = [
+    tap: list[Statement] = [
         Let("column", X + gap * (dx - half)),
         *reads(GUIDED, lambda i: there(GUIDES, programs.guides.index(GUIDED[i])), THERE),
         *reads(LIGHT_PLANES, lambda i: there(LIGHT, i)),
@@ -157,7 +172,7 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
     ]
     means, mean = lets(programs.mean, lanes=lanes)
     line = Let("line", clamp(Y + gap * (dy - half), HEIGHT))
-    body = (
+    body: Body = (
         *reads(programs.guides, lambda i: plane(GUIDES, i, Y, X), HERE),
         *(Array(each, kind, value=splat(const(0.0), lanes)) for each in (*SUMS, WEIGHTS)),
         loop("dy", 2 * half + 1, line, loop("dx", 2 * half + 1, *tap)),

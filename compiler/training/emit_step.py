@@ -23,11 +23,11 @@ from ...refimpl.errors import CompileError
 from ..core.ir import Node, Program, users
 from ..core.lines import Lines
 from ..core.ops import OPS
-from ..languages.dialect import Dialect
 from ..schedules.common import groups_of as schedule
 from .emit_factors import factor_defines
 from .step import SQUARES, TARGET, TRANSPOSED, WINDOW, Step, Sum
 from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for
+from .vectors import Vectors
 
 TILE = 64
 """Examples that a work item holds at once: their values (19 arrays of 8 KiB for the presets) stay in the
@@ -60,7 +60,7 @@ class _Step(Lines):
 
     step: Step
     form: WindowForm
-    dialect: Dialect
+    dialect: Vectors
     lines: list[str] = field(default_factory=list)
     depth: int = 2
 
@@ -188,7 +188,7 @@ class _Step(Lines):
     def _bias(self, node: Node, j: int) -> str:
         """Return what the sums of vector j of the neurons begin with."""
         if node.get("bias") is None:
-            return self.dialect.number(0.0, "float32")
+            return self.dialect.splatted(0.0, "float32")
         array, slot = self._weight_place(str(node["bias"]))
         return f"{array}[{slot.offset + j}]"
 
@@ -210,7 +210,7 @@ class _Step(Lines):
         self._open(self.dialect.loop("e", "filled"))
         self._open(self.dialect.loop("j", vectors))
         for index in group:
-            kind = self.dialect.variable(self.program.nodes[index].type.dtype)
+            kind = self.dialect.types[self.program.nodes[index].type.dtype]
             self._line(f"{kind} t{index} = {self._expression(index, number)};")
             if index in self.arrays:
                 self._line(f"v{index}[e * {vectors} + j] = t{index};")
@@ -267,7 +267,7 @@ class _Step(Lines):
         self._open("{")
         row = f"({before}) * {slot.vectors}" if before else "0"
         self._line(f"__global float16 *out = sums + {slot.offset} + {row};")
-        zero = self.dialect.number(0.0, "float32")
+        zero = self.dialect.splatted(0.0, "float32")
         names = [(i, j, f"s{i}_{j}", f"out[{i * slot.vectors + j}]") for i in range(inputs) for j in block]
         for _, _, name, place in names:
             self._line(f"float16 {name} = begins ? {zero} : {place};")
@@ -402,7 +402,7 @@ SLOPES_SPLIT = """\
 """The same where a matrix is trained through its factors [emit_factors.py]."""
 
 
-def step_text(step: Step, form: WindowForm, dialect: Dialect, helpers: Sequence[str]) -> tuple[str, int]:
+def step_text(step: Step, form: WindowForm, dialect: Vectors, helpers: Sequence[str]) -> tuple[str, int]:
     """Return the first kernel, with the definitions of both, and the vectors of memory of a work item."""
     body = _Step(step, form, dialect)
     lines = body.text()
@@ -427,7 +427,7 @@ def step_text(step: Step, form: WindowForm, dialect: Dialect, helpers: Sequence[
     return begin + "\n".join([*lines, "    }", "}"]) + "\n", body.scratch_vectors
 
 
-def update_text(step: Step, adam: Program, dialect: Dialect) -> str:
+def update_text(step: Step, adam: Program, dialect: Vectors) -> str:
     """Return the second kernel: the sums of all work items, Adam, and the copies of transposed matrices."""
     lines = []
     for index, node in enumerate(adam.nodes):
@@ -454,7 +454,7 @@ def update_text(step: Step, adam: Program, dialect: Dialect) -> str:
     return begin + "\n".join(f"    {line}" for line in lines) + "\n}\n"
 
 
-def _number(node: Node, index: int, dialect: Dialect) -> str:
+def _number(node: Node, index: int, dialect: Vectors) -> str:
     """Return the text of a value of Adam's program."""
     if node.op == "input":
         return str(node["name"])

@@ -18,12 +18,12 @@ from ..core import ir
 from ..core.ir import Program
 from ..core.passes import pipeline
 from ..core.profiles import PROFILES
-from ..languages.opencl_path import of_lanes
 from .emit_factors import factors_text
 from .emit_step import WindowForm, step_text, update_text
 from .lower_step import lower_adam, lower_step
 from .step import Split, Step
 from .step_layout import LANES, Slot, slots, transposed_slots
+from .vectors import Vectors
 
 FIRST = "W0"
 """Name of the first layer's matrix in a step."""
@@ -70,7 +70,7 @@ def compile_step(
 
 def compile_lowered(step: Step, size: int) -> StepKernel:
     """Return the kernels of a step; its window has `size` runs."""
-    dialect = of_lanes(LANES)
+    dialect = Vectors(LANES)
     emitted = replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes))
     operations = {node.op for node in emitted.program.nodes}
     helpers = list(dict.fromkeys(text for op, text in dialect.helpers.items() if op in operations))

@@ -59,7 +59,7 @@ def scene_listing(target: str) -> list[Line]:
     )
     programs = lower_scene(scene, Settings(), keep_places=True)
     kernel = compile_path(programs, target, "native", groups=("color",))
-    return lines_of(kernel.source, kernel.programs.parts())
+    return lines_of(kernel.source, kernel.programs.parts)
 
 
 def listings() -> Iterator[tuple[str, str]]:

@@ -112,22 +112,22 @@ def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, 
     given holds the inputs of `start`: x, y, seed, sample_number (...), width and height; and the scene's
     numbers that are inputs of all programs.
     """
-    state: dict[str, Any] = {**given, **interpret(programs.start, given)}
+    state: dict[str, Any] = {**given, **interpret(programs.parts["start"], given)}
     state["alive"] = state["way_going"] = np.ones(state["x"].shape, bool)
     state["way_length"] = np.zeros(state["x"].shape, np.float32)
     first: dict[str, Any] = {}
     for depth in range(programs.settings.max_depth + 1):
         state["depth"] = np.full(state["x"].shape, depth, np.uint32)
-        state = _masked(state, interpret(programs.arrive, state))
+        state = _masked(state, interpret(programs.parts["arrive"], state))
         if depth == 0:
-            first = interpret(programs.look, state)
-        if programs.see is not None and (depth == 0 or programs.most_followed > 0):
-            found = interpret(programs.see, state)
+            first = interpret(programs.parts["look"], state)
+        if "see" in programs.parts and (depth == 0 or programs.most_followed > 0):
+            found = interpret(programs.parts["see"], state)
             state |= {name: found.pop(name) for name in WAY if name in found}
             first |= {name: first.get(name, np.float32(0)) + value for name, value in found.items()}
         if depth == programs.settings.max_depth:
             break
-        state = _masked(state, interpret(programs.scatter, state))
+        state = _masked(state, interpret(programs.parts["scatter"], state))
         if not state["alive"].any():
             break
     return first, state
@@ -135,9 +135,8 @@ def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, 
 
 def looked(programs: PathPrograms, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the features of the first surfaces of the features' own rays; given as for [`follow`]."""
-    assert programs.ray is not None
-    state = {**given, **interpret(programs.ray, given)}
-    return interpret(programs.look, {**state, **interpret(programs.arrive, state)})
+    state = {**given, **interpret(programs.parts["ray"], given)}
+    return interpret(programs.parts["look"], {**state, **interpret(programs.parts["arrive"], state)})
 
 
 def _masked(state: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

@@ -262,16 +262,16 @@ class _Step:
 
     def ranges(self, guided: bool = False) -> dict[str, Range]:
         """Return the range of each component of the state `after`."""
-        parts = self.programs
+        parts = self.programs.parts
         if self.before is None:
-            sent = ranges.evaluate(parts.start, self.given, self.arithmetic, guided)
+            sent = ranges.evaluate(parts["start"], self.given, self.arithmetic, guided)
             sent["alive"] = Range(np.True_, np.True_, np.True_)
         else:
             depth = np.full(len(self.given["x"]), self.depth - 1, np.uint32)
             inputs = {**self.given, **self.before, "depth": depth}
-            sent = ranges.evaluate(parts.scatter, inputs, self.arithmetic, guided)
+            sent = ranges.evaluate(parts["scatter"], inputs, self.arithmetic, guided)
         gathered = {name: sent[name] for name in QUANTITIES["radiance"]}
-        arrived = ranges.evaluate(parts.arrive, {**self.after, **gathered}, self.arithmetic, guided)
+        arrived = ranges.evaluate(parts["arrive"], {**self.after, **gathered}, self.arithmetic, guided)
         # A path that ends keeps what its last scattering has gathered.
         alive = self.after["alive"]
         kept = {name: ranges.where(alive, arrived[name], gathered[name]) for name in gathered}

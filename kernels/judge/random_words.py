@@ -75,7 +75,7 @@ def _programs(max_depth: int) -> PathPrograms:
 
     program = trace(look, dict.fromkeys(COUNTERS, Type("uint32")))
     programs = lower_scene(canonical("empty"), Settings(max_depth=0))
-    return replace(programs, look=pipeline.run(program, PASSES))
+    return replace(programs, parts={**programs.parts, "look": pipeline.run(program, PASSES)})
 
 
 def _halves(word: Any) -> tuple[Any, Any]:

@@ -145,7 +145,7 @@ def test_without_widening_something_is_missed(monkeypatch):
 def test_a_tree_is_a_loop_of_the_program_and_may_be_walked_one_by_one():
     """Interpreted for one lane or many, with the bits of the list's program."""
     scene = scene_of(3, 60, ["sphere", "quad", "turned"])
-    listed, grown = (lower_scene(scene, Settings(), f).arrive for f in (LISTS, TREES))
+    listed, grown = (lower_scene(scene, Settings(), f).parts["arrive"] for f in (LISTS, TREES))
     assert not any(node.op == "branch" for node in listed.nodes)
     assert {"branch", "loop"} <= {node.op for node in grown.nodes}
     origin, direction = rays(scene, 3, 40)
@@ -280,8 +280,8 @@ def test_a_scene_that_moves_has_no_tree():
     moved = replace(scene, camera=replace(CAMERA, position=(0.1, 0.0, 0.9)))
     inputs = varying([scene, moved], Settings())
     programs = lower_scene(scene, Settings(), TREES, inputs)
-    assert not any(node.op == "branch" for node in programs.arrive.nodes)
-    assert any(node.op == "branch" for node in lower_scene(scene, Settings(), TREES).arrive.nodes)
+    assert not any(node.op == "branch" for node in programs.parts["arrive"].nodes)
+    assert any(node.op == "branch" for node in lower_scene(scene, Settings(), TREES).parts["arrive"].nodes)
 
 
 def test_a_shape_without_an_extent_keeps_the_list(monkeypatch):

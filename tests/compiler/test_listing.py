@@ -67,12 +67,12 @@ def test_what_a_pass_puts_in_has_the_places_of_what_was_there():
 
 def test_every_operation_of_a_path_is_asked_for_by_the_reference():
     programs = lower_scene(canonical("lone_light"), Settings(), keep_places=True)
-    for part in programs.parts().values():
+    for part in programs.parts.values():
         # The pixel's counter is computed by lower_scene.py itself.
         bare = [node.op for node in part.nodes if not node.places]
         assert set(bare) <= {"input", "constant", "multiply", "add", "convert"}, bare
     kernel = compile_path(programs, "opencl", "native", groups=("color",))
-    lines = lines_of(kernel.source, kernel.programs.parts())
+    lines = lines_of(kernel.source, kernel.programs.parts)
     source, first = inspect.getsourcelines(quad.quad_distance)
     own = [
         line

@@ -94,7 +94,7 @@ def test_loops_give_the_reference_s_bits(name):
     """As above, with every table of two primitives and more as a loop."""
     programs = follow(SCENES[name], Settings(max_depth=2), LISTS)
     loops = {"minicubes": [27, 2], "everything": [2, 2, 3]}[name]
-    for program, results in ((programs.arrive, 2), (programs.scatter, 1)):
+    for program, results in ((programs.parts["arrive"], 2), (programs.parts["scatter"], 1)):
         found = [node["trips"] for node in program.nodes if node.op == "loop"]
         assert found == [trips for trips in loops for _ in range(results)]
 
@@ -111,7 +111,7 @@ def follow(scene, settings, forms):
     )
     given = {"x": x.astype(np.uint32), "y": y.astype(np.uint32), "width": 16, "height": 12}
     given |= {"seed": counters.seed, "sample_number": counters.sample}
-    check(interpret(programs.start, given), {**components(PATH, path), "pixel": counters.pixel})
+    check(interpret(programs.parts["start"], given), {**components(PATH, path), "pixel": counters.pixel})
     given |= {"pixel": counters.pixel}
     # Paths that have ended are computed on, in both.
     with np.errstate(all="ignore"):
@@ -119,11 +119,11 @@ def follow(scene, settings, forms):
             given |= components(PATH, path)
             path, surface, hit = transport.arrive(world, path)
             arrived = {**components(PATH, path), **components(SURFACE, surface, hit)}
-            found = interpret(programs.arrive, given)
+            found = interpret(programs.parts["arrive"], given)
             check(found, {name: arrived[name] for name in found})
             given |= arrived
             layers = R.first_hit_layers(world, surface, hit, path.direction)
-            looked = interpret(programs.look, given)
+            looked = interpret(programs.parts["look"], given)
             assert list(looked) == names(LAYERS)
             check(
                 looked,
@@ -131,8 +131,13 @@ def follow(scene, settings, forms):
             )
             given["depth"] = rng.counter(depth)
             path, alive = transport.scatter(world, path, surface, hit, given["depth"], counters)
-            found, expected = interpret(programs.scatter, given), {**components(PATH, path), "alive": alive}
-            if len(programs.scatter.nodes) == 1 + sum(n.op == "input" for n in programs.scatter.nodes):
+            found, expected = (
+                interpret(programs.parts["scatter"], given),
+                {**components(PATH, path), "alive": alive},
+            )
+            if len(programs.parts["scatter"].nodes) == 1 + sum(
+                n.op == "input" for n in programs.parts["scatter"].nodes
+            ):
                 # Where nothing is ever met: the state of paths that have all ended says nothing.
                 found, expected = ({"alive": values["alive"]} for values in (found, expected))
             check(found, expected)
@@ -172,7 +177,7 @@ def boxes(count, *rotation):
 @pytest.mark.parametrize("count", [1, 2, 20])
 def test_a_rotation_that_boxes_share_is_applied_once(count):
     """TURNED times a vector: x and z times 0.8, 0 and +-0.6, y times 0 (twice, made once) and times 1 (y)."""
-    arrive = lower_scene(room_with(boxes=boxes(count, TURNED)), Settings()).arrive
+    arrive = lower_scene(room_with(boxes=boxes(count, TURNED)), Settings()).parts["arrive"]
     assert from_input(arrive, "multiply", "direction") == 7
     assert from_input(arrive, "multiply", "origin") == 7
 
@@ -180,7 +185,7 @@ def test_a_rotation_that_boxes_share_is_applied_once(count):
 @pytest.mark.parametrize("forms", [LISTS, USUAL, STATEMENTS])
 def test_a_rotation_that_boxes_share_is_outside_of_their_loop(forms):
     """The same seven products: none of them depends on the row."""
-    arrive = lower_scene(room_with(boxes=boxes(20, TURNED)), Settings(), forms).arrive
+    arrive = lower_scene(room_with(boxes=boxes(20, TURNED)), Settings(), forms).parts["arrive"]
     assert ops(arrive, "loop") == (2 if forms == LISTS else 0)
     inside = loops_of(arrive)[1]
     for prefix in ("direction", "origin"):
@@ -190,25 +195,27 @@ def test_a_rotation_that_boxes_share_is_outside_of_their_loop(forms):
 
 
 def test_boxes_that_are_parallel_to_the_axes_are_not_rotated():
-    arrive = lower_scene(room_with(boxes=boxes(5)), Settings()).arrive
+    arrive = lower_scene(room_with(boxes=boxes(5)), Settings()).parts["arrive"]
     assert from_input(arrive, "multiply", "direction") == from_input(arrive, "multiply", "origin") == 0
 
 
 def test_what_a_scene_lacks_is_in_no_program():
-    plain = lower_scene(room_with(), Settings()).parts()
+    plain = lower_scene(room_with(), Settings()).parts
     assert ops(plain["arrive"], "sqrt") == ops(plain["arrive"], "take") == 0
     with_sphere = lower_scene(room_with(spheres=(Sphere((0.0, 0.0, 0.0), 0.1, GREY),)), Settings())
-    assert ops(with_sphere.arrive, "sqrt") == 1
+    assert ops(with_sphere.parts["arrive"], "sqrt") == 1
     # No light: one direction is sampled; its shadow ray, distance and cosines are not there.
     assert ops(plain["scatter"], "sqrt") == 1
     assert ops(plain["scatter"], "reciprocal") == 0
-    assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).scatter, "sqrt") == 1
-    assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).scatter, "sqrt") == 2
+    assert (
+        ops(lower_scene(room_with(lights=(LIGHT,)), Settings(strategy="bsdf")).parts["scatter"], "sqrt") == 1
+    )
+    assert ops(lower_scene(room_with(lights=(LIGHT,)), Settings()).parts["scatter"], "sqrt") == 2
 
 
 def test_where_nothing_is_met_nothing_is_scattered():
     """PTK-4: the path's state is passed on, and it is not alive."""
-    scatter = lower_scene(scenes.canonical("empty"), Settings()).scatter
+    scatter = lower_scene(scenes.canonical("empty"), Settings()).parts["scatter"]
     (ended,) = (node for node in scatter.nodes if node.op != "input")
     assert (ended.op, ended["value"]) == ("constant", False)
     for name, index in scatter.outputs:
@@ -219,17 +226,17 @@ def test_where_nothing_is_met_nothing_is_scattered():
 def test_a_sky_is_sampled_where_there_is_one():
     """Numbers: two for the direction, two and a choice for the sky."""
     scene = replace(SCENES["daylight"], spheres=(), environment=SCENES["daylight"].environment)
-    assert ops(lower_scene(scene, Settings()).scatter, "convert") == 5
-    assert ops(lower_scene(scene, Settings(strategy="bsdf")).scatter, "convert") == 2
+    assert ops(lower_scene(scene, Settings()).parts["scatter"], "convert") == 5
+    assert ops(lower_scene(scene, Settings(strategy="bsdf")).parts["scatter"], "convert") == 2
     single = replace(scene, boxes=(), quads=(), spheres=SCENES["daylight"].spheres[1:])
-    assert ops(lower_scene(single, Settings()).scatter, "convert") == 1
+    assert ops(lower_scene(single, Settings()).parts["scatter"], "convert") == 1
 
 
 @pytest.mark.parametrize("material", [Lambertian(), Mirror(), Conductor(0.3)])
 def test_one_material_needs_no_selection(material):
     """With one kind and one number nothing depends on which surface was hit, but that there is one."""
     walls = replace(SCENES["furnace"].room, materials=(material,) * 6)
-    scatter = lower_scene(replace(room_with(lights=(LIGHT,)), room=walls), Settings()).scatter
+    scatter = lower_scene(replace(room_with(lights=(LIGHT,)), room=walls), Settings()).parts["scatter"]
     index = next(
         i for i, node in enumerate(scatter.nodes) if node.op == "input" and node["name"] == "surface"
     )
@@ -249,8 +256,8 @@ def test_a_second_material_is_selected_by_surface():
         for material in (None, Mirror())
     )
     # Three components of the direction, and the density; the throughput is the same.
-    assert ops(two.scatter, "select") - ops(one.scatter, "select") >= 4
-    assert one.scatter == lower_scene(room_with(), Settings()).scatter
+    assert ops(two.parts["scatter"], "select") - ops(one.parts["scatter"], "select") >= 4
+    assert one.parts["scatter"] == lower_scene(room_with(), Settings()).parts["scatter"]
 
 
 @pytest.mark.parametrize(
@@ -265,12 +272,12 @@ def test_a_second_material_is_selected_by_surface():
 )
 def test_only_random_numbers_that_are_used_are_made(lights, settings, numbers):
     """Two numbers for the direction, two for a point on a light, one to choose it, one for roulette."""
-    scatter = lower_scene(room_with(lights=lights), settings).scatter
+    scatter = lower_scene(room_with(lights=lights), settings).parts["scatter"]
     assert ops(scatter, "convert") == numbers
 
 
 def test_programs_are_numbers_without_vectors_and_without_what_nothing_needs():
-    for program in lower_scene(EVERYTHING, Settings()).parts().values():
+    for program in lower_scene(EVERYTHING, Settings()).parts.values():
         assert all(not node.type.shape for node in program.nodes)
         used = {arg for node in program.nodes for arg in node.args} | {i for _, i in program.outputs}
         assert all(i in used or node.op == "input" for i, node in enumerate(program.nodes))

@@ -6,22 +6,35 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from wamnet.compiler.core import ir
-from wamnet.compiler.core.loops import LISTS
-from wamnet.compiler.scenes.emit_path import GROUPS, PAST, planes
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES
+from wamnet.compiler.kernel.interface import SCENE_NUMBERS
+from wamnet.compiler.kernel.run import run_on
+from wamnet.compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, PAST, path_kernel, planes
+from wamnet.compiler.scenes.encode_kernel import encoding_of
+from wamnet.compiler.scenes.lower_encode import SAMPLES
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.kernels.devices.kernel import Part
+from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network.dataset import Normalization
 
 TRACED = [target.name for target in {**DENOISERS, **EXPORTED}.values() if target.paths]
 """Targets that have path kernels."""
 
+
+ENCODING = encoding_of(("color",), Normalization(exposure_stops=-1.0))
+"""Encoded colour."""
 
 ALL_GROUPS = tuple(group for group in GROUPS if group not in PAST)
 """Groups of planes that any programs have."""
@@ -81,7 +94,44 @@ def test_rays_of_features_in_every_language(target):
     text = compile_path(plain, target, groups=("color", "normal"))
     assert "camera rays" not in text.source
     assert "feature_rays" not in text.manifest
-    assert compile_path(replace(own, ray=None, rays=None), target, groups=("color", "normal")) == text
+    without = replace(own, parts={name: own.parts[name] for name in plain.parts}, rays=None)
+    assert compile_path(without, target, groups=("color", "normal")) == text
+
+
+RUN = {"width": 13, "height": 9, "first_row": 2, "rows": 6, "first_sample": 5, "samples": 2, "seed_number": 7}
+"""The integers of a launch: rows that are no multiple of any number of lanes."""
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 16])
+@pytest.mark.parametrize(
+    ("name", "forms"),
+    [("minicubes", TREES), ("glossy", LISTS), ("daylight", STATEMENTS), ("furnace", STATEMENTS)],
+)
+def test_a_kernel_runs_in_numpy_with_the_interpreter_s_bits(name, forms, lanes):
+    """PTK-5: trees, loops, features past mirrors, features' own rays; lanes beyond the end of a row."""
+    rays = FeatureRays(4, "net") if name == "furnace" else None
+    scene = scenes.canonical(name)
+    programs = lower_scene(scene, Settings(max_depth=3), forms, seen=name == "glossy", rays=rays)
+    groups = (*FRAME_GROUPS, "alive", *(PAST if name == "glossy" else ()))
+    made = compile_path(programs, "numpy", groups=groups)
+    expected = NumpyExecutor().trace(made, Part(*RUN.values()))
+    found = run_on(path_kernel(made.programs, lanes, groups), {}, RUN)
+    assert np.array_equal(found["sums"], expected)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_scene_parameters_and_images_of_a_kernel_in_numpy(lanes):
+    """PTK-16, PTK-18: inputs are those of another frame; sums become an encoded image, at their pixels."""
+    shots = [scenes.canonical("cornell", time=time) for time in (0.0, 2.0)]
+    settings, given = Settings(max_depth=1), {**RUN, "first_row": 0, "rows": 9}
+    moving = varying(shots, settings)
+    kernel = path_kernel(lower_scene(shots[0], settings, moving=moving), lanes, ("color",), ENCODING)
+    found = run_on(kernel, {SCENE_NUMBERS: moving.values(shots[1])}, given)["image_color"]
+    own = compile_path(lower_scene(shots[1], settings), "numpy", "native", groups=("color",))
+    sums = dict(zip(own.planes, NumpyExecutor().trace(own, Part(*given.values())), strict=True))
+    encoded = interpret(ENCODING.program, {**sums, SAMPLES: np.full((9, 13), 2, np.float32)})
+    expected = np.stack([encoded[f"color_{channel}"] for channel in range(3)], axis=-1)
+    assert np.array_equal(found, expected)
 
 
 def test_golden_manifest(golden):

@@ -460,8 +460,8 @@ def test_correct_arithmetic_leaves_one_number_or_two_neighbours(name):
     inputs |= {"width": np.full(x.shape, 24, np.float32), "height": np.full(x.shape, 24, np.float32)}
     points = []
     for part in ("start", "arrive", "scatter"):
-        found = evaluate(programs.parts()[part], inputs, CORRECT)
-        computed = interpret(programs.parts()[part], inputs)
+        found = evaluate(programs.parts[part], inputs, CORRECT)
+        computed = interpret(programs.parts[part], inputs)
         for key, value in computed.items():
             assert np.all(found[key].holds(value) | ~found[key].known), key
             points.append(np.mean(found[key].point))
@@ -474,7 +474,9 @@ def test_loops_have_the_ranges_of_their_trips_one_after_another():
     """A scene of spheres with all statements, and with a table and a loop: the same ends, to the bit."""
     spheres = tuple(Sphere((0.3 * i - 1.0, 0.1 * i, -0.2 * i), 0.2, (0.5, 0.6, 0.7)) for i in range(6))
     scene = replace(scenes.canonical("lone_light"), spheres=spheres)
-    unrolled, looped = (lower_scene(scene, Settings(), forms).arrive for forms in (STATEMENTS, LISTS))
+    unrolled, looped = (
+        lower_scene(scene, Settings(), forms).parts["arrive"] for forms in (STATEMENTS, LISTS)
+    )
     assert {node.op for node in looped.nodes} > {*ops.LOOPS} - {"branch"}
     random = np.random.default_rng(4)
     directions = random.normal(size=(3, 500))

@@ -33,9 +33,8 @@ def bind(programs, values):
             return None
         return builder.add(Node("constant", (), node.type, attributes(value=float(values[node["name"]]))))
 
-    return replace(
-        programs, inputs=(), **{name: rewrite(part, rule) for name, part in programs.parts().items()}
-    )
+    parts = {name: rewrite(part, rule) for name, part in programs.parts.items()}
+    return replace(programs, inputs=(), parts=parts)
 
 
 def at(name, time):
@@ -199,7 +198,7 @@ def test_nothing_that_moves_is_nothing_that_is_given():
     assert varying([scene, scene], SETTINGS).places == ()
     plain = lower_scene(scene, SETTINGS)
     assert lower_scene(scene, SETTINGS, moving=SceneInputs(SETTINGS, ())) == plain
-    assert bind(plain, {}).parts() == plain.parts()
+    assert bind(plain, {}).parts == plain.parts
 
 
 def test_opening_leaves_the_constants_alone():

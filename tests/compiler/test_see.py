@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.passes import pipeline
+from wamnet.compiler.core.profiles import profile_named
 from wamnet.compiler.scenes.lower_encode import sees
-from wamnet.compiler.scenes.lower_scene import SEEN, lower_scene, names
+from wamnet.compiler.scenes.lower_scene import SEEN, FeatureRays, lower_scene, names
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels.devices.kernel import Part
@@ -46,7 +48,7 @@ def test_the_program_has_the_reference_s_bits(name):
             given |= {f"beta_{c}": path.beta[:, i] for i, c in enumerate("rgb")}
             given |= {"t": hit.t, "surface": hit.surface, "alive": alive, "depth": rng.counter(depth)}
             given |= {"way_going": way.going, "way_length": way.length}
-            found = interpret(programs.see, given)
+            found = interpret(programs.parts["see"], given)
             going = way._replace(going=way.going & alive)
             way, layers = following.see(world, going, path, surface, hit, rng.counter(depth), most)
             for layer, values in layers.items():
@@ -60,6 +62,19 @@ def test_the_program_has_the_reference_s_bits(name):
             path, further = transport.scatter(world, path, surface, hit, rng.counter(depth), counters)
             alive = alive & further
     assert ends == len(x)
+
+
+@pytest.mark.parametrize("profile", ["ieee", "native"])
+def test_all_programs_go_through_the_passes_of_the_profile(profile):
+    """PTK-3: `see` and `ray` too."""
+    rays = FeatureRays(4, "net")
+    programs = lower_scene(scenes.canonical("glossy"), SETTINGS, seen=True, rays=rays)
+    made = compile_path(programs, "numpy", profile, groups=("color", *SEEN)).programs
+    passes = profile_named(profile).passes
+    expected = {name: pipeline.run(part, passes) for name, part in programs.parts.items()}
+    assert list(made.parts) == ["start", "arrive", "look", "scatter", "see", "ray"]
+    assert made.parts == expected
+    assert (made.parts["see"] == programs.parts["see"]) == (profile == "native")
 
 
 @pytest.mark.nightly(but="c-1")

@@ -26,8 +26,7 @@
 #else
 #define PRECISE
 #endif
-#define MAX_DEPTH 3u /* scatterings of a path */
-
+#define MAX_DEPTH 3 /* scatterings of a path */
 layout(location = 0) out vec4 sums_0;
 layout(location = 1) out vec4 sums_1;
 layout(location = 2) out vec4 sums_2;
@@ -43,8 +42,10 @@ uniform uint seed_number;
 
 void main()
 {
-    uint x = uint(gl_FragCoord.x) + 0u;
-    uint y = uint(int(gl_FragCoord.y) + first_row);
+    int column = int(gl_FragCoord.x);
+    int row = int(gl_FragCoord.y);
+    uint x = uint(column);
+    uint y = uint(row + first_row);
     uint seed = seed_number;
     float image_width = float(width);
     float image_height = float(height);
@@ -189,8 +190,8 @@ void main()
             pdf = 1.00000002e+30f;
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint depth = bounce;
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint depth = uint(bounce);
 
             /* arrive: the next surface */
             {
@@ -299,7 +300,7 @@ void main()
                 t = t63;
                 surface = t82;
             }
-            if (bounce == 0u) {
+            if (bounce == 0) {
 
                 /* look: the features of the first surface */
                 {
@@ -544,7 +545,6 @@ void main()
         sum_color_g += radiance_g;
         sum_color_b += radiance_b;
     }
-
     sums_0[0] = sum_color_r;
     sums_0[1] = sum_color_g;
     sums_0[2] = sum_color_b;

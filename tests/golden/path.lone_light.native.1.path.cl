@@ -19,8 +19,7 @@
  *           Work item (i, j) follows the pixels from 1 * i of row first_row + j on
  */
 #define LANES 1
-#define MAX_DEPTH 3u /* scatterings of a path */
-
+#define MAX_DEPTH 3 /* scatterings of a path */
 __kernel void wamnet_trace(
     __global float *restrict sums,
     int width,
@@ -35,8 +34,8 @@ __kernel void wamnet_trace(
     size_t row = get_global_id(1);
     size_t plane = get_global_size(1) * stride;
     size_t at = row * stride + column;
-    uint x = (uint)column + 0u;
-    uint y = (uint)((int)row + first_row);
+    uint x = (uint)column;
+    uint y = (uint)(row + first_row);
     uint seed = seed_number;
     float image_width = (float)width;
     float image_height = (float)height;
@@ -95,8 +94,8 @@ __kernel void wamnet_trace(
         {
             uint t7 = 65536u * y;
             uint t8 = x + t7;
-            float t9 = convert_float(x);
-            float t10 = convert_float(y);
+            float t9 = (float)x;
+            float t10 = (float)y;
             uint t12 = t8 * 1664525u;
             uint t14 = t12 + 1013904223u;
             uint t15 = sample_number * 1664525u;
@@ -124,10 +123,10 @@ __kernel void wamnet_trace(
             uint t38 = t33 * t37;
             uint t39 = t31 + t38;
             uint t41 = t37 >> 8u;
-            float t42 = convert_float(t41);
+            float t42 = (float)t41;
             float t44 = t42 * 5.96046448e-08f;
             uint t45 = t39 >> 8u;
-            float t46 = convert_float(t45);
+            float t46 = (float)t45;
             float t47 = t46 * 5.96046448e-08f;
             float t48 = t9 + t44;
             float t50 = 2.0f * t48;
@@ -180,8 +179,8 @@ __kernel void wamnet_trace(
             pdf = 1.00000002e+30f;
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint depth = bounce;
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint depth = (uint)bounce;
 
             /* arrive: the next surface */
             {
@@ -359,7 +358,7 @@ __kernel void wamnet_trace(
                 t = t120;
                 surface = t119;
             }
-            if (bounce == 0u) {
+            if (bounce == 0) {
 
                 /* look: the features of the first surface */
                 {
@@ -461,10 +460,10 @@ __kernel void wamnet_trace(
                 uint t65 = t62 * t64;
                 uint t66 = t58 + t65;
                 uint t69 = t64 >> 8u;
-                float t70 = convert_float(t69);
+                float t70 = (float)t69;
                 float t71 = t70 * 5.96046448e-08f;
                 uint t72 = t66 >> 8u;
-                float t73 = convert_float(t72);
+                float t73 = (float)t72;
                 float t74 = t73 * 5.96046448e-08f;
                 float t76 = t29 ? t : 0.0f;
                 float t77 = fabs(point_x);
@@ -676,10 +675,10 @@ __kernel void wamnet_trace(
                 uint t299 = t294 * t298;
                 uint t300 = t292 + t299;
                 uint t301 = t298 >> 8u;
-                float t302 = convert_float(t301);
+                float t302 = (float)t301;
                 float t303 = t302 * 5.96046448e-08f;
                 uint t304 = t300 >> 8u;
-                float t305 = convert_float(t304);
+                float t305 = (float)t304;
                 float t306 = t305 * 5.96046448e-08f;
                 float t307 = 2.0f * t303;
                 float t308 = t307 - 1.0f;
@@ -777,7 +776,6 @@ __kernel void wamnet_trace(
         sum_color_g += radiance_g;
         sum_color_b += radiance_b;
     }
-
     sums[0 * plane + at] = sum_color_r;
     sums[1 * plane + at] = sum_color_g;
     sums[2 * plane + at] = sum_color_b;

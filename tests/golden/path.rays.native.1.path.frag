@@ -25,8 +25,7 @@
 #else
 #define PRECISE
 #endif
-#define MAX_DEPTH 1u /* scatterings of a path */
-
+#define MAX_DEPTH 1 /* scatterings of a path */
 layout(location = 0) out vec4 sums_0;
 layout(location = 1) out vec4 sums_1;
 uniform int width;
@@ -38,8 +37,10 @@ uniform uint seed_number;
 
 void main()
 {
-    uint x = uint(gl_FragCoord.x) + 0u;
-    uint y = uint(int(gl_FragCoord.y) + first_row);
+    int column = int(gl_FragCoord.x);
+    int row = int(gl_FragCoord.y);
+    uint x = uint(column);
+    uint y = uint(row + first_row);
     uint seed = seed_number;
     float image_width = float(width);
     float image_height = float(height);
@@ -168,8 +169,8 @@ void main()
             pdf = 1.00000002e+30f;
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint depth = bounce;
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint depth = uint(bounce);
 
             /* arrive: the next surface */
             {
@@ -278,7 +279,7 @@ void main()
                 t = t63;
                 surface = t82;
             }
-            if (bounce == 0u && n == 0) {
+            if (bounce == 0 && n == 0) {
 
                 /* look: the features of the first surface */
                 {
@@ -440,8 +441,8 @@ void main()
     }
 
     /* the features of further camera rays */
-    for (int n = 0; n < 3; ++n) {
-        uint sample_number = first_sample + uint(n) + 1u;
+    for (int n = 1; n < 4; ++n) {
+        uint sample_number = first_sample + uint(n);
         float origin_x;
         float origin_y;
         float origin_z;
@@ -778,7 +779,6 @@ void main()
             sum_normal_z += normal_z;
         }
     }
-
     sums_0[0] = sum_color_r;
     sums_0[1] = sum_color_g;
     sums_0[2] = sum_color_b;

@@ -18,7 +18,7 @@
  *           Work item (i, j) follows the pixels from 16 * i of row first_row + j on
  */
 #define LANES 16
-#define MAX_DEPTH 1u /* scatterings of a path */
+#define MAX_DEPTH 1 /* scatterings of a path */
 #ifdef __has_builtin
 #if __has_builtin(__builtin_elementwise_floor)
 #define FLOOR(a) __builtin_elementwise_floor(a)
@@ -33,6 +33,19 @@
 #ifndef CONVERT
 #define CONVERT(a, kind) convert_##kind(a)
 #endif
+/* Whether any component is true. The library's any() is a call, which saves all registers. */
+int any_lane(int16 mask)
+{
+#if defined(__AVX512DQ__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_cvtd2mask512)
+    return (ushort)__builtin_ia32_cvtd2mask512(mask);
+#endif
+#endif
+    int8 of_8 = mask.lo | mask.hi;
+    int4 of_4 = of_8.lo | of_8.hi;
+    int2 of_2 = of_4.lo | of_4.hi;
+    return of_2.lo | of_2.hi;
+}
 __kernel void wamnet_trace(
     __global float *restrict sums,
     int width,
@@ -47,8 +60,8 @@ __kernel void wamnet_trace(
     size_t row = get_global_id(1);
     size_t plane = get_global_size(1) * stride;
     size_t at = row * stride + column;
-    uint16 x = (uint16)((uint)column) + (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    uint16 y = (uint16)((uint)((int)row + first_row));
+    uint16 x = (uint)column + (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    uint16 y = (uint16)((uint)(row + first_row));
     uint16 seed = (uint16)(seed_number);
     float16 image_width = (float16)((float)width);
     float16 image_height = (float16)((float)height);
@@ -89,61 +102,61 @@ __kernel void wamnet_trace(
 
         /* start: the path at the camera */
         {
-            uint16 t7 = (uint16)(65536u) * y;
+            uint16 t7 = 65536u * y;
             uint16 t8 = x + t7;
             float16 t9 = CONVERT(x, float16);
             float16 t10 = CONVERT(y, float16);
-            uint16 t12 = t8 * (uint16)(1664525u);
-            uint16 t14 = t12 + (uint16)(1013904223u);
-            uint16 t15 = sample_number * (uint16)(1664525u);
-            uint16 t16 = t15 + (uint16)(1013904223u);
-            uint16 t17 = seed * (uint16)(1664525u);
-            uint16 t18 = t17 + (uint16)(1013904223u);
+            uint16 t12 = t8 * 1664525u;
+            uint16 t14 = t12 + 1013904223u;
+            uint16 t15 = sample_number * 1664525u;
+            uint16 t16 = t15 + 1013904223u;
+            uint16 t17 = seed * 1664525u;
+            uint16 t18 = t17 + 1013904223u;
             uint16 t19 = t16 * t18;
             uint16 t20 = t14 + t19;
-            uint16 t21 = (uint16)(1013904223u) * t20;
+            uint16 t21 = 1013904223u * t20;
             uint16 t22 = t16 + t21;
             uint16 t23 = t20 * t22;
-            uint16 t24 = (uint16)(1013904223u) + t23;
+            uint16 t24 = 1013904223u + t23;
             uint16 t25 = t22 * t24;
             uint16 t26 = t18 + t25;
-            uint16 t28 = t20 >> (uint16)(16u);
+            uint16 t28 = t20 >> 16u;
             uint16 t29 = t20 ^ t28;
-            uint16 t30 = t22 >> (uint16)(16u);
+            uint16 t30 = t22 >> 16u;
             uint16 t31 = t22 ^ t30;
-            uint16 t32 = t24 >> (uint16)(16u);
+            uint16 t32 = t24 >> 16u;
             uint16 t33 = t24 ^ t32;
-            uint16 t34 = t26 >> (uint16)(16u);
+            uint16 t34 = t26 >> 16u;
             uint16 t35 = t26 ^ t34;
             uint16 t36 = t31 * t35;
             uint16 t37 = t29 + t36;
             uint16 t38 = t33 * t37;
             uint16 t39 = t31 + t38;
-            uint16 t41 = t37 >> (uint16)(8u);
+            uint16 t41 = t37 >> 8u;
             float16 t42 = CONVERT(t41, float16);
-            float16 t44 = t42 * (float16)(5.96046448e-08f);
-            uint16 t45 = t39 >> (uint16)(8u);
+            float16 t44 = t42 * 5.96046448e-08f;
+            uint16 t45 = t39 >> 8u;
             float16 t46 = CONVERT(t45, float16);
-            float16 t47 = t46 * (float16)(5.96046448e-08f);
+            float16 t47 = t46 * 5.96046448e-08f;
             float16 t48 = t9 + t44;
-            float16 t50 = (float16)(2.0f) * t48;
+            float16 t50 = 2.0f * t48;
             float16 t51 = t50 - image_width;
             float16 t52 = t51 / image_height;
-            float16 t54 = t52 * (float16)(0.577350259f);
+            float16 t54 = t52 * 0.577350259f;
             float16 t55 = t10 + t47;
-            float16 t56 = (float16)(2.0f) * t55;
+            float16 t56 = 2.0f * t55;
             float16 t57 = image_height - t56;
             float16 t58 = t57 / image_height;
-            float16 t59 = t58 * (float16)(0.577350259f);
-            float16 t63 = t54 * (float16)(0.998274386f);
-            float16 t64 = t54 * (float16)(0.0f);
-            float16 t65 = t54 * (float16)(-0.0587220229f);
-            float16 t69 = (float16)(-0.0583211854f) + t63;
-            float16 t70 = (float16)(-0.116642371f) + t64;
-            float16 t71 = (float16)(-0.991460145f) + t65;
-            float16 t75 = t59 * (float16)(-0.00684947567f);
-            float16 t76 = t59 * (float16)(0.993173957f);
-            float16 t77 = t59 * (float16)(-0.116441086f);
+            float16 t59 = t58 * 0.577350259f;
+            float16 t63 = t54 * 0.998274386f;
+            float16 t64 = t54 * 0.0f;
+            float16 t65 = t54 * (-0.0587220229f);
+            float16 t69 = (-0.0583211854f) + t63;
+            float16 t70 = (-0.116642371f) + t64;
+            float16 t71 = (-0.991460145f) + t65;
+            float16 t75 = t59 * (-0.00684947567f);
+            float16 t76 = t59 * 0.993173957f;
+            float16 t77 = t59 * (-0.116441086f);
             float16 t78 = t69 + t75;
             float16 t79 = t70 + t76;
             float16 t80 = t71 + t77;
@@ -156,12 +169,12 @@ __kernel void wamnet_trace(
             float16 t87 = t78 / t86;
             float16 t88 = t79 / t86;
             float16 t89 = t80 / t86;
-            float16 t90 = (float16)(0.0f) * t87;
-            float16 t91 = (float16)(0.0f) * t88;
-            float16 t92 = (float16)(0.0f) * t89;
-            float16 t96 = (float16)(0.100000001f) + t90;
-            float16 t97 = (float16)(0.200000003f) + t91;
-            float16 t98 = (float16)(0.699999988f) + t92;
+            float16 t90 = 0.0f * t87;
+            float16 t91 = 0.0f * t88;
+            float16 t92 = 0.0f * t89;
+            float16 t96 = 0.100000001f + t90;
+            float16 t97 = 0.200000003f + t91;
+            float16 t98 = 0.699999988f + t92;
             origin_x = t96;
             origin_y = t97;
             origin_z = t98;
@@ -177,20 +190,20 @@ __kernel void wamnet_trace(
             pdf = (float16)(1.00000002e+30f);
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint16 depth = (uint16)(bounce);
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint16 depth = (uint16)((uint)bounce);
 
             /* arrive: the next surface */
             {
                 float16 t16 = as_float16(as_int16(direction_x) & 0x7fffffff);
                 float16 t17 = as_float16(as_int16(direction_y) & 0x7fffffff);
                 float16 t18 = as_float16(as_int16(direction_z) & 0x7fffffff);
-                int16 t19 = t16 < (float16)(1e-15f);
-                int16 t20 = t17 < (float16)(1e-15f);
-                int16 t21 = t18 < (float16)(1e-15f);
-                int16 t23 = direction_x < (float16)(0.0f);
-                int16 t24 = direction_y < (float16)(0.0f);
-                int16 t25 = direction_z < (float16)(0.0f);
+                int16 t19 = t16 < 1e-15f;
+                int16 t20 = t17 < 1e-15f;
+                int16 t21 = t18 < 1e-15f;
+                int16 t23 = direction_x < 0.0f;
+                int16 t24 = direction_y < 0.0f;
+                int16 t25 = direction_z < 0.0f;
                 float16 t27 = t23 ? (float16)(-1e-15f) : (float16)(1e-15f);
                 float16 t28 = t24 ? (float16)(-1e-15f) : (float16)(1e-15f);
                 float16 t29 = t25 ? (float16)(-1e-15f) : (float16)(1e-15f);
@@ -200,9 +213,9 @@ __kernel void wamnet_trace(
                 float16 t33 = 1.0f / t30;
                 float16 t34 = 1.0f / t31;
                 float16 t35 = 1.0f / t32;
-                float16 t36 = (float16)(0.0f) - origin_x;
-                float16 t37 = (float16)(0.0f) - origin_y;
-                float16 t38 = (float16)(0.0f) - origin_z;
+                float16 t36 = 0.0f - origin_x;
+                float16 t37 = 0.0f - origin_y;
+                float16 t38 = 0.0f - origin_z;
                 float16 t39 = t36 * t33;
                 float16 t40 = t37 * t34;
                 float16 t41 = t38 * t35;
@@ -220,18 +233,18 @@ __kernel void wamnet_trace(
                 float16 t54 = t50 < t49 ? t50 : t49;
                 float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
-                int16 t57 = t55 > (float16)(0.0f);
+                int16 t57 = t55 > 0.0f;
                 int16 t58 = t56 && t57;
                 float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
-                int16 t60 = t59 < (float16)(1.00000002e+30f);
+                int16 t60 = t59 < 1.00000002e+30f;
                 int16 t62 = t60 ? (int16)(0) : (int16)(6);
                 float16 t63 = t59 < (float16)(1.00000002e+30f) ? t59 : (float16)(1.00000002e+30f);
-                int16 t64 = t62 == (int16)(0);
-                int16 t65 = direction_x > (float16)(0.0f);
+                int16 t64 = t62 == 0;
+                int16 t65 = direction_x > 0.0f;
                 int16 t67 = t65 ? (int16)(1) : (int16)(0);
-                int16 t68 = direction_y > (float16)(0.0f);
+                int16 t68 = direction_y > 0.0f;
                 int16 t71 = t68 ? (int16)(3) : (int16)(2);
-                int16 t72 = direction_z > (float16)(0.0f);
+                int16 t72 = direction_z > 0.0f;
                 int16 t75 = t72 ? (int16)(5) : (int16)(4);
                 int16 t76 = t49 <= t50;
                 int16 t77 = t49 <= t51;
@@ -240,7 +253,7 @@ __kernel void wamnet_trace(
                 int16 t80 = t79 ? t71 : t75;
                 int16 t81 = t78 ? t67 : t80;
                 int16 t82 = t64 ? t81 : t62;
-                int16 t83 = t82 < (int16)(6);
+                int16 t83 = t82 < 6;
                 float16 t84 = t83 ? t63 : (float16)(0.0f);
                 float16 t85 = direction_x * t84;
                 float16 t86 = direction_y * t84;
@@ -287,11 +300,11 @@ __kernel void wamnet_trace(
                 t = t63;
                 surface = t82;
             }
-            if (bounce == 0u && n == 0) {
+            if (bounce == 0 && n == 0) {
 
                 /* look: the features of the first surface */
                 {
-                    int16 t15 = surface < (int16)(6);
+                    int16 t15 = surface < 6;
                     float16 t17 = t15 ? t : (float16)(0.0f);
                     float16 t18 = t15 ? point_x : (float16)(0.0f);
                     float16 t19 = t15 ? point_y : (float16)(0.0f);
@@ -307,18 +320,18 @@ __kernel void wamnet_trace(
 
             /* scatter: the path goes on */
             {
-                int16 t29 = surface < (int16)(6);
-                uint16 t31 = (uint16)(2u) * depth;
-                uint16 t33 = (uint16)(1u) + t31;
-                uint16 t35 = pixel * (uint16)(1664525u);
-                uint16 t37 = t35 + (uint16)(1013904223u);
-                uint16 t38 = sample_number * (uint16)(1664525u);
-                uint16 t39 = t38 + (uint16)(1013904223u);
-                uint16 t40 = seed * (uint16)(1664525u);
-                uint16 t41 = t40 + (uint16)(1013904223u);
+                int16 t29 = surface < 6;
+                uint16 t31 = 2u * depth;
+                uint16 t33 = 1u + t31;
+                uint16 t35 = pixel * 1664525u;
+                uint16 t37 = t35 + 1013904223u;
+                uint16 t38 = sample_number * 1664525u;
+                uint16 t39 = t38 + 1013904223u;
+                uint16 t40 = seed * 1664525u;
+                uint16 t41 = t40 + 1013904223u;
                 uint16 t42 = t39 * t41;
                 uint16 t43 = t37 + t42;
-                uint16 t45 = t43 >> (uint16)(16u);
+                uint16 t45 = t43 >> 16u;
                 uint16 t46 = t43 ^ t45;
                 float16 t50 = t29 ? t : (float16)(0.0f);
                 float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
@@ -327,7 +340,7 @@ __kernel void wamnet_trace(
                 float16 t54 = t52 > t51 ? t52 : t51;
                 float16 t55 = t53 > t54 ? t53 : t54;
                 float16 t56 = t55 + t50;
-                float16 t58 = (float16)(3.81469727e-06f) * t56;
+                float16 t58 = 3.81469727e-06f * t56;
                 float16 t59 = normal_x * t58;
                 float16 t60 = normal_y * t58;
                 float16 t61 = normal_z * t58;
@@ -337,66 +350,66 @@ __kernel void wamnet_trace(
                 float16 t65 = beta_r * reflectance_r;
                 float16 t66 = beta_g * reflectance_g;
                 float16 t67 = beta_b * reflectance_b;
-                uint16 t68 = t33 + (uint16)(1u);
-                uint16 t69 = t68 * (uint16)(1664525u);
-                uint16 t70 = t69 + (uint16)(1013904223u);
+                uint16 t68 = t33 + 1u;
+                uint16 t69 = t68 * 1664525u;
+                uint16 t70 = t69 + 1013904223u;
                 uint16 t71 = t70 * t43;
                 uint16 t72 = t39 + t71;
                 uint16 t73 = t43 * t72;
                 uint16 t74 = t70 + t73;
                 uint16 t75 = t72 * t74;
                 uint16 t76 = t41 + t75;
-                uint16 t77 = t72 >> (uint16)(16u);
+                uint16 t77 = t72 >> 16u;
                 uint16 t78 = t72 ^ t77;
-                uint16 t79 = t74 >> (uint16)(16u);
+                uint16 t79 = t74 >> 16u;
                 uint16 t80 = t74 ^ t79;
-                uint16 t81 = t76 >> (uint16)(16u);
+                uint16 t81 = t76 >> 16u;
                 uint16 t82 = t76 ^ t81;
                 uint16 t83 = t78 * t82;
                 uint16 t84 = t46 + t83;
                 uint16 t85 = t80 * t84;
                 uint16 t86 = t78 + t85;
-                uint16 t87 = t84 >> (uint16)(8u);
+                uint16 t87 = t84 >> 8u;
                 float16 t88 = CONVERT(t87, float16);
-                float16 t89 = t88 * (float16)(5.96046448e-08f);
-                uint16 t90 = t86 >> (uint16)(8u);
+                float16 t89 = t88 * 5.96046448e-08f;
+                uint16 t90 = t86 >> 8u;
                 float16 t91 = CONVERT(t90, float16);
-                float16 t92 = t91 * (float16)(5.96046448e-08f);
-                float16 t94 = (float16)(2.0f) * t89;
-                float16 t96 = t94 - (float16)(1.0f);
-                float16 t97 = (float16)(2.0f) * t92;
-                float16 t98 = t97 - (float16)(1.0f);
+                float16 t92 = t91 * 5.96046448e-08f;
+                float16 t94 = 2.0f * t89;
+                float16 t96 = t94 - 1.0f;
+                float16 t97 = 2.0f * t92;
+                float16 t98 = t97 - 1.0f;
                 float16 t99 = as_float16(as_int16(t96) & 0x7fffffff);
                 float16 t100 = as_float16(as_int16(t98) & 0x7fffffff);
                 int16 t101 = t99 > t100;
                 float16 t102 = t101 ? t96 : t98;
                 float16 t103 = t101 ? t98 : t96;
-                int16 t104 = t102 == (float16)(0.0f);
+                int16 t104 = t102 == 0.0f;
                 float16 t106 = t104 ? (float16)(1e-30f) : t102;
                 float16 t107 = t103 / t106;
-                float16 t109 = (float16)(0.785398185f) * t107;
-                float16 t111 = (float16)(1.57079637f) - t109;
+                float16 t109 = 0.785398185f * t107;
+                float16 t111 = 1.57079637f - t109;
                 float16 t112 = t101 ? t109 : t111;
                 float16 t113 = cos(t112);
                 float16 t114 = t102 * t113;
                 float16 t115 = sin(t112);
                 float16 t116 = t102 * t115;
                 float16 t117 = t114 * t114;
-                float16 t118 = (float16)(1.0f) - t117;
+                float16 t118 = 1.0f - t117;
                 float16 t119 = t116 * t116;
                 float16 t120 = t118 - t119;
                 float16 t121 = t120 > (float16)(0.0f) ? t120 : (float16)(0.0f);
                 float16 t122 = sqrt(t121);
-                int16 t123 = normal_z < (float16)(0.0f);
+                int16 t123 = normal_z < 0.0f;
                 float16 t125 = t123 ? (float16)(-1.0f) : (float16)(1.0f);
                 float16 t126 = t125 + normal_z;
-                float16 t127 = (float16)(-1.0f) / t126;
+                float16 t127 = (-1.0f) / t126;
                 float16 t128 = normal_x * normal_y;
                 float16 t129 = t128 * t127;
                 float16 t130 = t125 * normal_x;
                 float16 t131 = t130 * normal_x;
                 float16 t132 = t131 * t127;
-                float16 t133 = (float16)(1.0f) + t132;
+                float16 t133 = 1.0f + t132;
                 float16 t134 = t125 * t129;
                 float16 t135 = -t125;
                 float16 t136 = t135 * normal_x;
@@ -420,10 +433,10 @@ __kernel void wamnet_trace(
                 float16 t154 = t148 + t151;
                 float16 t155 = t149 + t152;
                 float16 t156 = (float16)(0.0f) > t122 ? (float16)(0.0f) : t122;
-                float16 t158 = t156 * (float16)(0.318309873f);
+                float16 t158 = t156 * 0.318309873f;
                 float16 t159 = t66 > t65 ? t66 : t65;
                 float16 t160 = t67 > t159 ? t67 : t159;
-                int16 t161 = t160 > (float16)(0.0f);
+                int16 t161 = t160 > 0.0f;
                 int16 t162 = t29 && t161;
                 origin_x = t62;
                 origin_y = t63;
@@ -437,7 +450,7 @@ __kernel void wamnet_trace(
                 pdf = t158;
                 alive = alive && t162;
             }
-            if (!any(alive)) {
+            if (!any_lane(alive)) {
                 break;
             }
         }
@@ -449,8 +462,8 @@ __kernel void wamnet_trace(
     }
 
     /* the features of further camera rays */
-    for (int n = 0; n < 3; ++n) {
-        uint16 sample_number = (uint16)(first_sample + (uint)n) + (uint16)(1u);
+    for (int n = 1; n < 4; ++n) {
+        uint16 sample_number = (uint16)(first_sample + (uint)n);
         float16 origin_x;
         float16 origin_y;
         float16 origin_z;
@@ -478,29 +491,29 @@ __kernel void wamnet_trace(
 
         /* ray: the ray at the camera */
         {
-            uint16 t7 = (uint16)(65536u) * y;
+            uint16 t7 = 65536u * y;
             uint16 t8 = x + t7;
             float16 t9 = CONVERT(x, float16);
             float16 t10 = CONVERT(y, float16);
-            uint16 t12 = t8 * (uint16)(1664525u);
-            uint16 t14 = t12 + (uint16)(1013904223u);
-            uint16 t15 = seed * (uint16)(1664525u);
-            uint16 t16 = t15 + (uint16)(1013904223u);
-            uint16 t17 = (uint16)(1013904223u) * t16;
+            uint16 t12 = t8 * 1664525u;
+            uint16 t14 = t12 + 1013904223u;
+            uint16 t15 = seed * 1664525u;
+            uint16 t16 = t15 + 1013904223u;
+            uint16 t17 = 1013904223u * t16;
             uint16 t18 = t14 + t17;
-            uint16 t19 = (uint16)(1013904223u) * t18;
-            uint16 t20 = (uint16)(1013904223u) + t19;
+            uint16 t19 = 1013904223u * t18;
+            uint16 t20 = 1013904223u + t19;
             uint16 t21 = t18 * t20;
-            uint16 t22 = (uint16)(1013904223u) + t21;
+            uint16 t22 = 1013904223u + t21;
             uint16 t23 = t20 * t22;
             uint16 t24 = t16 + t23;
-            uint16 t26 = t18 >> (uint16)(16u);
+            uint16 t26 = t18 >> 16u;
             uint16 t27 = t18 ^ t26;
-            uint16 t28 = t20 >> (uint16)(16u);
+            uint16 t28 = t20 >> 16u;
             uint16 t29 = t20 ^ t28;
-            uint16 t30 = t22 >> (uint16)(16u);
+            uint16 t30 = t22 >> 16u;
             uint16 t31 = t22 ^ t30;
-            uint16 t32 = t24 >> (uint16)(16u);
+            uint16 t32 = t24 >> 16u;
             uint16 t33 = t24 ^ t32;
             uint16 t34 = t29 * t33;
             uint16 t35 = t27 + t34;
@@ -510,130 +523,130 @@ __kernel void wamnet_trace(
             uint16 t39 = t31 + t38;
             uint16 t40 = t37 * t39;
             uint16 t41 = t33 + t40;
-            uint16 t42 = sample_number >> (uint16)(16u);
-            uint16 t44 = t42 & (uint16)(65535u);
+            uint16 t42 = sample_number >> 16u;
+            uint16 t44 = t42 & 65535u;
             uint16 t45 = sample_number ^ t44;
-            uint16 t47 = t45 >> (uint16)(8u);
-            uint16 t49 = t47 & (uint16)(16711935u);
+            uint16 t47 = t45 >> 8u;
+            uint16 t49 = t47 & 16711935u;
             uint16 t50 = t45 ^ t49;
-            uint16 t52 = t50 >> (uint16)(4u);
-            uint16 t54 = t52 & (uint16)(252645135u);
+            uint16 t52 = t50 >> 4u;
+            uint16 t54 = t52 & 252645135u;
             uint16 t55 = t50 ^ t54;
-            uint16 t57 = t55 >> (uint16)(2u);
-            uint16 t59 = t57 & (uint16)(858993459u);
+            uint16 t57 = t55 >> 2u;
+            uint16 t59 = t57 & 858993459u;
             uint16 t60 = t55 ^ t59;
-            uint16 t62 = t60 >> (uint16)(1u);
-            uint16 t64 = t62 & (uint16)(1431655765u);
+            uint16 t62 = t60 >> 1u;
+            uint16 t64 = t62 & 1431655765u;
             uint16 t65 = t60 ^ t64;
             uint16 t66 = sample_number + t39;
-            uint16 t68 = t66 * (uint16)(1817228412u);
+            uint16 t68 = t66 * 1817228412u;
             uint16 t69 = t66 ^ t68;
-            uint16 t71 = t69 * (uint16)(3090095698u);
+            uint16 t71 = t69 * 3090095698u;
             uint16 t72 = t69 ^ t71;
-            uint16 t74 = t72 * (uint16)(3350193720u);
+            uint16 t74 = t72 * 3350193720u;
             uint16 t75 = t72 ^ t74;
-            uint16 t77 = t75 * (uint16)(2367878886u);
+            uint16 t77 = t75 * 2367878886u;
             uint16 t78 = t75 ^ t77;
-            uint16 t79 = t39 * (uint16)(1817228412u);
+            uint16 t79 = t39 * 1817228412u;
             uint16 t80 = t39 ^ t79;
-            uint16 t81 = t80 * (uint16)(3090095698u);
+            uint16 t81 = t80 * 3090095698u;
             uint16 t82 = t80 ^ t81;
-            uint16 t83 = t82 * (uint16)(3350193720u);
+            uint16 t83 = t82 * 3350193720u;
             uint16 t84 = t82 ^ t83;
-            uint16 t85 = t84 * (uint16)(2367878886u);
+            uint16 t85 = t84 * 2367878886u;
             uint16 t86 = t84 ^ t85;
             uint16 t87 = t78 ^ t86;
-            uint16 t88 = t87 >> (uint16)(16u);
-            uint16 t89 = t87 * (uint16)(65536u);
+            uint16 t88 = t87 >> 16u;
+            uint16 t89 = t87 * 65536u;
             uint16 t90 = t88 + t89;
-            uint16 t91 = t90 & (uint16)(16711935u);
-            uint16 t92 = t90 >> (uint16)(8u);
-            uint16 t93 = t92 & (uint16)(16711935u);
-            uint16 t95 = t91 * (uint16)(256u);
+            uint16 t91 = t90 & 16711935u;
+            uint16 t92 = t90 >> 8u;
+            uint16 t93 = t92 & 16711935u;
+            uint16 t95 = t91 * 256u;
             uint16 t96 = t93 + t95;
-            uint16 t97 = t96 & (uint16)(252645135u);
-            uint16 t98 = t96 >> (uint16)(4u);
-            uint16 t99 = t98 & (uint16)(252645135u);
-            uint16 t100 = t97 * (uint16)(16u);
+            uint16 t97 = t96 & 252645135u;
+            uint16 t98 = t96 >> 4u;
+            uint16 t99 = t98 & 252645135u;
+            uint16 t100 = t97 * 16u;
             uint16 t101 = t99 + t100;
-            uint16 t102 = t101 & (uint16)(858993459u);
-            uint16 t103 = t101 >> (uint16)(2u);
-            uint16 t104 = t103 & (uint16)(858993459u);
-            uint16 t105 = t102 * (uint16)(4u);
+            uint16 t102 = t101 & 858993459u;
+            uint16 t103 = t101 >> 2u;
+            uint16 t104 = t103 & 858993459u;
+            uint16 t105 = t102 * 4u;
             uint16 t106 = t104 + t105;
-            uint16 t107 = t106 & (uint16)(1431655765u);
-            uint16 t108 = t106 >> (uint16)(1u);
-            uint16 t109 = t108 & (uint16)(1431655765u);
-            uint16 t110 = t107 * (uint16)(2u);
+            uint16 t107 = t106 & 1431655765u;
+            uint16 t108 = t106 >> 1u;
+            uint16 t109 = t108 & 1431655765u;
+            uint16 t110 = t107 * 2u;
             uint16 t111 = t109 + t110;
             uint16 t112 = t35 ^ t111;
             uint16 t113 = t65 + t41;
-            uint16 t114 = t113 * (uint16)(1817228412u);
+            uint16 t114 = t113 * 1817228412u;
             uint16 t115 = t113 ^ t114;
-            uint16 t116 = t115 * (uint16)(3090095698u);
+            uint16 t116 = t115 * 3090095698u;
             uint16 t117 = t115 ^ t116;
-            uint16 t118 = t117 * (uint16)(3350193720u);
+            uint16 t118 = t117 * 3350193720u;
             uint16 t119 = t117 ^ t118;
-            uint16 t120 = t119 * (uint16)(2367878886u);
+            uint16 t120 = t119 * 2367878886u;
             uint16 t121 = t119 ^ t120;
-            uint16 t122 = t41 * (uint16)(1817228412u);
+            uint16 t122 = t41 * 1817228412u;
             uint16 t123 = t41 ^ t122;
-            uint16 t124 = t123 * (uint16)(3090095698u);
+            uint16 t124 = t123 * 3090095698u;
             uint16 t125 = t123 ^ t124;
-            uint16 t126 = t125 * (uint16)(3350193720u);
+            uint16 t126 = t125 * 3350193720u;
             uint16 t127 = t125 ^ t126;
-            uint16 t128 = t127 * (uint16)(2367878886u);
+            uint16 t128 = t127 * 2367878886u;
             uint16 t129 = t127 ^ t128;
             uint16 t130 = t121 ^ t129;
-            uint16 t131 = t130 >> (uint16)(16u);
-            uint16 t132 = t130 * (uint16)(65536u);
+            uint16 t131 = t130 >> 16u;
+            uint16 t132 = t130 * 65536u;
             uint16 t133 = t131 + t132;
-            uint16 t134 = t133 & (uint16)(16711935u);
-            uint16 t135 = t133 >> (uint16)(8u);
-            uint16 t136 = t135 & (uint16)(16711935u);
-            uint16 t137 = t134 * (uint16)(256u);
+            uint16 t134 = t133 & 16711935u;
+            uint16 t135 = t133 >> 8u;
+            uint16 t136 = t135 & 16711935u;
+            uint16 t137 = t134 * 256u;
             uint16 t138 = t136 + t137;
-            uint16 t139 = t138 & (uint16)(252645135u);
-            uint16 t140 = t138 >> (uint16)(4u);
-            uint16 t141 = t140 & (uint16)(252645135u);
-            uint16 t142 = t139 * (uint16)(16u);
+            uint16 t139 = t138 & 252645135u;
+            uint16 t140 = t138 >> 4u;
+            uint16 t141 = t140 & 252645135u;
+            uint16 t142 = t139 * 16u;
             uint16 t143 = t141 + t142;
-            uint16 t144 = t143 & (uint16)(858993459u);
-            uint16 t145 = t143 >> (uint16)(2u);
-            uint16 t146 = t145 & (uint16)(858993459u);
-            uint16 t147 = t144 * (uint16)(4u);
+            uint16 t144 = t143 & 858993459u;
+            uint16 t145 = t143 >> 2u;
+            uint16 t146 = t145 & 858993459u;
+            uint16 t147 = t144 * 4u;
             uint16 t148 = t146 + t147;
-            uint16 t149 = t148 & (uint16)(1431655765u);
-            uint16 t150 = t148 >> (uint16)(1u);
-            uint16 t151 = t150 & (uint16)(1431655765u);
-            uint16 t152 = t149 * (uint16)(2u);
+            uint16 t149 = t148 & 1431655765u;
+            uint16 t150 = t148 >> 1u;
+            uint16 t151 = t150 & 1431655765u;
+            uint16 t152 = t149 * 2u;
             uint16 t153 = t151 + t152;
             uint16 t154 = t37 ^ t153;
-            uint16 t155 = t112 >> (uint16)(8u);
+            uint16 t155 = t112 >> 8u;
             float16 t156 = CONVERT(t155, float16);
-            float16 t158 = t156 * (float16)(5.96046448e-08f);
-            uint16 t159 = t154 >> (uint16)(8u);
+            float16 t158 = t156 * 5.96046448e-08f;
+            uint16 t159 = t154 >> 8u;
             float16 t160 = CONVERT(t159, float16);
-            float16 t161 = t160 * (float16)(5.96046448e-08f);
+            float16 t161 = t160 * 5.96046448e-08f;
             float16 t162 = t9 + t158;
-            float16 t164 = (float16)(2.0f) * t162;
+            float16 t164 = 2.0f * t162;
             float16 t165 = t164 - image_width;
             float16 t166 = t165 / image_height;
-            float16 t168 = t166 * (float16)(0.577350259f);
+            float16 t168 = t166 * 0.577350259f;
             float16 t169 = t10 + t161;
-            float16 t170 = (float16)(2.0f) * t169;
+            float16 t170 = 2.0f * t169;
             float16 t171 = image_height - t170;
             float16 t172 = t171 / image_height;
-            float16 t173 = t172 * (float16)(0.577350259f);
-            float16 t177 = t168 * (float16)(0.998274386f);
-            float16 t178 = t168 * (float16)(0.0f);
-            float16 t179 = t168 * (float16)(-0.0587220229f);
-            float16 t183 = (float16)(-0.0583211854f) + t177;
-            float16 t184 = (float16)(-0.116642371f) + t178;
-            float16 t185 = (float16)(-0.991460145f) + t179;
-            float16 t189 = t173 * (float16)(-0.00684947567f);
-            float16 t190 = t173 * (float16)(0.993173957f);
-            float16 t191 = t173 * (float16)(-0.116441086f);
+            float16 t173 = t172 * 0.577350259f;
+            float16 t177 = t168 * 0.998274386f;
+            float16 t178 = t168 * 0.0f;
+            float16 t179 = t168 * (-0.0587220229f);
+            float16 t183 = (-0.0583211854f) + t177;
+            float16 t184 = (-0.116642371f) + t178;
+            float16 t185 = (-0.991460145f) + t179;
+            float16 t189 = t173 * (-0.00684947567f);
+            float16 t190 = t173 * 0.993173957f;
+            float16 t191 = t173 * (-0.116441086f);
             float16 t192 = t183 + t189;
             float16 t193 = t184 + t190;
             float16 t194 = t185 + t191;
@@ -646,12 +659,12 @@ __kernel void wamnet_trace(
             float16 t201 = t192 / t200;
             float16 t202 = t193 / t200;
             float16 t203 = t194 / t200;
-            float16 t204 = (float16)(0.0f) * t201;
-            float16 t205 = (float16)(0.0f) * t202;
-            float16 t206 = (float16)(0.0f) * t203;
-            float16 t210 = (float16)(0.100000001f) + t204;
-            float16 t211 = (float16)(0.200000003f) + t205;
-            float16 t212 = (float16)(0.699999988f) + t206;
+            float16 t204 = 0.0f * t201;
+            float16 t205 = 0.0f * t202;
+            float16 t206 = 0.0f * t203;
+            float16 t210 = 0.100000001f + t204;
+            float16 t211 = 0.200000003f + t205;
+            float16 t212 = 0.699999988f + t206;
             origin_x = t210;
             origin_y = t211;
             origin_z = t212;
@@ -672,12 +685,12 @@ __kernel void wamnet_trace(
             float16 t16 = as_float16(as_int16(direction_x) & 0x7fffffff);
             float16 t17 = as_float16(as_int16(direction_y) & 0x7fffffff);
             float16 t18 = as_float16(as_int16(direction_z) & 0x7fffffff);
-            int16 t19 = t16 < (float16)(1e-15f);
-            int16 t20 = t17 < (float16)(1e-15f);
-            int16 t21 = t18 < (float16)(1e-15f);
-            int16 t23 = direction_x < (float16)(0.0f);
-            int16 t24 = direction_y < (float16)(0.0f);
-            int16 t25 = direction_z < (float16)(0.0f);
+            int16 t19 = t16 < 1e-15f;
+            int16 t20 = t17 < 1e-15f;
+            int16 t21 = t18 < 1e-15f;
+            int16 t23 = direction_x < 0.0f;
+            int16 t24 = direction_y < 0.0f;
+            int16 t25 = direction_z < 0.0f;
             float16 t27 = t23 ? (float16)(-1e-15f) : (float16)(1e-15f);
             float16 t28 = t24 ? (float16)(-1e-15f) : (float16)(1e-15f);
             float16 t29 = t25 ? (float16)(-1e-15f) : (float16)(1e-15f);
@@ -687,9 +700,9 @@ __kernel void wamnet_trace(
             float16 t33 = 1.0f / t30;
             float16 t34 = 1.0f / t31;
             float16 t35 = 1.0f / t32;
-            float16 t36 = (float16)(0.0f) - origin_x;
-            float16 t37 = (float16)(0.0f) - origin_y;
-            float16 t38 = (float16)(0.0f) - origin_z;
+            float16 t36 = 0.0f - origin_x;
+            float16 t37 = 0.0f - origin_y;
+            float16 t38 = 0.0f - origin_z;
             float16 t39 = t36 * t33;
             float16 t40 = t37 * t34;
             float16 t41 = t38 * t35;
@@ -707,18 +720,18 @@ __kernel void wamnet_trace(
             float16 t54 = t50 < t49 ? t50 : t49;
             float16 t55 = t51 < t54 ? t51 : t54;
             int16 t56 = t53 <= t55;
-            int16 t57 = t55 > (float16)(0.0f);
+            int16 t57 = t55 > 0.0f;
             int16 t58 = t56 && t57;
             float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
-            int16 t60 = t59 < (float16)(1.00000002e+30f);
+            int16 t60 = t59 < 1.00000002e+30f;
             int16 t62 = t60 ? (int16)(0) : (int16)(6);
             float16 t63 = t59 < (float16)(1.00000002e+30f) ? t59 : (float16)(1.00000002e+30f);
-            int16 t64 = t62 == (int16)(0);
-            int16 t65 = direction_x > (float16)(0.0f);
+            int16 t64 = t62 == 0;
+            int16 t65 = direction_x > 0.0f;
             int16 t67 = t65 ? (int16)(1) : (int16)(0);
-            int16 t68 = direction_y > (float16)(0.0f);
+            int16 t68 = direction_y > 0.0f;
             int16 t71 = t68 ? (int16)(3) : (int16)(2);
-            int16 t72 = direction_z > (float16)(0.0f);
+            int16 t72 = direction_z > 0.0f;
             int16 t75 = t72 ? (int16)(5) : (int16)(4);
             int16 t76 = t49 <= t50;
             int16 t77 = t49 <= t51;
@@ -727,7 +740,7 @@ __kernel void wamnet_trace(
             int16 t80 = t79 ? t71 : t75;
             int16 t81 = t78 ? t67 : t80;
             int16 t82 = t64 ? t81 : t62;
-            int16 t83 = t82 < (int16)(6);
+            int16 t83 = t82 < 6;
             float16 t84 = t83 ? t63 : (float16)(0.0f);
             float16 t85 = direction_x * t84;
             float16 t86 = direction_y * t84;
@@ -777,7 +790,7 @@ __kernel void wamnet_trace(
 
         /* look: its features */
         {
-            int16 t15 = surface < (int16)(6);
+            int16 t15 = surface < 6;
             float16 t17 = t15 ? t : (float16)(0.0f);
             float16 t18 = t15 ? point_x : (float16)(0.0f);
             float16 t19 = t15 ? point_y : (float16)(0.0f);
@@ -787,7 +800,6 @@ __kernel void wamnet_trace(
             sum_normal_z += normal_z;
         }
     }
-
     vstore16(sum_color_r, 0, sums + 0 * plane + at);
     vstore16(sum_color_g, 0, sums + 1 * plane + at);
     vstore16(sum_color_b, 0, sums + 2 * plane + at);

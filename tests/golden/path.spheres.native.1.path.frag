@@ -24,7 +24,7 @@
 #else
 #define PRECISE
 #endif
-#define MAX_DEPTH 1u /* scatterings of a path */
+#define MAX_DEPTH 1 /* scatterings of a path */
 const float table_0[3] = float[3](0.0f, 0.300000012f, 0.600000024f);
 const float table_1[3] = float[3](0.200000003f, (-0.800000012f), (-1.79999995f));
 const float table_2[3] = float[3](0.100000001f, 0.200000003f, 0.300000012f);
@@ -39,8 +39,10 @@ uniform uint seed_number;
 
 void main()
 {
-    uint x = uint(gl_FragCoord.x) + 0u;
-    uint y = uint(int(gl_FragCoord.y) + first_row);
+    int column = int(gl_FragCoord.x);
+    int row = int(gl_FragCoord.y);
+    uint x = uint(column);
+    uint y = uint(row + first_row);
     uint seed = seed_number;
     float image_width = float(width);
     float image_height = float(height);
@@ -166,8 +168,8 @@ void main()
             pdf = 1.00000002e+30f;
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint depth = bounce;
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint depth = uint(bounce);
 
             /* arrive: the next surface */
             {
@@ -524,7 +526,6 @@ void main()
         sum_color_g += radiance_g;
         sum_color_b += radiance_b;
     }
-
     sums_0[0] = sum_color_r;
     sums_0[1] = sum_color_g;
     sums_0[2] = sum_color_b;

@@ -17,7 +17,7 @@
  *           Work item (i, j) follows the pixels from 16 * i of row first_row + j on
  */
 #define LANES 16
-#define MAX_DEPTH 1u /* scatterings of a path */
+#define MAX_DEPTH 1 /* scatterings of a path */
 __constant float table_0[3] = {0.0f, 0.300000012f, 0.600000024f};
 __constant float table_1[3] = {0.200000003f, (-0.800000012f), (-1.79999995f)};
 __constant float table_2[3] = {0.100000001f, 0.200000003f, 0.300000012f};
@@ -36,6 +36,19 @@ __constant int table_3[3] = {6, 7, 8};
 #ifndef CONVERT
 #define CONVERT(a, kind) convert_##kind(a)
 #endif
+/* Whether any component is true. The library's any() is a call, which saves all registers. */
+int any_lane(int16 mask)
+{
+#if defined(__AVX512DQ__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_cvtd2mask512)
+    return (ushort)__builtin_ia32_cvtd2mask512(mask);
+#endif
+#endif
+    int8 of_8 = mask.lo | mask.hi;
+    int4 of_4 = of_8.lo | of_8.hi;
+    int2 of_2 = of_4.lo | of_4.hi;
+    return of_2.lo | of_2.hi;
+}
 __kernel void wamnet_trace(
     __global float *restrict sums,
     int width,
@@ -50,8 +63,8 @@ __kernel void wamnet_trace(
     size_t row = get_global_id(1);
     size_t plane = get_global_size(1) * stride;
     size_t at = row * stride + column;
-    uint16 x = (uint16)((uint)column) + (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    uint16 y = (uint16)((uint)((int)row + first_row));
+    uint16 x = (uint)column + (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    uint16 y = (uint16)((uint)(row + first_row));
     uint16 seed = (uint16)(seed_number);
     float16 image_width = (float16)((float)width);
     float16 image_height = (float16)((float)height);
@@ -89,61 +102,61 @@ __kernel void wamnet_trace(
 
         /* start: the path at the camera */
         {
-            uint16 t7 = (uint16)(65536u) * y;
+            uint16 t7 = 65536u * y;
             uint16 t8 = x + t7;
             float16 t9 = CONVERT(x, float16);
             float16 t10 = CONVERT(y, float16);
-            uint16 t12 = t8 * (uint16)(1664525u);
-            uint16 t14 = t12 + (uint16)(1013904223u);
-            uint16 t15 = sample_number * (uint16)(1664525u);
-            uint16 t16 = t15 + (uint16)(1013904223u);
-            uint16 t17 = seed * (uint16)(1664525u);
-            uint16 t18 = t17 + (uint16)(1013904223u);
+            uint16 t12 = t8 * 1664525u;
+            uint16 t14 = t12 + 1013904223u;
+            uint16 t15 = sample_number * 1664525u;
+            uint16 t16 = t15 + 1013904223u;
+            uint16 t17 = seed * 1664525u;
+            uint16 t18 = t17 + 1013904223u;
             uint16 t19 = t16 * t18;
             uint16 t20 = t14 + t19;
-            uint16 t21 = (uint16)(1013904223u) * t20;
+            uint16 t21 = 1013904223u * t20;
             uint16 t22 = t16 + t21;
             uint16 t23 = t20 * t22;
-            uint16 t24 = (uint16)(1013904223u) + t23;
+            uint16 t24 = 1013904223u + t23;
             uint16 t25 = t22 * t24;
             uint16 t26 = t18 + t25;
-            uint16 t28 = t20 >> (uint16)(16u);
+            uint16 t28 = t20 >> 16u;
             uint16 t29 = t20 ^ t28;
-            uint16 t30 = t22 >> (uint16)(16u);
+            uint16 t30 = t22 >> 16u;
             uint16 t31 = t22 ^ t30;
-            uint16 t32 = t24 >> (uint16)(16u);
+            uint16 t32 = t24 >> 16u;
             uint16 t33 = t24 ^ t32;
-            uint16 t34 = t26 >> (uint16)(16u);
+            uint16 t34 = t26 >> 16u;
             uint16 t35 = t26 ^ t34;
             uint16 t36 = t31 * t35;
             uint16 t37 = t29 + t36;
             uint16 t38 = t33 * t37;
             uint16 t39 = t31 + t38;
-            uint16 t41 = t37 >> (uint16)(8u);
+            uint16 t41 = t37 >> 8u;
             float16 t42 = CONVERT(t41, float16);
-            float16 t44 = t42 * (float16)(5.96046448e-08f);
-            uint16 t45 = t39 >> (uint16)(8u);
+            float16 t44 = t42 * 5.96046448e-08f;
+            uint16 t45 = t39 >> 8u;
             float16 t46 = CONVERT(t45, float16);
-            float16 t47 = t46 * (float16)(5.96046448e-08f);
+            float16 t47 = t46 * 5.96046448e-08f;
             float16 t48 = t9 + t44;
-            float16 t50 = (float16)(2.0f) * t48;
+            float16 t50 = 2.0f * t48;
             float16 t51 = t50 - image_width;
             float16 t52 = t51 / image_height;
-            float16 t54 = t52 * (float16)(0.577350259f);
+            float16 t54 = t52 * 0.577350259f;
             float16 t55 = t10 + t47;
-            float16 t56 = (float16)(2.0f) * t55;
+            float16 t56 = 2.0f * t55;
             float16 t57 = image_height - t56;
             float16 t58 = t57 / image_height;
-            float16 t59 = t58 * (float16)(0.577350259f);
-            float16 t63 = t54 * (float16)(0.998274386f);
-            float16 t64 = t54 * (float16)(0.0f);
-            float16 t65 = t54 * (float16)(-0.0587220229f);
-            float16 t69 = (float16)(-0.0583211854f) + t63;
-            float16 t70 = (float16)(-0.116642371f) + t64;
-            float16 t71 = (float16)(-0.991460145f) + t65;
-            float16 t75 = t59 * (float16)(-0.00684947567f);
-            float16 t76 = t59 * (float16)(0.993173957f);
-            float16 t77 = t59 * (float16)(-0.116441086f);
+            float16 t59 = t58 * 0.577350259f;
+            float16 t63 = t54 * 0.998274386f;
+            float16 t64 = t54 * 0.0f;
+            float16 t65 = t54 * (-0.0587220229f);
+            float16 t69 = (-0.0583211854f) + t63;
+            float16 t70 = (-0.116642371f) + t64;
+            float16 t71 = (-0.991460145f) + t65;
+            float16 t75 = t59 * (-0.00684947567f);
+            float16 t76 = t59 * 0.993173957f;
+            float16 t77 = t59 * (-0.116441086f);
             float16 t78 = t69 + t75;
             float16 t79 = t70 + t76;
             float16 t80 = t71 + t77;
@@ -156,12 +169,12 @@ __kernel void wamnet_trace(
             float16 t87 = t78 / t86;
             float16 t88 = t79 / t86;
             float16 t89 = t80 / t86;
-            float16 t90 = (float16)(0.0f) * t87;
-            float16 t91 = (float16)(0.0f) * t88;
-            float16 t92 = (float16)(0.0f) * t89;
-            float16 t96 = (float16)(0.100000001f) + t90;
-            float16 t97 = (float16)(0.200000003f) + t91;
-            float16 t98 = (float16)(0.699999988f) + t92;
+            float16 t90 = 0.0f * t87;
+            float16 t91 = 0.0f * t88;
+            float16 t92 = 0.0f * t89;
+            float16 t96 = 0.100000001f + t90;
+            float16 t97 = 0.200000003f + t91;
+            float16 t98 = 0.699999988f + t92;
             origin_x = t96;
             origin_y = t97;
             origin_z = t98;
@@ -177,20 +190,20 @@ __kernel void wamnet_trace(
             pdf = (float16)(1.00000002e+30f);
             pixel = t8;
         }
-        for (uint bounce = 0u; bounce <= MAX_DEPTH; ++bounce) {
-            uint16 depth = (uint16)(bounce);
+        for (int bounce = 0; bounce < MAX_DEPTH + 1; ++bounce) {
+            uint16 depth = (uint16)((uint)bounce);
 
             /* arrive: the next surface */
             {
                 float16 t16 = as_float16(as_int16(direction_x) & 0x7fffffff);
                 float16 t17 = as_float16(as_int16(direction_y) & 0x7fffffff);
                 float16 t18 = as_float16(as_int16(direction_z) & 0x7fffffff);
-                int16 t19 = t16 < (float16)(1e-15f);
-                int16 t20 = t17 < (float16)(1e-15f);
-                int16 t21 = t18 < (float16)(1e-15f);
-                int16 t23 = direction_x < (float16)(0.0f);
-                int16 t24 = direction_y < (float16)(0.0f);
-                int16 t25 = direction_z < (float16)(0.0f);
+                int16 t19 = t16 < 1e-15f;
+                int16 t20 = t17 < 1e-15f;
+                int16 t21 = t18 < 1e-15f;
+                int16 t23 = direction_x < 0.0f;
+                int16 t24 = direction_y < 0.0f;
+                int16 t25 = direction_z < 0.0f;
                 float16 t27 = t23 ? (float16)(-1e-15f) : (float16)(1e-15f);
                 float16 t28 = t24 ? (float16)(-1e-15f) : (float16)(1e-15f);
                 float16 t29 = t25 ? (float16)(-1e-15f) : (float16)(1e-15f);
@@ -200,9 +213,9 @@ __kernel void wamnet_trace(
                 float16 t33 = 1.0f / t30;
                 float16 t34 = 1.0f / t31;
                 float16 t35 = 1.0f / t32;
-                float16 t36 = (float16)(0.0f) - origin_x;
-                float16 t37 = (float16)(0.0f) - origin_y;
-                float16 t38 = (float16)(0.0f) - origin_z;
+                float16 t36 = 0.0f - origin_x;
+                float16 t37 = 0.0f - origin_y;
+                float16 t38 = 0.0f - origin_z;
                 float16 t39 = t36 * t33;
                 float16 t40 = t37 * t34;
                 float16 t41 = t38 * t35;
@@ -220,15 +233,15 @@ __kernel void wamnet_trace(
                 float16 t54 = t50 < t49 ? t50 : t49;
                 float16 t55 = t51 < t54 ? t51 : t54;
                 int16 t56 = t53 <= t55;
-                int16 t57 = t55 > (float16)(0.0f);
+                int16 t57 = t55 > 0.0f;
                 int16 t58 = t56 && t57;
                 float16 t59 = t58 ? t55 : (float16)(1.00000002e+30f);
-                int16 t60 = t59 < (float16)(1.00000002e+30f);
+                int16 t60 = t59 < 1.00000002e+30f;
                 int16 t62 = t60 ? (int16)(0) : (int16)(9);
                 float16 t63 = t59 < (float16)(1.00000002e+30f) ? t59 : (float16)(1.00000002e+30f);
                 float16 t64 = t63;
                 int16 t65 = t62;
-                float16 t72 = origin_y - (float16)(0.100000001f);
+                float16 t72 = origin_y - 0.100000001f;
                 float16 t75 = t72 * direction_y;
                 float16 t100 = t72 * t72;
                 for (int i = 0; i < 3; ++i) {
@@ -258,7 +271,7 @@ __kernel void wamnet_trace(
                     float16 t92 = t86 - t91;
                     float16 t93 = (float16)(0.0f) > t92 ? (float16)(0.0f) : t92;
                     float16 t94 = sqrt(t93);
-                    int16 t95 = t79 < (float16)(0.0f);
+                    int16 t95 = t79 < 0.0f;
                     float16 t96 = -t94;
                     float16 t97 = t95 ? t96 : t94;
                     float16 t98 = t79 + t97;
@@ -267,15 +280,15 @@ __kernel void wamnet_trace(
                     float16 t102 = t73 * t73;
                     float16 t103 = t101 + t102;
                     float16 t104 = t103 - t86;
-                    int16 t105 = t98 == (float16)(0.0f);
+                    int16 t105 = t98 == 0.0f;
                     float16 t106 = t105 ? (float16)(1e-15f) : t98;
                     float16 t107 = t104 / t106;
                     float16 t108 = t107 < t98 ? t107 : t98;
                     float16 t109 = t107 > t98 ? t107 : t98;
-                    int16 t110 = t92 > (float16)(0.0f);
-                    int16 t111 = t109 > (float16)(0.0f);
+                    int16 t110 = t92 > 0.0f;
+                    int16 t111 = t109 > 0.0f;
                     int16 t112 = t110 && t111;
-                    int16 t113 = t108 > (float16)(0.0f);
+                    int16 t113 = t108 > 0.0f;
                     float16 t114 = t113 ? t108 : t109;
                     float16 t115 = t112 ? t114 : (float16)(1.00000002e+30f);
                     int16 t116 = t115 < t64;
@@ -284,12 +297,12 @@ __kernel void wamnet_trace(
                     t64 = t118;
                     t65 = t117;
                 }
-                int16 t121 = t65 == (int16)(0);
-                int16 t122 = direction_x > (float16)(0.0f);
+                int16 t121 = t65 == 0;
+                int16 t122 = direction_x > 0.0f;
                 int16 t124 = t122 ? (int16)(1) : (int16)(0);
-                int16 t125 = direction_y > (float16)(0.0f);
+                int16 t125 = direction_y > 0.0f;
                 int16 t128 = t125 ? (int16)(3) : (int16)(2);
-                int16 t129 = direction_z > (float16)(0.0f);
+                int16 t129 = direction_z > 0.0f;
                 int16 t132 = t129 ? (int16)(5) : (int16)(4);
                 int16 t133 = t49 <= t50;
                 int16 t134 = t49 <= t51;
@@ -298,7 +311,7 @@ __kernel void wamnet_trace(
                 int16 t137 = t136 ? t128 : t132;
                 int16 t138 = t135 ? t124 : t137;
                 int16 t139 = t121 ? t138 : t65;
-                int16 t140 = t139 < (int16)(9);
+                int16 t140 = t139 < 9;
                 float16 t141 = t140 ? t64 : (float16)(0.0f);
                 float16 t142 = direction_x * t141;
                 float16 t143 = direction_y * t141;
@@ -319,21 +332,21 @@ __kernel void wamnet_trace(
                 int16 t159 = !t136;
                 int16 t160 = t156 && t159;
                 float16 t161 = t160 ? t154 : (float16)(0.0f);
-                int16 t163 = t139 >= (int16)(6);
+                int16 t163 = t139 >= 6;
                 int16 t164 = t163 && t140;
-                int16 t165 = t139 - (int16)(6);
+                int16 t165 = t139 - 6;
                 int16 t166 = (int16)(0) > t165 ? (int16)(0) : t165;
                 int16 t167 = (int16)(2) < t166 ? (int16)(2) : t166;
-                int16 t169 = t167 < (int16)(2);
+                int16 t169 = t167 < 2;
                 float16 t171 = t169 ? (float16)(0.300000012f) : (float16)(0.600000024f);
-                int16 t172 = t167 < (int16)(1);
+                int16 t172 = t167 < 1;
                 float16 t173 = t172 ? (float16)(0.0f) : t171;
                 float16 t176 = t169 ? (float16)(-0.800000012f) : (float16)(-1.79999995f);
                 float16 t178 = t172 ? (float16)(0.200000003f) : t176;
                 float16 t179 = t169 ? (float16)(0.200000003f) : (float16)(0.300000012f);
                 float16 t180 = t172 ? (float16)(0.100000001f) : t179;
                 float16 t181 = t148 - t173;
-                float16 t182 = t149 - (float16)(0.100000001f);
+                float16 t182 = t149 - 0.100000001f;
                 float16 t183 = t150 - t178;
                 float16 t184 = t181 / t180;
                 float16 t185 = t182 / t180;
@@ -343,7 +356,7 @@ __kernel void wamnet_trace(
                 float16 t189 = t187 + t188;
                 float16 t190 = t186 * direction_z;
                 float16 t191 = t189 + t190;
-                int16 t192 = t191 > (float16)(0.0f);
+                int16 t192 = t191 > 0.0f;
                 float16 t193 = -t184;
                 float16 t194 = -t185;
                 float16 t195 = -t186;
@@ -356,14 +369,14 @@ __kernel void wamnet_trace(
                 float16 t202 = t140 ? t199 : (float16)(0.0f);
                 float16 t203 = t140 ? t200 : (float16)(0.0f);
                 float16 t204 = t140 ? t201 : (float16)(0.0f);
-                int16 t205 = t139 < (int16)(6);
+                int16 t205 = t139 < 6;
                 float16 t206 = t205 ? (float16)(1.0f) : (float16)(0.0f);
                 float16 t207 = t140 ? (float16)(0.200000003f) : (float16)(0.0f);
                 float16 t209 = t205 ? (float16)(0.5f) : t207;
                 float16 t210 = t140 ? (float16)(0.600000024f) : (float16)(0.0f);
-                int16 t212 = t139 < (int16)(8);
+                int16 t212 = t139 < 8;
                 float16 t213 = t212 ? (float16)(0.300000012f) : t210;
-                int16 t215 = t139 < (int16)(7);
+                int16 t215 = t139 < 7;
                 float16 t216 = t215 ? (float16)(0.0f) : t213;
                 float16 t217 = t205 ? (float16)(0.5f) : t216;
                 float16 t218 = t140 ? (float16)(0.100000001f) : (float16)(0.0f);
@@ -395,18 +408,18 @@ __kernel void wamnet_trace(
 
             /* scatter: the path goes on */
             {
-                int16 t29 = surface < (int16)(9);
-                uint16 t31 = (uint16)(2u) * depth;
-                uint16 t33 = (uint16)(1u) + t31;
-                uint16 t35 = pixel * (uint16)(1664525u);
-                uint16 t37 = t35 + (uint16)(1013904223u);
-                uint16 t38 = sample_number * (uint16)(1664525u);
-                uint16 t39 = t38 + (uint16)(1013904223u);
-                uint16 t40 = seed * (uint16)(1664525u);
-                uint16 t41 = t40 + (uint16)(1013904223u);
+                int16 t29 = surface < 9;
+                uint16 t31 = 2u * depth;
+                uint16 t33 = 1u + t31;
+                uint16 t35 = pixel * 1664525u;
+                uint16 t37 = t35 + 1013904223u;
+                uint16 t38 = sample_number * 1664525u;
+                uint16 t39 = t38 + 1013904223u;
+                uint16 t40 = seed * 1664525u;
+                uint16 t41 = t40 + 1013904223u;
                 uint16 t42 = t39 * t41;
                 uint16 t43 = t37 + t42;
-                uint16 t45 = t43 >> (uint16)(16u);
+                uint16 t45 = t43 >> 16u;
                 uint16 t46 = t43 ^ t45;
                 float16 t50 = t29 ? t : (float16)(0.0f);
                 float16 t51 = as_float16(as_int16(point_x) & 0x7fffffff);
@@ -415,7 +428,7 @@ __kernel void wamnet_trace(
                 float16 t54 = t52 > t51 ? t52 : t51;
                 float16 t55 = t53 > t54 ? t53 : t54;
                 float16 t56 = t55 + t50;
-                float16 t58 = (float16)(3.81469727e-06f) * t56;
+                float16 t58 = 3.81469727e-06f * t56;
                 float16 t59 = normal_x * t58;
                 float16 t60 = normal_y * t58;
                 float16 t61 = normal_z * t58;
@@ -425,66 +438,66 @@ __kernel void wamnet_trace(
                 float16 t65 = beta_r * reflectance_r;
                 float16 t66 = beta_g * reflectance_g;
                 float16 t67 = beta_b * reflectance_b;
-                uint16 t68 = t33 + (uint16)(1u);
-                uint16 t69 = t68 * (uint16)(1664525u);
-                uint16 t70 = t69 + (uint16)(1013904223u);
+                uint16 t68 = t33 + 1u;
+                uint16 t69 = t68 * 1664525u;
+                uint16 t70 = t69 + 1013904223u;
                 uint16 t71 = t70 * t43;
                 uint16 t72 = t39 + t71;
                 uint16 t73 = t43 * t72;
                 uint16 t74 = t70 + t73;
                 uint16 t75 = t72 * t74;
                 uint16 t76 = t41 + t75;
-                uint16 t77 = t72 >> (uint16)(16u);
+                uint16 t77 = t72 >> 16u;
                 uint16 t78 = t72 ^ t77;
-                uint16 t79 = t74 >> (uint16)(16u);
+                uint16 t79 = t74 >> 16u;
                 uint16 t80 = t74 ^ t79;
-                uint16 t81 = t76 >> (uint16)(16u);
+                uint16 t81 = t76 >> 16u;
                 uint16 t82 = t76 ^ t81;
                 uint16 t83 = t78 * t82;
                 uint16 t84 = t46 + t83;
                 uint16 t85 = t80 * t84;
                 uint16 t86 = t78 + t85;
-                uint16 t87 = t84 >> (uint16)(8u);
+                uint16 t87 = t84 >> 8u;
                 float16 t88 = CONVERT(t87, float16);
-                float16 t89 = t88 * (float16)(5.96046448e-08f);
-                uint16 t90 = t86 >> (uint16)(8u);
+                float16 t89 = t88 * 5.96046448e-08f;
+                uint16 t90 = t86 >> 8u;
                 float16 t91 = CONVERT(t90, float16);
-                float16 t92 = t91 * (float16)(5.96046448e-08f);
-                float16 t94 = (float16)(2.0f) * t89;
-                float16 t96 = t94 - (float16)(1.0f);
-                float16 t97 = (float16)(2.0f) * t92;
-                float16 t98 = t97 - (float16)(1.0f);
+                float16 t92 = t91 * 5.96046448e-08f;
+                float16 t94 = 2.0f * t89;
+                float16 t96 = t94 - 1.0f;
+                float16 t97 = 2.0f * t92;
+                float16 t98 = t97 - 1.0f;
                 float16 t99 = as_float16(as_int16(t96) & 0x7fffffff);
                 float16 t100 = as_float16(as_int16(t98) & 0x7fffffff);
                 int16 t101 = t99 > t100;
                 float16 t102 = t101 ? t96 : t98;
                 float16 t103 = t101 ? t98 : t96;
-                int16 t104 = t102 == (float16)(0.0f);
+                int16 t104 = t102 == 0.0f;
                 float16 t106 = t104 ? (float16)(1e-30f) : t102;
                 float16 t107 = t103 / t106;
-                float16 t109 = (float16)(0.785398185f) * t107;
-                float16 t111 = (float16)(1.57079637f) - t109;
+                float16 t109 = 0.785398185f * t107;
+                float16 t111 = 1.57079637f - t109;
                 float16 t112 = t101 ? t109 : t111;
                 float16 t113 = cos(t112);
                 float16 t114 = t102 * t113;
                 float16 t115 = sin(t112);
                 float16 t116 = t102 * t115;
                 float16 t117 = t114 * t114;
-                float16 t118 = (float16)(1.0f) - t117;
+                float16 t118 = 1.0f - t117;
                 float16 t119 = t116 * t116;
                 float16 t120 = t118 - t119;
                 float16 t121 = t120 > (float16)(0.0f) ? t120 : (float16)(0.0f);
                 float16 t122 = sqrt(t121);
-                int16 t123 = normal_z < (float16)(0.0f);
+                int16 t123 = normal_z < 0.0f;
                 float16 t125 = t123 ? (float16)(-1.0f) : (float16)(1.0f);
                 float16 t126 = t125 + normal_z;
-                float16 t127 = (float16)(-1.0f) / t126;
+                float16 t127 = (-1.0f) / t126;
                 float16 t128 = normal_x * normal_y;
                 float16 t129 = t128 * t127;
                 float16 t130 = t125 * normal_x;
                 float16 t131 = t130 * normal_x;
                 float16 t132 = t131 * t127;
-                float16 t133 = (float16)(1.0f) + t132;
+                float16 t133 = 1.0f + t132;
                 float16 t134 = t125 * t129;
                 float16 t135 = -t125;
                 float16 t136 = t135 * normal_x;
@@ -508,10 +521,10 @@ __kernel void wamnet_trace(
                 float16 t154 = t148 + t151;
                 float16 t155 = t149 + t152;
                 float16 t156 = (float16)(0.0f) > t122 ? (float16)(0.0f) : t122;
-                float16 t158 = t156 * (float16)(0.318309873f);
+                float16 t158 = t156 * 0.318309873f;
                 float16 t159 = t66 > t65 ? t66 : t65;
                 float16 t160 = t67 > t159 ? t67 : t159;
-                int16 t161 = t160 > (float16)(0.0f);
+                int16 t161 = t160 > 0.0f;
                 int16 t162 = t29 && t161;
                 origin_x = t62;
                 origin_y = t63;
@@ -525,7 +538,7 @@ __kernel void wamnet_trace(
                 pdf = t158;
                 alive = alive && t162;
             }
-            if (!any(alive)) {
+            if (!any_lane(alive)) {
                 break;
             }
         }
@@ -535,7 +548,6 @@ __kernel void wamnet_trace(
         sum_color_g += radiance_g;
         sum_color_b += radiance_b;
     }
-
     vstore16(sum_color_r, 0, sums + 0 * plane + at);
     vstore16(sum_color_g, 0, sums + 1 * plane + at);
     vstore16(sum_color_b, 0, sums + 2 * plane + at);

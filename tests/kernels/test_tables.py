@@ -141,7 +141,7 @@ def test_thresholds():
     assert forms_of("opencl") == forms_of("c") == replace(USUAL, trees=True)
     assert forms_of("opengl") == Forms(few=10000.0)
     for name in CANONICAL:
-        programs = lower_scene(canonical(name), SETTINGS, forms_of("opencl")).parts().values()
+        programs = lower_scene(canonical(name), SETTINGS, forms_of("opencl")).parts.values()
         assert not any(node.op == "loop" for program in programs for node in program.nodes), name
 
 
@@ -223,7 +223,7 @@ def test_numbers_that_trade_places(executor):
         return dict(zip(names, carried_about(surface.astype(np.float32)), strict=True))
 
     program = trace(look, {"surface": Type("int32")}, most_unrolled=0)
-    programs = replace(programs, look=verify(program))
+    programs = replace(programs, parts={**programs.parts, "look": verify(program)})
     kernel = compile_path(
         programs, executor.name, lanes=executor.lanes, groups=("albedo", "depth", "last_surface")
     )

@@ -7,9 +7,10 @@ import pytest
 
 from wamnet.compiler.core.ir import Node, Type
 from wamnet.compiler.core.ops import OPS
-from wamnet.compiler.languages.opencl_path import LANES, of_lanes
+from wamnet.compiler.languages.opencl import LANES
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.training.vectors import Vectors
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 
@@ -22,7 +23,7 @@ EDGES = [0.0, -0.0, 0.25, -0.25, 1.0, -1.0, 2.5, -2.5, 1e30, -1e30, 2.0**23 - 0.
 def test_operators_on_vectors_compute_what_numpy_computes(executor_named, lanes, operation):
     """All pairs of the edges; equal to the bit, except for the sign of zero, which comparisons do not see."""
     context = executor_named("opencl")._context
-    dialect = of_lanes(lanes)
+    dialect = Vectors(lanes)
     arity = OPS[operation].arity
     a, b = (part.ravel().astype(np.float32) for part in np.meshgrid(EDGES, EDGES))
     a, b = (np.resize(part, -(-len(a) // lanes) * lanes) for part in (a, b))

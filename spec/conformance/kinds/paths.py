@@ -276,7 +276,7 @@ def step(
     """
     answer, own_clause = STEPS[name]
     wanted = answer({**inputs, "scene": scene_text(view.scene)})
-    program = getattr(programs_of(view.scene, view.settings), name.removeprefix("path."))
+    program = programs_of(view.scene, view.settings).parts[name.removeprefix("path.")]
     states = [_flat(inputs, values) for values in (PATH, SURFACE) if values.keys() <= inputs.keys()]
     found = ranges.evaluate(program, dict(ChainMap(*states, _counted(inputs))), guided=guided)
     if of_light is None:
@@ -429,11 +429,11 @@ class _Ranges:
     def __init__(self, view: View) -> None:
         self.programs = programs_of(view.scene, view.settings)
         self.counters = _counted({**view.inputs(), "pixel": view.x + render.MAX_IMAGE_SIDE_PX * view.y})
-        self.state = dict(ranges.evaluate(self.programs.start, self.counters))
+        self.state = dict(ranges.evaluate(self.programs.parts["start"], self.counters))
 
     def arrive(self) -> None:
         """Go on to the next surface."""
-        self.state |= ranges.evaluate(self.programs.arrive, self.state)
+        self.state |= ranges.evaluate(self.programs.parts["arrive"], self.state)
 
     def sure(self, names: Iterable[str]) -> bool:
         """Tell whether all values of these names are sure and finite."""
@@ -442,7 +442,7 @@ class _Ranges:
     def scatter(self, depth: int) -> Range:
         """Leave the surface, and return whether the path continues."""
         given = {**self.state, **self.counters, "depth": rng.counter(depth)}
-        sent = dict(ranges.evaluate(self.programs.scatter, given))
+        sent = dict(ranges.evaluate(self.programs.parts["scatter"], given))
         alive = sent.pop("alive")
         self.state |= sent
         return alive

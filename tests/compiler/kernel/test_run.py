@@ -24,6 +24,7 @@ from wamnet.compiler.kernel.kernel import (
     INT,
     Array,
     Barrier,
+    Break,
     Call,
     Constant,
     Expr,
@@ -36,9 +37,11 @@ from wamnet.compiler.kernel.kernel import (
     Store,
     Type,
     View,
+    any_lane,
     apply,
     call,
     const,
+    lanes,
     load,
     name,
     splat,
@@ -407,11 +410,33 @@ def test_race(kernel, message):
         ran(kernel, (2, 4))
 
 
+def test_loops_end_for_each_item_by_itself():
+    """As many turns as an item's column says, and no more than two; an inner loop's break ends that alone."""
+    sum_of, result = (
+        Array("sum", FLOAT, value=const(0.0)),
+        Store(RESULT, (Y, X, const(0)), name("sum", FLOAT)),
+    )
+    one, inner = Store("sum", (), const(1.0), add=True), For("k", const(3), (Break(const(True)),))
+    body = Break(apply("equal", TURN, X)), inner, Break(apply("equal", TURN, 2)), one
+    assert np.array_equal(ran(small(sum_of, For("i", const(9), body), result), (1, 5)), [[0, 1, 2, 2, 2]])
+
+
+def test_lanes_are_numbered_and_tell_whether_any_holds():
+    """Entries of a table by the lanes' numbers; an index beyond it is found in any lane."""
+    index = apply("add", apply("convert", lanes(4), value="int32"), splat(X, 4))
+    entry = Expr("take", (index,), FLOAT.of(4), "table")
+    found = any_lane(apply("equal", entry, splat(const(5.0), 4)))
+    write = Store(RESULT, (Y, X, const(0)), apply("select", found, const(1.0), const(0.0)))
+    long, short = (small(write, tables=(("table", np.arange(n, dtype=np.float32)),)) for n in (6, 5))
+    assert np.array_equal(ran(long), [[0, 0, 1]] * 2)
+    with pytest.raises(KernelError, match=r"index 5 is beyond table, which has 5, in the item of pixel \(2"):
+        ran(short)
+
+
 def test_a_barrier_that_some_items_miss():
     """`verify` refuses such a kernel, so that the run itself is called."""
     kernel = small(If(LOCAL < 3, (Barrier(),)), WRITTEN, group=(4, 2))
-    arrays, size = {"image_a": np.zeros((2, 4, 1), np.float32)}, {"width": 4, "height": 2}
-    runner = Runner(kernel, arrays, size, np.zeros(4, np.float32), Domain())
+    runner = Runner(kernel, {}, {"width": 4, "height": 2}, Domain())
     with pytest.raises(KernelError, match="a barrier is reached by 6 of 8 items of a group"):
         runner.body(kernel.body)
 

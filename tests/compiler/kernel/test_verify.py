@@ -13,6 +13,7 @@ from wamnet.compiler.kernel.kernel import (
     INT,
     Array,
     Barrier,
+    Break,
     Call,
     Constant,
     Expr,
@@ -26,6 +27,7 @@ from wamnet.compiler.kernel.kernel import (
     Type,
     View,
     Write,
+    any_lane,
     apply,
     call,
     const,
@@ -140,6 +142,21 @@ WRONG = {
     "a bound that is a float": (
         small(looped(WRITE, count=ZERO)),
         "a bound of the loop over i has type float32",
+    ),
+    "a break of a number": (small(looped(Break(X))), "the condition that ends a loop has type int32"),
+    "a break outside of a loop": (small(Break(X < 1)), "a break outside of a loop's own body"),
+    "a break in a branch": (
+        small(looped(If(X < 1, (Break(Y < 1),)))),
+        "a break outside of a loop's own body",
+    ),
+    "a barrier behind a break": (
+        small(looped(Break(X < 1), Barrier()), group=(2, 2)),
+        "a barrier inside a branch",
+    ),
+    "any lane of numbers": (small(Let("t", any_lane(X))), "what may hold in any lane has type int32"),
+    "entries at one index": (
+        small(Let("t", Expr("take", (X,), FOUR, "table")), tables=TABLES),
+        "the index of table has type int32 instead of int32 x 4",
     ),
     "a size of nothing": (small(Array("v", FLOAT, (0,))), "a size of v is 0"),
     "a size that varies": (small(Array("v", FLOAT, (X,))), "a size of v is not determined by constants"),

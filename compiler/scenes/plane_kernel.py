@@ -51,8 +51,8 @@ class PlaneArtifact(OneSource):
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Return what the planes of sums are, in order, of an encoding."""
-        return tuple(self.manifest["planes"])
+        """Return what the planes of sums are, in order, of an encoding; other kernels have none."""
+        return tuple(self.manifest.get("planes", ()))
 
 
 @dataclass(frozen=True)

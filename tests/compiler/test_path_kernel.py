@@ -99,7 +99,7 @@ def test_rays_of_features_in_every_language(target):
 
 
 RUN = {"width": 13, "height": 9, "first_row": 2, "rows": 6, "first_sample": 5, "samples": 2, "seed_number": 7}
-"""The integers of a launch: the rows are not a multiple of any number of lanes."""
+"""The integers of a launch: a row is not a multiple of any number of lanes but 1."""
 
 
 @pytest.mark.parametrize("lanes", [1, 4, 16])

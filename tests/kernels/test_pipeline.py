@@ -298,7 +298,7 @@ def test_the_definition_is_the_composition(executor_named, model_of):
 FAULTS = {
     "no division by the samples": ("(float)sample_count", "1.0f"),
     "another exponent": ("0.416666657f", "0.4545f"),
-    "rows that are too long": ("(size_t)y * (size_t)row_stride", "(size_t)y * (size_t)(row_stride + 1)"),
+    "rows that are too long": ("stride = (size_t)row_stride", "stride = (size_t)(row_stride + 1)"),
     "one plane too far": ("sums[3 * plane", "sums[4 * plane"),
 }
 """What may go wrong in an encoding kernel: a text of its source and what replaces it."""

@@ -145,7 +145,7 @@ def test_thresholds():
         assert not any(node.op == "loop" for program in programs for node in program.nodes), name
 
 
-TREE = re.compile(r"for \(int node = 0; node < (\d+);\) {")
+TREE = re.compile(r"for \(int visit = 0; visit < (\d+); \+\+visit\) {")
 """A walk along a tree."""
 
 GROWN = {

@@ -20,7 +20,7 @@ export VENV PYTHON WAMNET_REQUIRE
 
 # Seconds of processor time that the tests may take (tests/support/tiers.py).
 QUICK_S = 240
-TEST_S = 900
+TEST_S = 1200
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
@@ -49,7 +49,7 @@ quick: ## Run the tests that need NumPy, and no device, compiler or browser (2 m
 	@.ci/setup quick
 	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE --budget $(QUICK_S)
 
-test: setup ## Run the tests, those of devices and programs too (6 minutes on two cores)
+test: setup ## Run the tests, those of devices and programs too (a quarter of an hour on two cores)
 	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --budget $(TEST_S)
 
 nightly: baselines ## Run every test and all combinations of parameters, then long, fuzz and faults (hours on two cores)

@@ -365,6 +365,7 @@ def test_a_poster_shows_what_happens_until_a_picture_is_drawn(chromium, path, da
         assert tab.said == []
 
 
+@pytest.mark.nightly
 def test_it_plays_where_motion_is_welcome(chromium, path):
     with chromium.tab(path) as tab:
         tab.page.evaluate("wamnet.page.change({ size: 64 })")

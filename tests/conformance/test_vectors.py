@@ -26,6 +26,10 @@ LARGEST_BYTES = 4 * 10**6
 """What all vectors together may take: they are part of the package."""
 
 
+LONG = ("path.start", "path.arrive", "path.scatter", "path.whole", "picture.exact", "picture.rendered")
+"""Kinds that take more than five seconds to make; the reference answers the written ones in every run."""
+
+
 @pytest.fixture(scope="module")
 def made():
     return vectors.contents()
@@ -86,25 +90,28 @@ def scaled(bound):
     return [scaled(part) for part in bound] if isinstance(bound, list) else number(bound) * SHARE / 64
 
 
+@pytest.mark.nightly(*LONG)
 @pytest.mark.parametrize("name", KINDS)
-def test_vectors_are_those_that_the_reference_makes(made, name):
+def test_vectors_are_those_that_the_reference_makes(name):
     path = vectors.FOLDER / f"{name}.json"
     way_out = (
         "run wamnet conformance --write spec/vectors, read git diff, and raise the version if it is meant"
     )
     assert path.exists(), f"{path.name} is not there; {way_out}"
-    old, new = json.loads(path.read_text()), json.loads(made[path.name])
+    old, new = json.loads(path.read_text()), json.loads(vectors.text_of(KINDS[name]))
     assert {k: v for k, v in old.items() if k != "cases"} == {k: v for k, v in new.items() if k != "cases"}
     assert [c["id"] for c in old["cases"]] == [c["id"] for c in new["cases"]], way_out
     found = [text for pair in zip(old["cases"], new["cases"], strict=True) for text in differences(*pair)]
     assert not found, f"{found[:5]}; {way_out}"
 
 
+@pytest.mark.nightly
 def test_nothing_is_left_over(made):
     there = {p.relative_to(vectors.FOLDER).as_posix() for p in vectors.FOLDER.rglob("*") if p.is_file()}
     assert there == set(made)
 
 
+@pytest.mark.nightly
 def test_files_beside_the_vectors_are_those_that_the_reference_makes(made):
     for name in ("schema.json", "README.md", *(n for n in made if n.startswith("scenes/"))):
         assert (vectors.FOLDER / name).read_bytes() == made[name], name

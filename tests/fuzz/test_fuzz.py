@@ -71,12 +71,14 @@ def test_what_was_found_once(targets, path):
     check(targets[path.parent.name], path.read_bytes())
 
 
+@pytest.mark.nightly
 def test_good_files_are_accepted(targets):
     for target in targets.values():
         for example in target.examples:
             assert check(target, example) == "accepted", target.name
 
 
+@pytest.mark.nightly
 def test_changed_files_are_refused_or_right(targets):
     """Each target gets inputs of all outcomes that it has, and none is a finding."""
     for target in targets.values():

@@ -79,6 +79,7 @@ def excess(kit, executor, artifact, program, images, of_cut):
     return float(np.max(difference / bound))
 
 
+@pytest.mark.nightly("opencl-tile:16", "opencl-tile:4", "opencl-group:4")
 @pytest.mark.nightly(
     "opengl-inlined", "opencl-group:1", "opencl-group:2", "opencl-tile:8", "opencl-vector:16"
 )

@@ -192,7 +192,7 @@ def test_a_moving_scene_with_features_of_their_own_rays(executor, model, built):
             assert np.array_equal(picture, pipeline.run(4))
 
 
-@pytest.mark.nightly(but="opencl")
+@pytest.mark.nightly(but="numpy")
 def test_frames_of_scenes_that_are_known_share_a_kernel(executor, built):
     """Noisy picture and features of more rays have settings of their own, so two kernels in all."""
     shots = [cubes(time) for time in TIMES[:3]]

@@ -107,6 +107,7 @@ def pair_of(factors: Factors) -> tuple[Any, Any]:
     return factors.vertical, factors.horizontal
 
 
+@pytest.mark.nightly
 @settings(max_examples=15)
 @given(
     widths=st.lists(st.sampled_from([1, 3, 15, 16, 17, 40]), max_size=2),

@@ -123,9 +123,17 @@ def rewrite(path: Path, block: Block, printed: str) -> None:
     path.write_text(after[:start] + printed + after[start + len(str(block.printed)) :])
 
 
-@pytest.mark.nightly(
-    "docs/guide/faster.md", "docs/guide/first-picture.md", "docs/guide/data.md", "docs/guide/export.md"
+USUAL = (
+    "README.md",
+    "docs/guide/install.md",
+    "docs/guide/python.md",
+    "docs/guide/hosts.md",
+    "docs/first-kernel.md",
 )
+"""Documents whose commands run in every run; the others take minutes together."""
+
+
+@pytest.mark.nightly(but=USUAL)
 @pytest.mark.parametrize("document", ALL)
 @pytest.mark.needs("programs")
 def test_commands_of_a_document(document: str, tmp_path: Path, pytestconfig: pytest.Config) -> None:

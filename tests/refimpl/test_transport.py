@@ -49,6 +49,7 @@ STRATEGIES = [
 ]
 
 
+@pytest.mark.nightly("minicubes-bsdf-power")
 @pytest.mark.nightly("minicubes-light-power")
 @pytest.mark.product
 @pytest.mark.parametrize(("strategy", "heuristic"), STRATEGIES)

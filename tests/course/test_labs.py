@@ -18,6 +18,8 @@ SOLUTIONS = Path(__file__).parent / "solutions"
 STYLES = Path(__file__).parent / "styles"
 """Other right answers: as a different student writes them."""
 
+pytestmark = pytest.mark.needs("programs")  # answers run in processes of their own
+
 ROOT = Path(__file__).resolve().parents[2]
 
 EVERY = [pytest.param(lab, id=lab.name) for lab in LABS]

@@ -9,6 +9,8 @@ from answers import answers, finding, right_answer
 
 from wamnet_course.labs import LABS
 
+pytestmark = pytest.mark.needs("programs")  # answers run in processes of their own
+
 STEP = 6
 """Every sixth wrong answer of a lab is asked at once."""
 

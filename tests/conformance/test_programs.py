@@ -171,6 +171,7 @@ def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command
         verdicts(command, ["random.block"], 1.0)
 
 
+@pytest.mark.needs("programs")
 def test_a_program_that_has_answered_ends_by_itself(program, monkeypatch, tmp_path):
     """Also where its answer is there before the thread that wrote the request is done: it was killed then."""
     write = protocol._write

@@ -379,6 +379,7 @@ def test_integers_are_exact_whatever_the_options(executor_named, tmp_path, sched
     assert found.tobytes() == expected.tobytes()
 
 
+@pytest.mark.needs("programs")
 def test_a_library_is_compiled_once_for_a_compiler_and_a_processor(case, monkeypatch, tmp_path):
     monkeypatch.setenv("WAMNET_CACHE", str(tmp_path))
     artifact, calls = compile_program(case[0], "c"), []

@@ -62,6 +62,7 @@ def test_whatever_is_in_a_folder_goes_and_nothing_else(tree) -> None:
         assert [*Path(around).rglob("*")] == [outside, outside / "kept"]
 
 
+@pytest.mark.needs("programs")
 def test_folders_deeper_than_recursion_and_paths_go(tmp_path) -> None:
     """shutil.rmtree ended in a RecursionError here, with a renderer's report lost."""
     code = "import os\nfor _ in range(1500): os.mkdir('deep'); os.chdir('deep')"
@@ -76,6 +77,7 @@ def test_a_temporary_folder_may_be_gone_at_its_end() -> None:
     assert not folder.exists()
 
 
+@pytest.mark.needs("programs")
 def test_folders_of_killed_processes_go_and_those_of_running_ones_stay(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     code = (
@@ -173,6 +175,7 @@ def test_programs_are_built_where_they_run(tmp_path, monkeypatch) -> None:
         folders.new_temporary("test", programs=True)
 
 
+@pytest.mark.needs("programs")
 def test_a_file_system_without_programs_is_noticed(tmp_path) -> None:
     done = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "noexec", "tmpfs", tmp_path], capture_output=True, check=False

@@ -28,6 +28,7 @@ def model(frame):
     return wamnet.train(frame, frame, preset="short", steps=3, features=features, executor="numpy")
 
 
+@pytest.mark.needs("programs")
 def test_importing_it_imports_nothing_else():
     code = "import sys, wamnet; dir(wamnet); print('numpy' in sys.modules, 'typer' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -105,6 +106,7 @@ def test_training_is_the_references(frame, model):
         wamnet.train(frame, frame, preset="good")
 
 
+@pytest.mark.needs("programs")
 def test_a_kernel_is_compiled_saved_and_certified(tmp_path):
     model = Model(siren.init([27, 4, 4, 3], 2.0, 2.0, seed=5), ("color",), Window(3), Normalization())
     kernel = wamnet.compile(model, "c", schedule="tile:8")

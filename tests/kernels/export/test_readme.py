@@ -72,6 +72,7 @@ def agrees(made, folder):
     assert ("It reads `denoise/" in told) == reads(path)
 
 
+@pytest.mark.needs("programs")
 @pytest.mark.product
 @pytest.mark.product
 @pytest.mark.parametrize("variant", ["full", "whole8"])
@@ -81,6 +82,7 @@ def test_it_says_what_certify_does(target, where, schedule, variant, tmp_path):
     agrees(exported(target, where, schedule, variant=variant), tmp_path)
 
 
+@pytest.mark.needs("programs")
 @pytest.mark.parametrize("variant", ["full", "whole8"])
 @pytest.mark.parametrize("target", ["opencl", "c", "cuda", "glsl", "wgsl"])
 def test_it_says_so_of_the_target_s_own_sine(target, variant, tmp_path):
@@ -91,6 +93,7 @@ def test_it_says_so_of_the_target_s_own_sine(target, variant, tmp_path):
         agrees(made, tmp_path)
 
 
+@pytest.mark.needs("programs")
 def test_it_says_so_of_sines_of_another_degree(tmp_path):
     agrees(exported("c", "", "plain", variant="sine7"), tmp_path)
 
@@ -105,6 +108,7 @@ def test_it_says_which_file_is_a_translation_that_nobody_reads():
     assert "`denoise/denoise.dxc.hlsl`, `denoise/denoise.fxc.hlsl`: translated from it, and not read" in told
 
 
+@pytest.mark.needs("packages")
 @pytest.mark.parametrize(
     ("target", "options", "said"),
     [

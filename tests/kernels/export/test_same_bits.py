@@ -71,6 +71,7 @@ def insist(whole, network):
     assert verdict.digest == check.digest_of(held)
 
 
+@pytest.mark.needs("devices")
 @pytest.mark.product
 @pytest.mark.parametrize(("target", "place", "schedule"), WAYS)
 def test_every_target_place_and_schedule_has_the_reference_s_digest(target, place, schedule):
@@ -165,6 +166,7 @@ def test_a_graph_of_integers_has_phases_below_zero():
     assert found.tobytes() == by_definition(extreme, images).tobytes()
 
 
+@pytest.mark.needs("devices")
 @pytest.mark.parametrize("target", ["wgsl", "c", "glsl-es"])
 def test_weights_that_are_off_by_one_are_found(target):
     """Some of them: the phase that one moves may round to the same sine."""
@@ -179,6 +181,7 @@ def test_weights_that_are_off_by_one_are_found(target):
     assert verdict.wrong.endswith("where each bit is promised")
 
 
+@pytest.mark.needs("programs")
 def test_what_is_not_a_number_is_found():
     whole = made("c", model())
     broken = replace(whole.pair, output=np.full_like(whole.pair.output, np.nan))

@@ -56,6 +56,7 @@ def test_a_readme_gives_the_bytes_of_each_kernel():
     assert "* Speed" not in text
 
 
+@pytest.mark.needs("packages")
 def test_a_time_that_is_nothing_is_refused():
     with pytest.raises(InputError, match="--measure"):
         measure(export(Request(random_model(), "onnx")))

@@ -75,6 +75,7 @@ def test_a_missing_program_is_told(monkeypatch):
         TintRunner()
 
 
+@pytest.mark.needs("programs")
 def test_a_missing_package_is_told(monkeypatch, tmp_path):
     if tint_runner.shutil.which("node") is None:
         pytest.skip("no node; in Debian: apt-get install nodejs npm")

@@ -167,13 +167,12 @@ def test_the_schema_refuses_what_is_no_vector():
 
 
 def test_every_kind_says_what_its_fields_are():
-    for kind in KINDS.values():
-        for c in kind.make():
-            known = {re.sub(r"_l$", "_", name) if name.endswith("_l") else name for name in kind.inputs}
-            for side, fields in ((c.inputs, kind.inputs), (c.expected or {}, kind.outputs)):
+    for name, kind in KINDS.items():
+        for c in json.loads((vectors.FOLDER / f"{name}.json").read_text())["cases"]:
+            for side, fields in ((c["input"], kind.inputs), (c.get("expected", {}), kind.outputs)):
                 known = [re.compile(name[:-1] + r"\d+" if name.endswith("_l") else name) for name in fields]
                 unknown = [name for name in side if not any(p.fullmatch(name) for p in known)]
-                assert not unknown, f"{c.id}: the page of formats does not name {unknown}"
+                assert not unknown, f"{c['id']}: the page of formats does not name {unknown}"
 
 
 def test_bounds_are_finite_and_small():

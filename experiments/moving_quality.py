@@ -68,7 +68,7 @@ NETWORKS = {
 FEATURE_RAYS = {"shipped": (0, 4), "best-1": (0,)}
 """Camera rays of a pixel that a network's features are means over; 0: only the path's."""
 
-HEADS = ("picture", "PSNR, dB", "worst, dB", "SSIM", "FLIP")
+HEADS = ("image", "PSNR, dB", "worst, dB", "SSIM", "FLIP")
 """Columns of the table."""
 
 Pictures = Mapping[str, Callable[[Scene, int], Floats]]

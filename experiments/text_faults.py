@@ -216,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             row, wrong = planted(folder, options.count, options.seed)
             rows.append(row)
             accepted += wrong
-    heads = ["target", "schedule", "possible faults", "planted", "noticed", "more room only", "accepted"]
+    heads = ["target", "schedule", "possible defects", "seeded", "detected", "larger arrays only", "accepted"]
     print(markdown(heads, rows))
     return int(accepted > 0)
 

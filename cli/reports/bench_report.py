@@ -309,8 +309,8 @@ def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
 
 
 TABLE_HEADS = (
-    "form", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms", "spread",
-    "PSNR, dB", "lost, dB", "largest error", "bound, this frame", "bound, all frames",
+    "variant", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms", "spread",
+    "PSNR, dB", "PSNR loss, dB", "largest error", "bound, this frame", "bound, all frames",
 )  # fmt: skip
 """Columns of the table of speed against error."""
 

@@ -14,7 +14,7 @@ from .tables import markdown
 RECORD = "same-bits"
 """The record's name."""
 
-HEADS = ("by", "found", "options", "schedules", "equal", "floats that differ")
+HEADS = ("compiler or device", "version", "options", "schedules", "equal", "floats that differ")
 """Of the table."""
 
 

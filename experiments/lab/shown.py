@@ -54,7 +54,7 @@ def whole_pictures(records: Records) -> str:
     whole = ("one pipeline, moving", "whole picture")
     return printed.table(
         records["bench-pipeline"],
-        shows=lambda row: row["size"] == largest or row["way"].startswith(whole),
+        shows=lambda row: row["size"] == largest or row["method"].startswith(whole),
     )
 
 
@@ -283,7 +283,7 @@ def domain(records: Records) -> str:
             far = f"{values['distance']:.1f} ({values['threshold']:.1f})"
             count = f"{values['outside']} of {values['frames']}"
             found.append([record["configuration"], count, far, values["farthest"], lost])
-    heads = ["model: frames", "outside", "median distance (threshold)", "farthest off", "lost, dB"]
+    heads = ["model: frames", "outside", "median distance (threshold)", "largest distance", "PSNR loss, dB"]
     return tables.markdown(heads, found)
 
 
@@ -343,7 +343,7 @@ def bench(record: str) -> TableOf:
         }
         ordered = sorted(rows.items(), key=lambda item: item[1]["ms.median"])
         cells = [[BENCH[name], *(_short(row, key, forms[key]) for key in keys)] for name, row in ordered]
-        return tables.markdown(["by", *heads], cells)
+        return tables.markdown(["backend", *heads], cells)
 
     return made
 
@@ -360,20 +360,20 @@ def train_speed(records: Records) -> str:
         {"numpy": "the reference, NumPy", "torch": "PyTorch", "opencl": "compiled"},
     )
     rows: dict[str, list[str]] = {}
-    heads = ["by"]
+    heads = ["backend"]
     for at, preset in ((1, "paper"), (2, "short")):
         mine = [r["values"] for r in found.records() if r["values"]["table"] == at]
         steps = list(mine[0])[-1]
         heads += [f"`{preset}`, ms per step", f"all {steps}"]
         for row in mine:
-            rows.setdefault(names[row["by"]], []).extend([row["ms a step"], row[steps]])
+            rows.setdefault(names[row["backend"]], []).extend([row["ms per step"], row[steps]])
     return tables.markdown(heads, [[name, *row] for name, row in rows.items()])
 
 
 def paper_hours(records: Records) -> str:
     """Return the hours of the paper's data set, 1,100 frames of 2^20 pixels and 1,024 samples, by OpenCL."""
     rows = [r["values"] for r in records["bench-render-kernels"].records()]
-    (speed,) = (number(row["samples/s"]) for row in rows if row["by"].startswith("opencl"))
+    (speed,) = (number(row["samples/s"]) for row in rows if row["backend"].startswith("opencl"))
     return f"{1100 * 2**20 * 1024 / speed / 3600:.0f}"
 
 
@@ -382,7 +382,7 @@ def moving(by: str, way: str, column: str, digits: int) -> Callable[[Records], s
 
     def made(records: Records) -> str:
         rows = [r["values"] for r in records["bench-pipeline"].records()]
-        (found,) = (r for r in rows if (r.get("by"), r.get("way"), r.get("size")) == (by, way, "512x512"))
+        (found,) = (r for r in rows if (r.get("backend"), r.get("method"), r.get("size")) == (by, way, "512x512"))
         return f"{number(found[column]):.{digits}f}"
 
     return made

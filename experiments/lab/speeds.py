@@ -60,7 +60,7 @@ def short_rows(records: Records, record: str) -> list[list[str]]:
     shown: list[list[str]] = []
     for row in rows:  # of a kernel that is in front too, the first
         cells = dict(zip(heads, row, strict=True))
-        form, way = cells["form"].removesuffix(" *"), cells["executor, schedule"]
+        form, way = cells["variant"].removesuffix(" *"), cells["executor, schedule"]
         name = SPEED_SHORT.get((form, way))
         if name and all(name != other for other, *_ in shown):
             checked = source_verified(form, way, cells[SPEED_COLUMNS[-1]])
@@ -70,7 +70,7 @@ def short_rows(records: Records, record: str) -> list[list[str]]:
 
 def speed_short(record: str) -> TableOf:
     """Return these rows as a table."""
-    heads = ["by", "schedule", *SPEED_COLUMNS, "source verified"]
+    heads = ["backend", "schedule", *SPEED_COLUMNS, "source verified"]
     return lambda records: tables.markdown(heads, short_rows(records, record))
 
 

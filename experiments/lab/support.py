@@ -50,7 +50,7 @@ def matrix(records: Records) -> str:
                 hardware(row["executed on"]) if done else NOT,
                 schedules(mine),
                 schedules([other for other in mine if other["text"].startswith("computes it")]),
-                f"{_sum(faults, 'accepted')} of {_sum(faults, 'planted')}" if faults else NOT,
+                f"{_sum(faults, 'accepted')} of {_sum(faults, 'seeded')}" if faults else NOT,
             ]
         )
     return markdown(HEADS, cells)

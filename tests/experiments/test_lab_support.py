@@ -21,8 +21,8 @@ CERTIFIED = [
     {"target": "opencl", "schedule": "dot:16", "variant": "whole8", "text": "computes it: 2 sums"},
 ]
 FAULTS = [
-    {"target": "cuda", "planted": "60", "accepted": "1"},
-    {"target": "cuda", "planted": "5", "accepted": "0"},
+    {"target": "cuda", "seeded": "60", "accepted": "1"},
+    {"target": "cuda", "seeded": "5", "accepted": "0"},
 ]
 
 

@@ -85,7 +85,7 @@ def render(
     say_facts(NUMPY, f"{size}x{size}, {spp} spp, {depth} edges")
     for found in tables:
         last, last_s = found[-1].by, found[-1].times.median
-        head("scene", "by", "first frame, s", "s, median", "s, range", "samples/s", f"times {last}")
+        head("scene", "backend", "first frame, s", "s, median", "s, range", "samples/s", f"times {last}")
         for each in found:
             median = each.times.median
             row(
@@ -144,7 +144,7 @@ def primitives(
     scenes, numbers = names_of("--kinds", kinds, KINDS), counts_of("--counts", counts, "30,100")
     check_counts([size], spp=(spp, 4), repeats=(repeats, 5))
     say_facts(NUMPY, f"{size}x{size}, {spp} spp")
-    head("by", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
+    head("backend", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
     part = Part(size, size, 0, size, 0, spp, 0)
     with environment(paths.NO_CACHES):
         for name in given:

@@ -89,7 +89,7 @@ def pipeline(
     rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
     network = f"network {'-'.join(map(str, model.siren.widths))}"
     say_facts(NUMPY, f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)
-    head("by", "size", "way", "ms, median", "ms, range", "pictures/s", f"times {given[0]}, moving")
+    head("backend", "size", "method", "ms, median", "ms, range", "images/s", f"times {given[0]}, moving")
     notes: dict[str, None] = {}
     for size in widths:
         _show(_entries(given, others, model, scene, size, repeats, notes, feature_rays), size)

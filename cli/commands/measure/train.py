@@ -70,7 +70,7 @@ def train(
         work, most = training.operations(recipe), product.facts["operations"] / min(product.seconds)
         say("")
         say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {most / 1e9:.0f} GFLOP/s")
-        head("by", "ms a step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
+        head("backend", "ms per step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
         for entry in entries:
             median = entry.times.median
             row(

@@ -20,6 +20,7 @@ def rewrite(program: Program, rule: Rule) -> Program:
         args = tuple(moved[arg] for arg in node.args)
         builder.places = node.places
         index = rule(builder, node, args)
-        moved.append(builder.add(replace(node, args=args)) if index is None else index)
+        kept = node if args == node.args else replace(node, args=args)
+        moved.append(builder.add(kept) if index is None else index)
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     return replace(program, nodes=tuple(builder.nodes), outputs=outputs)

@@ -28,11 +28,11 @@ from ..kernel.interface import SUMS as SUMS_ARRAY
 from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
 from ..plan import sine_contract
 from ..proof import bounds
-from ..schedules.common import X, Y
+from ..schedules.common import X, Y, lets
 from ..targets import target_named
 from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
-from .plane_kernel import Draft, PlaneArtifact, compiled, lets, reads
+from .plane_kernel import Draft, PlaneArtifact, compiled, reads
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""

@@ -24,7 +24,7 @@ from ..kernel.interface import FIRST as FIRST_ARRAY
 from ..kernel.interface import FOLLOW, IMAGE, INTEGERS, MOTIONS, RESULT
 from ..kernel.interface import PAST as PAST_ARRAY
 from ..kernel.kernel import FLOAT, Array, Body, Expr, For, If, Kernel, Let, Store, apply, const, load, name
-from ..schedules.common import HEIGHT, WIDTH, X, Y, loop
+from ..schedules.common import HEIGHT, WIDTH, X, Y, lets, loop
 from .lower_history import (
     BEYOND,
     CAMERAS,
@@ -42,7 +42,7 @@ from .lower_history import (
     lower_history,
 )
 from .lower_smooth import THERE
-from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, lets, reads, role_facts
+from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, reads, role_facts
 
 SCHEMA = "wamnet-history-kernel-1"
 """Name and version of the manifest's form; described in spec/history.md."""

@@ -1,7 +1,7 @@
 """Kernels of one pixel, or several of a row, on images and planes: the filter, the history, the encoding.
 
-1. A builder makes a kernel [kernel/kernel.py] of traced programs: each is a statement an operation [`lets`],
-   between reads of what its inputs are and stores of its outputs.
+1. A builder makes a kernel [kernel/kernel.py] of traced programs: each is a statement an operation
+   [`common.lets`], between reads of what its inputs are and stores of its outputs.
 2. The kernel is printed in a language, or its programs are; a manifest says what was made [`compiled`].
 """
 
@@ -18,7 +18,7 @@ from ..artifact import OneSource
 from ..core import ir, profiles
 from ..core.ir import Image, Program
 from ..kernel.interface import Interface
-from ..kernel.kernel import Expr, Kernel, Let, Type, apply, const, name, splat
+from ..kernel.kernel import Expr, Kernel, Let
 from ..languages.renderer import Renderer, housed
 from ..schedules.schedules import PRINTED
 from ..targets import target_named
@@ -77,30 +77,6 @@ class Draft:
 def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = "") -> list[Let]:
     """Return the reads of elements, by name."""
     return [Let(f"{prefix}{each}", element(number)) for number, each in enumerate(names)]
-
-
-def lets(
-    program: Program, known: Mapping[str, Expr] | None = None, lanes: int = 1, prefix: str = "t"
-) -> tuple[list[Let], dict[str, Expr]]:
-    """Return a statement for each operation of a program, and its outputs.
-
-    Inputs are values of their names unless `known` has others.
-    """
-    values: list[Expr] = []
-    lines = []
-    for index, node in enumerate(program.nodes):
-        kind = Type(node.type.dtype)
-        if node.op == "input":
-            key = str(node["name"])
-            values.append((known or {}).get(key) or name(key, kind.of(lanes)))
-        elif node.op == "constant":
-            number: Any = node["value"]
-            values.append(splat(const(float(number) if kind == Type() else number, kind), lanes))
-        else:
-            value = apply(node.op, *(values[arg] for arg in node.args), value=node.get("dtype"))
-            lines.append(Let(f"{prefix}{index}", value, kept=True))
-            values.append(name(lines[-1].name, value.type))
-    return lines, {key: values[index] for key, index in program.outputs}
 
 
 def check_lanes(target: str, lanes: int, what: str, remedy: str) -> None:

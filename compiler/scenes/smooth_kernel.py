@@ -45,7 +45,7 @@ from ..kernel.kernel import (
 from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, loop
+from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
 from .encode_kernel import compile_encode
 from .lower_encode import SAMPLES, channel_name
 from .lower_smooth import (
@@ -61,7 +61,7 @@ from .lower_smooth import (
     lower_smooth,
 )
 from .lower_smooth import LIGHT as LIGHT_PLANES
-from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, lets, reads, role_facts
+from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, reads, role_facts
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""

@@ -9,6 +9,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
 
 from ...refimpl.errors import CompileError
 from ..core.ir import Gather, Image, Node, Program, users
@@ -93,6 +95,30 @@ def loop(counter: str, count: Expr | int, *body: Statement) -> For:
     return For(counter, expr(count), body)
 
 
+def lets(
+    program: Program, known: Mapping[str, Expr] | None = None, lanes: int = 1, prefix: str = "t"
+) -> tuple[list[Let], dict[str, Expr]]:
+    """Return a statement for each operation of a program, and its outputs.
+
+    Inputs are values of their names unless `known` has others.
+    """
+    values: list[Expr] = []
+    lines = []
+    for index, node in enumerate(program.nodes):
+        kind = Type(node.type.dtype)
+        if node.op == "input":
+            key = str(node["name"])
+            values.append((known or {}).get(key) or name(key, kind.of(lanes)))
+        elif node.op == "constant":
+            number: Any = node["value"]
+            values.append(splat(const(float(number) if kind == Type() else number, kind), lanes))
+        else:
+            value = apply(node.op, *(values[arg] for arg in node.args), value=node.get("dtype"))
+            lines.append(Let(f"{prefix}{index}", value, kept=True))
+            values.append(name(lines[-1].name, value.type))
+    return lines, {key: values[index] for key, index in program.outputs}
+
+
 Read = Callable[[int], Expr]
 """The expression of a value that another group has computed."""
 
@@ -102,8 +128,13 @@ class Nest:
 
     def __init__(self, program: Program, slots: Mapping[str, Slot], lanes: int = 1) -> None:
         self.program, self.slots, self.lanes = program, slots, lanes
-        self.gather, self.groups, self.readers = kernel_gather(program), groups_of(program), users(program)
+        self.groups, self.readers = groups_of(program), users(program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
+
+    @cached_property
+    def gather(self) -> Gather:
+        """Return how the window is filled."""
+        return kernel_gather(self.program)
 
     def window(self) -> list[Constant]:
         """Return the constants of the window."""

@@ -22,14 +22,17 @@ GUIDE, SMOOTH = "guide", "smooth"
 FOLLOW = "follow"
 """What the kernel of a history does: it adds a picture."""
 
+TRAIN = "train"
+"""What the kernel of a training step does: derivatives of a minibatch, and Adam."""
+
 PLAIN = "plain"
 """Name of the schedule that every target has: the kernel that is made to be read."""
 
 FULL = "full"
 """Name of the variant of a network that leaves nothing out [variants.py]."""
 
-READ, WRITE = "read", "write"
-"""What a kernel does with an array."""
+READ, WRITE, BOTH = "read", "write", "both"
+"""What a kernel does with an array; one that it reads and writes is memory of the device."""
 
 BUFFER, BLOCK, TABLE = "buffer", "uniform", "inline"
 """Homes of an array: memory, or a texture; a uniform block, or constant memory; a table in the source."""
@@ -63,6 +66,7 @@ INTEGERS: Mapping[str, tuple[str, ...]] = {
     GUIDE: ("width", "height", "row_stride"),
     SMOOTH: ("width", "height", "row_stride", "gap"),
     FOLLOW: ("width", "height", "row_stride"),
+    TRAIN: ("groups", "at", "step"),
 }
 """The integers that a kernel is given, in order, by role; a dialect may know some of them by itself."""
 
@@ -72,12 +76,17 @@ READ_NUMBER, WRITTEN_NUMBER, FIRST_IMAGE = 1, 2, 3
 
 @dataclass(frozen=True)
 class Array:
-    """An array of float32: `shape` in numbers, or in names of integers."""
+    """An array of float32, or of vectors of another kind: `shape` in numbers, or in names of integers.
+
+    An array of the role TRAIN has one index.
+    """
 
     name: str
     access: str
     shape: tuple[int | str, ...]
     home: str = BUFFER
+    dtype: str = "float32"
+    lanes: int = 1
 
     @property
     def is_image(self) -> bool:
@@ -117,6 +126,11 @@ class Interface:
     def written(self) -> tuple[Array, ...]:
         """Return the arrays that the kernel writes."""
         return tuple(array for array in self.arrays if array.access == WRITE)
+
+    @property
+    def both(self) -> tuple[Array, ...]:
+        """Return the arrays that the kernel reads and writes."""
+        return tuple(array for array in self.arrays if array.access == BOTH)
 
     @property
     def place(self) -> tuple[str, str]:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
-from .interface import Interface
+from .interface import READ, Interface
 
 Index = tuple["Expr", ...]
 
@@ -199,12 +199,13 @@ class Barrier:
 class Launch:
     """A grid of items, which start when all items of the previous launch have ended.
 
-    `place`: names of an item's column and row; `counts`: how many columns and rows there are.
+    `place`: names of an item's column and row, or of its column alone; `counts`: how many there are.
     """
 
-    place: tuple[str, str]
-    counts: tuple[Expr, Expr]
+    place: tuple[str, ...]
+    counts: tuple[Expr, ...]
     body: tuple[Statement, ...]
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -272,6 +273,18 @@ class Kernel:
     def launches(self) -> tuple[Launch, ...]:
         """Return the launches, of a kernel that is several of them."""
         return tuple(s for s in self.body if isinstance(s, Launch))
+
+    def interface_of(self, launch: Launch) -> Interface:
+        """Return the arrays and integers that a launch uses."""
+        every = [launch, *walk(launch.body)]
+        used = {
+            each.value for s in every for v in values(s) for each in parts(v) if each.op in ("load", "name")
+        }
+        stored = {s.array for s in every if isinstance(s, Store)}
+        integers = tuple(each for each in self.interface.integers if each in used)
+        arrays = [each for each in self.interface.arrays if each.name in used | stored]
+        found = [each if each.name in stored else replace(each, access=READ) for each in arrays]
+        return replace(self.interface, arrays=tuple(found), integers=integers)
 
     @property
     def shared(self) -> tuple[Array, ...]:

@@ -77,9 +77,10 @@ class Memory:
             self.reader = np.full(data.shape, NOBODY, np.int64)
 
     @classmethod
-    def of(cls, name: str, values: NDArray[Any], space: str) -> Memory:
-        """Return the memory of an array that a kernel is given."""
-        return cls(name, values.reshape(-1, 1), FLOAT, values.shape, space)
+    def of(cls, name: str, values: NDArray[Any], space: str, kind: Type = FLOAT) -> Memory:
+        """Return the memory of an array that a kernel is given; one of vectors has one index."""
+        sizes = values.shape if kind.lanes == 1 else (values.size // kind.lanes,)
+        return cls(name, values.reshape(-1, 1), kind, sizes, space)
 
     def columns(self, items: Items) -> Any:
         """Return the column of each item."""
@@ -210,6 +211,11 @@ class Memory:
             row, column, channel = np.unravel_index(int(np.argmin(written)), written.shape)
             raise KernelError(f"channel {channel} of pixel ({column}, {row}) of the result is never written")
         return data
+
+    def left(self) -> NDArray[Any]:
+        """Return the elements, one after another; floats that nothing has written are NaN."""
+        assert self.written is not None, "what is read and written notes what is written"
+        return np.where(self.written, self.data, np.nan if self.data.dtype.kind == "f" else 0)[:, 0]
 
 
 class Part:

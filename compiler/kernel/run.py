@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..core.ops import OPS
 from .domain import STORED, Domain, computed
 from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
+from .interface import Array as Declared
 from .kernel import (
     BATCH,
     FLOAT,
@@ -70,8 +71,9 @@ def run_on(
     with np.errstate(all="ignore"):
         runner = Runner(kernel, arrays, integers, domain or Domain())
         runner.body(kernel.body)
-    width, results = integers["width"], runner.results
-    return {a.name: results[a.name].image(bool(a.planes), width) for a in kernel.interface.written}
+    width, results = integers.get("width", 1), runner.results
+    found = {a.name: results[a.name].image(bool(a.planes), width) for a in kernel.interface.written}
+    return found | {key: memory.left() for key, memory in runner.both.items()}
 
 
 class Runner:
@@ -89,14 +91,15 @@ class Runner:
         self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
         self.numbers: dict[int, Values] = {}
-        self.items, places = self._items(integers["width"], integers[kernel.interface.rows])
+        self.items, places = self._items(integers.get("width", 1), integers.get(kernel.interface.rows, 1))
         self.names: dict[str, Values] = {**self.constants, **places}
         for key, number in integers.items():
             self.names[key] = np.uint32(number) if key in UNSIGNED else number
         self.memory: dict[str, Memory | Part] = {}
+        self.both = {each.name: self._updated(each, arrays, integers) for each in kernel.interface.both}
         for key, array in arrays.items():
-            weights = key == WEIGHTS
-            self.memory[key] = self._weights(array) if weights else Memory.of(key, domain.lift(array), "read")
+            self.memory[key] = self._weights(array) if key == WEIGHTS else self._read(key, array)
+        self.memory |= self.both
         self.results: dict[str, Memory] = {}
         for each in kernel.interface.written:
             shape = [size if isinstance(size, int) else integers[size] for size in each.shape]
@@ -125,6 +128,28 @@ class Runner:
         if self.kernel.group:
             places |= {"local_x": local_x, "local_y": local_y, "item": local_y * columns + local_x}
         return Items(x, y, row // rows * groups[0] + column // columns), places
+
+    def _read(self, key: str, array: NDArray[Any]) -> Memory:
+        """Return the memory of an array that is only read."""
+        declared = self.kernel.interface.named(key)
+        kind = Type(declared.dtype, declared.lanes) if declared else FLOAT
+        return Memory.of(key, self._lifted(array, kind), "read", kind)
+
+    def _lifted(self, array: NDArray[Any], kind: Type) -> NDArray[Any]:
+        """Return values of a kind as they are stored."""
+        return self.domain.lift(array) if kind.dtype == "float32" else np.array(array, STORED[kind.dtype])
+
+    def _updated(
+        self, declared: Declared, arrays: Mapping[str, NDArray[Any]], integers: Mapping[str, int]
+    ) -> Memory:
+        """Return the memory of an array that is read and written; nothing is written if none is given."""
+        kind, given = Type(declared.dtype, declared.lanes), arrays.get(declared.name)
+        if given is None:
+            given = np.zeros([each if isinstance(each, int) else integers[each] for each in declared.shape])
+            given = np.repeat(given, kind.lanes)
+        memory = Memory.of(declared.name, self._lifted(given, kind).flatten(), "device", kind)
+        memory.written = np.full(memory.data.shape, declared.name in arrays)
+        return memory
 
     def _weights(self, weights: NDArray[Any]) -> Memory:
         """Return the memory of the weights, which may be words bit by bit."""
@@ -259,10 +284,10 @@ class Runner:
 
     def _run_launch(self, statement: Launch) -> None:
         """Run a grid of items; for memory of the device they are one group, and the end is a barrier."""
-        outer, (across, down) = self.items, map(self.value, statement.counts)
+        outer, (across, down) = self.items, [*map(self.value, statement.counts), 1][:2]
         row, column = (each.ravel() for each in np.mgrid[:down, :across])
         self.items = Items(column, row, np.zeros(len(row), np.int64))
-        self.names |= dict(zip(statement.place, (column, row), strict=True))
+        self.names |= dict(zip(statement.place, (column, row), strict=False))
         self.body(statement.body)
         for memory in self.memory.values():
             memory.settle(np.ones(1, np.bool_))

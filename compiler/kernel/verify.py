@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import ir
 from ..core.ops import OPS, TypeRuleError
-from .interface import DENOISE, IMAGE, RESULT, UNSIGNED, WEIGHTS, WRITE
+from .interface import BOTH, DENOISE, IMAGE, READ, RESULT, UNSIGNED, WEIGHTS, WRITE
 from .kernel import (
     BATCH,
     BOOL,
@@ -114,7 +114,10 @@ class Verifier:
         for array in kernel.interface.arrays:
             if array.name != WEIGHTS:
                 sizes = tuple(each if isinstance(each, int) else None for each in array.shape)
-                self.declare(array.name, Declared(FLOAT, sizes, array.access == WRITE))
+                sizes = sizes if array.access != BOTH else (None,)
+                self.declare(
+                    array.name, Declared(Type(array.dtype, array.lanes), sizes, array.access != READ)
+                )
         if kernel.interface.role == DENOISE:
             self.declare(WEIGHTS, Declared(kernel.weights, (None,), False))
 
@@ -249,7 +252,8 @@ class Verifier:
         if not self.array(array).written:
             raise KernelError(f"{array} is written, which is read only")
         # Lanes of planes and images are pixels of a row, of which those beyond its end are not written.
-        pixels = self.kernel.interface.role != DENOISE and self.kernel.interface.named(array) is not None
+        named = self.kernel.interface.named(array)
+        pixels = self.kernel.interface.role != DENOISE and named is not None and named.access == WRITE
         self.element(array, statement.index, kind.of(1) if pixels else kind)
         if statement.add and (array == RESULT or kind.dtype not in ("float32", "int32", "uint32")):
             raise KernelError(f"a value of type {kind} is added to {array}")

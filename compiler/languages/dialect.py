@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..core.profiles import SineContract
 
 if TYPE_CHECKING:
-    from ..kernel.kernel import Kernel, Type
+    from ..kernel.kernel import Kernel, Launch, Type
 
 from ..kernel.interface import (
     BUFFER,
@@ -39,6 +39,7 @@ from ..kernel.interface import (
     PATH,
     SCENE_NUMBERS,
     SMOOTH,
+    TRAIN,
     Array,
     Interface,
 )
@@ -70,14 +71,15 @@ class Dialect:
     channel. A path kernel has `path_lanes` paths at once where the target's compiler chooses their number,
     which `at_once` describes; it takes `most_numbers` of a scene, and callers read `said_numbers`. `paints`:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
-    `scalars`: the types of single numbers.
+    `scalars`: the types of single numbers. `staged`: a launch is a program, which is compiled if STAGE is
+    its number. `numbers` makes the address of a vector that of its first number.
     """
 
     target: str
     language: str
     suffix: str
     entries: Mapping[str, str] = {
-        **{role: f"wamnet_{role}" for role in (DENOISE, ENCODE, GUIDE, SMOOTH, FOLLOW)},
+        **{role: f"wamnet_{role}" for role in (DENOISE, ENCODE, GUIDE, SMOOTH, FOLLOW, TRAIN)},
         PATH: "wamnet_trace",
     }
     integers: Mapping[str, tuple[str, ...]] = INTEGERS
@@ -132,6 +134,8 @@ class Dialect:
     group: tuple[int, int] | None = None
     largest_shared: int = 2**15
     grouped: Mapping[str, Any] = {}
+    staged: bool = False
+    numbers: str = ""
     vectors: Type | None = None
     launches: tuple[str, str, str] = ("", "", "")
     aligned: tuple[str, str] = ("", "")
@@ -268,7 +272,7 @@ class Dialect:
             found.append(self.shared_array.format(kind=kind, name=array.name, count=count))
         return found
 
-    def launched(self, place: tuple[str, str], counts: Sequence[str]) -> list[str]:
+    def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch, of a grid of so many columns and rows of items."""
         raise NotImplementedError
 
@@ -296,6 +300,10 @@ class Dialect:
     def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
         """Return the first lines of a function of values."""
         return f"{result} {name}({', '.join(f'{kind} {each}' for each, kind in takes)})\n{{"
+
+    def component(self, lane: int, lanes: int) -> str:
+        """Return the name of a component of a vector."""
+        return "xyzw"[lane]
 
     def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
         """Return the declaration of an array of vectors whose components are read by their own index."""

@@ -28,7 +28,7 @@ from ..kernel.interface import (
     Interface,
 )
 from ..kernel.interface import Array as Given
-from ..kernel.kernel import BATCH, Array, Kernel, values, walk
+from ..kernel.kernel import BATCH, Array, Kernel, Launch, values, walk
 from ..kernel.kernel import parts as inside
 from .dialect import Dialect, Parts
 
@@ -313,6 +313,7 @@ class GLSLCompute(GLSL):
     suffix = ".comp"
     group = (16, 8)
 
+    staged = True
     wait = "barrier();"
     max_output_channels = 4
     local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
@@ -381,9 +382,9 @@ class GLSLCompute(GLSL):
         size = f"textureSize({kernel.images[0].name}, 0)" if kernel else "imageSize(result)"
         return ["void main()", "{", f"    int width = {size}.x;", f"    int height = {size}.y;"]
 
-    def launched(self, place: tuple[str, str], counts: Sequence[str]) -> list[str]:
+    def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch; no item is beyond the grid, and none needs a branch."""
-        column, row = place
+        column, row = launch.place
         return [
             *self.opened(),
             f"    int {column} = int(gl_GlobalInvocationID.x);",

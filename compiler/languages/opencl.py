@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import OPENCL_SINE
 from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, Array, Interface
+from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
 from ..kernel.kernel import Kernel, Type
 from .c_path import MASKS
 from .dialect import Dialect, Parts
@@ -70,8 +70,9 @@ class OpenCL(Arguments):
         ENCODE: ("width", "height", "row_stride", "plane_stride", "sample_count"),
     }
     heading = "__kernel void {entry}"
-    reads = "__global const float *restrict {name}"
-    writes = "__global float *restrict {name}"
+    reads = "__global const {kind} *restrict {name}"
+    writes = "__global {kind} *restrict {name}"
+    numbers = "(__global float *)"
     long = "size_t"
     row_reader = OPENCL_ROW
     lanes = 1
@@ -149,6 +150,10 @@ class OpenCL(Arguments):
         line = f"    __global const {vector} *w = (__global const {vector} *)weights;"
         return [line] if kind.lanes > 1 else []
 
+    def component(self, lane: int, lanes: int) -> str:
+        """Return the name of a component of a vector."""
+        return super().component(lane, lanes) if lanes <= 4 else f"s{lane:x}"
+
     def mixed_address(self, name: str, index: str, kind: str) -> str:
         """Return the address of a vector of an array whose components are read by their own index."""
         return f"{name}.all + {index}"
@@ -184,9 +189,9 @@ class OpenCL(Arguments):
         return [f"#define LANES {self.lanes}", *super().top(kernel, parts), *painter]
 
     def fitted(self, kernel: Kernel) -> Dialect:
-        """Return the dialect for a kernel: a path kernel has operators in place of functions."""
+        """Return the dialect for a kernel: 16 lanes have operators in place of functions."""
         found = super().fitted(kernel)
-        if kernel.interface.role == PATH:
+        if kernel.interface.role in (PATH, TRAIN):
             lanes = int(kernel.step[0].value)
             vars(found).update(lanes=lanes, inside="if (left > 0) ")
             found.operations = {**self.operations, "minimum": "min({0}, {1})", "maximum": "max({0}, {1})"}

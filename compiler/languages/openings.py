@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..kernel.interface import DENOISE, PATH, UNSIGNED, WRITE, Array, Interface
-from ..kernel.kernel import Expr, Kernel, Type
+from ..kernel.interface import DENOISE, PATH, READ, UNSIGNED, Array, Interface
+from ..kernel.kernel import Expr, Kernel, Launch, Type
 from .dialect import Dialect, Parts
 
 IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
@@ -47,6 +47,8 @@ class Buffers(Dialect):
 
     def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
         """Return the lines of a kernel that is data, up to its first statement."""
+        if kernel.launches:
+            return self.top(interface, parts)
         along, down = (self.step(each) for each in kernel.step)
         names, limits = kernel.place, ("width", "height")
         column, row = (self.cast("int32", text) for text in self.item)
@@ -176,8 +178,22 @@ class Arguments(Buffers):
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""
+        return self.function(self.entries[kernel.role], kernel)
+
+    def function(self, entry: str, kernel: Interface) -> list[str]:
+        """Return the lines of a function of these arguments up to its brace."""
         listed = ",\n".join(f"    {each}" for each in self.listed(kernel))
-        return [f"{self.heading.format(entry=self.entries[kernel.role])}(", f"{listed})", "{"]
+        return [f"{self.heading.format(entry=entry)}(", f"{listed})", "{"]
+
+    def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
+        """Return the first lines of a launch, which is a function; items beyond the grid end."""
+        places = [*zip(launch.place, self.item, counts, strict=False)]
+        outside = " || ".join(f"{place} >= {count}" for place, _, count in places)
+        return [
+            *self.function(f"wamnet_{launch.name}", kernel.interface_of(launch)),
+            *(f"    {self.index(place, self.cast('int32', item))}" for place, item, _ in places),
+            *(f"    if ({outside}) {{", "        return;", "    }"),
+        ]
 
     def listed(self, kernel: Interface) -> list[str]:
         """Return all arguments."""
@@ -186,7 +202,8 @@ class Arguments(Buffers):
 
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""
-        return (self.writes if array.access == WRITE else self.reads).format(name=array.name)
+        kind = self.scalars[array.dtype] if array.lanes == 1 else self.vector_kind(array.dtype, array.lanes)
+        return (self.reads if array.access == READ else self.writes).format(kind=kind, name=array.name)
 
     def cast(self, dtype: str, text: str) -> str:
         """Return the text of a number converted to another kind."""

@@ -26,6 +26,7 @@ from ..kernel.interface import (
     READ,
     RESULT,
     TABLE,
+    TRAIN,
     WEIGHTS,
     Interface,
 )
@@ -128,6 +129,10 @@ class Renderer(Lines):
         self.integers = {each: self.dialect.integer(bound, each) for each in bound.integers if path}
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
         self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
+        if bound.role == TRAIN:
+            self.arrays |= {
+                a.name: Array(a.name, Type(a.dtype, a.lanes), (1,), "device") for a in bound.arrays
+            }
         self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
 
     def _narrower(self, array: str, kind: Type) -> bool:
@@ -147,8 +152,9 @@ class Renderer(Lines):
         top = "\n".join([*above, *functions])
         begin = dialect.begin(kernel.interface, Parts(top, self.bounded, kernel=kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
-        end = "#endif" if kernel.launches else dialect.ends[kernel.interface.role]
-        lines = [*dialect.first, *comment, begin, *self.lines, end]
+        end = ["#endif"] if dialect.staged else []
+        end = end if kernel.launches else [dialect.ends[kernel.interface.role]]
+        lines = [*dialect.first, *comment, begin, *self.lines, *end]
         return dialect.finished("\n".join(lines)) + "\n"
 
     def constant(self, constant: Constant) -> str:
@@ -215,7 +221,8 @@ class Renderer(Lines):
 
     def _component(self, value: Expr) -> tuple[str, int]:
         """Return one component of a vector."""
-        return f"{self.text(value.args[0], ATOM)}.{'xyzw'[value.value]}", ATOM
+        vector, (lanes,) = self.text(value.args[0], ATOM), {each.type.lanes for each in value.args}
+        return f"{vector}.{self.dialect.component(value.value, lanes)}", ATOM
 
     def _splat(self, value: Expr) -> tuple[str, int]:
         """Return a value in all lanes."""
@@ -306,9 +313,9 @@ class Renderer(Lines):
         return self.element(array, index, value.type.lanes), ATOM
 
     def given(self, array: str) -> Memory | None:
-        """Return an array of the interface, unless it is a denoiser's, which has words of its own."""
+        """Return an array of the interface, unless it is a denoiser's or a training step's."""
         interface = self.kernel.interface
-        return None if interface.role == DENOISE else interface.named(array)
+        return None if interface.role in (DENOISE, TRAIN) else interface.named(array)
 
     def _pixel(self, array: str, index: Sequence[Expr], lanes: int) -> str:
         """Return a channel of an image's pixel, all of its channels, or the value at a position of a row."""
@@ -335,10 +342,20 @@ class Renderer(Lines):
     def element(self, array: str, index: Sequence[Expr], lanes: int) -> str:
         """Return an element of an array of the kernel."""
         declared = self.arrays.get(array)
+        if declared and declared.space == "device" and self.dialect.numbers:
+            return self.address(array, index[0], array in self.mixed and lanes == 1)
         if declared and array in self.mixed:
             number = lanes < declared.type.lanes
             return self.dialect.mixed_element(array, self.text(index[0]), self.kind(declared.type), number)
         return array + "".join(f"[{self.text(each)}]" for each in index)
+
+    def address(self, array: str, place: Expr, number: bool) -> str:
+        """Return an element of memory of the device: what a loop does not change is an address of its own."""
+        memory = f"{self.dialect.numbers}{array}" if number else array
+        first, beyond = place.args if place.op == "add" else (place, place)
+        if beyond.op in ("const", place.op) or first is beyond:
+            return f"{f'({memory})' if number else memory}[{self.text(place)}]"
+        return f"({memory} + {self.text(first, 10)})[{self.text(beyond)}]"
 
     # ---- statements --------------------------------------------------------------------------------------
 
@@ -534,12 +551,13 @@ class Renderer(Lines):
         self._line(self.dialect.wait)
 
     def _write_launch(self, statement: Launch) -> None:
-        """Write a launch as a separate program, which is compiled if STAGE is its number."""
+        """Write a launch as a function, or as a program, which is compiled if STAGE is its number."""
         number = self.kernel.launches.index(statement)
-        counts = [self.text(each) for each in statement.counts]
+        counts = [self.text(each, 9) for each in statement.counts]
+        stage = f"#{'elif' if number else 'if'} STAGE == {number}"
         self.lines += [
-            f"#{'elif' if number else 'if'} STAGE == {number}",
-            *self.dialect.launched(statement.place, counts),
+            stage if self.dialect.staged else "",
+            *self.dialect.launched(self.kernel, statement, counts),
         ]
         self.depth = 1
         self.body(statement.body)

@@ -1,7 +1,7 @@
-"""The kernels of a training step for OpenCL: source, layout, and what they promise [`compile_step`].
+"""The kernel of a training step: its launches as data, their source, and what they promise [`compile_step`].
 
 1. Lower the reference's step and Adam [`lower_step.py`]; put the emitted sine and cosine in.
-2. Emit both kernels [`emit_step.py`], and those of a first layer of low rank [`emit_factors.py`].
+2. Build the launches: derivatives [derivatives.py], loss, factors and Adam [update.py].
 
 Profile `ieee`: any order of summation, fused multiply-add, emitted sine. What the derivatives of one step may
 be off is computed at given examples [`step.sum_errors`]. There is no bound for all weights that training may
@@ -10,20 +10,21 @@ reach: sine and cosine are proven only up to their domains, and beyond them the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ...refimpl.network.activation import SINE
 from ..core import ir
-from ..core.ir import Program
 from ..core.passes import pipeline
 from ..core.profiles import PROFILES
-from .emit_factors import factors_text
-from .emit_step import WindowForm, step_text, update_text
-from .lower_step import lower_adam, lower_step
-from .step import Split, Step
-from .step_layout import LANES, Slot, slots, transposed_slots
-from .vectors import Vectors
+from ..kernel.interface import BOTH, INTEGERS, READ, TRAIN, Array, Interface
+from ..kernel.kernel import Constant, Kernel, const
+from ..languages.renderer import Renderer
+from ..targets import target_named
+from .derivatives import Derivatives
+from .lower_step import lower_step
+from .step import SQUARES, Split, Step
+from .step_layout import LANES, slots, transposed_slots
+from .update import factors, loss, update
 
 FIRST = "W0"
 """Name of the first layer's matrix in a step."""
@@ -31,23 +32,11 @@ FIRST = "W0"
 
 @dataclass(frozen=True)
 class StepKernel:
-    """All kernels; `step` is the analysed one, `adam` the program of one number.
-
-    `places` are the slots of parameters, `copies` those of transposed matrices; `scratch_vectors` is the
-    memory of a work item.
-    """
+    """The launches of a step as data and as source; `step` is the analysed one."""
 
     source: str
     step: Step
-    adam: Program
-    places: Mapping[str, Slot]
-    copies: Mapping[str, Slot]
-    scratch_vectors: int
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names the kernels."""
-        return ir.sha256(self.source.encode())
+    kernel: Kernel
 
 
 def compile_step(
@@ -58,7 +47,7 @@ def compile_step(
     rank: int = 0,
     activation: str = SINE,
 ) -> StepKernel:
-    """Return the kernels that train layers of `widths` on windows of `size` x `size` pixels.
+    """Return the kernel that trains layers of `widths` on windows of `size` x `size` pixels.
 
     With a `rank` the factors of the first layer are what is trained.
     """
@@ -69,20 +58,38 @@ def compile_step(
 
 
 def compile_lowered(step: Step, size: int) -> StepKernel:
-    """Return the kernels of a step; its window has `size` runs."""
-    dialect = Vectors(LANES)
-    emitted = replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes))
-    operations = {node.op for node in emitted.program.nodes}
-    helpers = list(dict.fromkeys(text for op, text in dialect.helpers.items() if op in operations))
-    (n_in,) = next(node.type.shape for node in step.program.nodes if node.op == "input")
-    form = WindowForm(size, n_in // size)
-    text, scratch_vectors = step_text(emitted, form, dialect, helpers)
-    adam = lower_adam()
+    """Return the kernel of a step; its window has `size` runs."""
+    dialect = target_named("opencl").dialect
+    assert dialect is not None
+    kernel = step_kernel(step, size)
     header = (
-        "/*\n * wamnet training step, OpenCL C 1.2. Generated: change the compiler, not this text.\n"
-        f" * program   {ir.digest(step.program)[:32]}\n */\n"
+        f"wamnet training step, {dialect.language}. Generated: change the compiler, not this text.",
+        f"program   {ir.digest(step.program)[:32]}",
     )
-    source = header + text + "\n" + update_text(step, adam, dialect)
-    if step.split is not None:
-        source += "\n" + factors_text()
-    return StepKernel(source, step, adam, slots(step), transposed_slots(step), scratch_vectors)
+    return StepKernel(Renderer(dialect, kernel, False).source(header), step, kernel)
+
+
+def step_kernel(step: Step, size: int) -> Kernel:
+    """Return the kernel of a step; its window has `size` runs."""
+    first = Derivatives(replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes)), size)
+    copies = max((slot.end for slot in transposed_slots(step).values()), default=1)
+    count, end = slots(step)[SQUARES].offset, slots(step)[SQUARES].end
+    integers = {"BATCH": step.batch, "COUNT": count, "SUMS": end, "SCRATCH": first.vectors}
+    slopes, expand = factors(step)[:2], factors(step)[2:]
+    launches = first.launch(), *slopes, loss(step), update(step), *expand
+    arrays = (
+        Array("values", READ, ("values",)),
+        Array("targets", READ, ("targets",)),
+        Array("places", READ, (3 * step.batch,), dtype="int32"),
+        Array("rates", READ, ("rates",)),
+        Array("old", READ, (3 * count,), lanes=LANES),
+        Array("moved", BOTH, (3 * count,), lanes=LANES),
+        Array("transposed", BOTH, (copies,), lanes=LANES),
+        Array("scratch", BOTH, ("groups", first.vectors), lanes=LANES),
+        Array("sums", BOTH, ("groups", end), lanes=LANES),
+        Array("losses", BOTH, ("losses",)),
+        Array("failed", BOTH, (1,), dtype="int32"),
+    )
+    constants = tuple(Constant(key, const(value)) for key, value in integers.items())
+    interface = Interface(TRAIN, arrays, INTEGERS[TRAIN])
+    return Kernel(interface, launches, constants, step=(const(LANES), const(1)))

@@ -12,12 +12,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, welch_p
 
 from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
+from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
 from wamnet.compiler.training import lower_step, step, step_kernel
 from wamnet.compiler.training.step_kernel import StepKernel, compile_step
@@ -91,9 +93,8 @@ def tensors(state: TrainState) -> list[bytes]:
 
 def kernel_of(recipe: Recipe) -> StepKernel:
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
-    return compile_step(
-        recipe.layer_widths, omegas, recipe.batch, recipe.window.size, activation=recipe.activation
-    )
+    size, rank, activation = recipe.window.size, recipe.rank, recipe.activation
+    return compile_step(recipe.layer_widths, omegas, recipe.batch, size, rank, activation)
 
 
 def data_of(recipe: Recipe, pairs: Any = PAIRS) -> Dataset:
@@ -191,10 +192,10 @@ def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("s0_0 += d0;", "s0_0 += 0.0f * d0;"),
+        ("s0_0 += w0 * 1.0f;", ""),
         ("n < count", "n < filled"),
-        ("begins ? ", "1 ? "),
-        ("x0 += row[e + 0];", ""),
+        ("begin < first", "0"),
+        ("int x0 = corner[e] + dy * row[e];", "int x0 = corner[e];"),
         ("dy * row[n] + k", "k"),
     ],
     ids=["bias", "fill", "restart", "rows forwards", "rows backwards"],
@@ -285,7 +286,7 @@ adam_update = adam.update
 
 def test_copies_that_stay_behind_are_found(opencl: Any) -> None:
     """The backward pass reads transposed weights; without their update the second step is wrong."""
-    faulty = with_source(kernel_of(SMALL), ") transposed[", ") if (0) transposed[")
+    faulty = with_source(kernel_of(SMALL), "if (neuron", "if (0 && neuron")
     assert gradient_excess(opencl, SMALL, faulty) <= 1
     assert adam_excess(opencl, faulty) > 1
 
@@ -296,6 +297,38 @@ def test_planted_faults_in_adam_are_found(opencl: Any, monkeypatch: Any, fault: 
         patch.setattr(adam, "update", fault)
         faulty = kernel_of(SMALL)
     assert adam_excess(opencl, faulty) > 1
+
+
+@pytest.mark.parametrize("rank", [0, 4])
+def test_a_step_has_the_bits_of_its_kernel_in_numpy(opencl: Any, rank: int) -> None:
+    """NumPy fuses no product with a sum; where OpenCL may not either, every number is the same."""
+    recipe = replace(SMALL, batch=70, rank=rank)
+    data, kernel = data_of(recipe), kernel_of(recipe)
+    state = train.start(recipe, dataset.Normalization(), data.digest)
+    source = f"#pragma OPENCL FP_CONTRACT OFF\n{kernel.source}"
+    run = begin(opencl, recipe, replace(kernel, source=source), state, data)
+    old, transposed = (numbers_in(each) for each in (run.device._states[0], run.device._arrays["transposed"]))
+    places = run.draw(0, 1)
+    run.enqueue(places)
+    loss = run.settle()
+    given = {"values": data.values, "targets": data.targets, "places": places, "old": old}
+    given |= {"transposed": transposed, "losses": np.zeros(1), "failed": np.array([-1])}
+    given["rates"] = np.array([train.rate_at(recipe, 0), *adam.growth(1)])
+    flat = {key: np.ravel(value) for key, value in given.items()}
+    found = run_on(kernel.kernel, flat, {"groups": run.device._groups, "at": 0, "step": 0})
+    assert found["losses"] == [loss]
+    for key, buffer in {**run.device._arrays, "moved": run.device._states[1]}.items():
+        if key in ("moved", "transposed", "sums"):
+            ours = found[key]
+            assert np.array_equal(ours[~np.isnan(ours)], numbers_in(buffer)[~np.isnan(ours)]), key
+
+
+def numbers_in(buffer: Any) -> Any:
+    """Return the floats of a buffer of the device."""
+    found = np.empty(buffer.size // 4, np.float32)
+    with cl.CommandQueue(buffer.get_info(cl.mem_info.CONTEXT)) as queue:
+        cl.enqueue_copy(queue, found, buffer)
+    return found
 
 
 # ---- runs ------------------------------------------------------------------------------------------------
@@ -443,7 +476,7 @@ def test_an_interrupt_while_steps_are_handed_out(opencl: Any, monkeypatch: Any) 
 
     def interrupting(device: Any, *arguments: Any) -> None:
         load(device, *arguments)
-        update, calls = device._update, []
+        (update, *sizes), calls = device._launches[-1], []
 
         def interrupted(*numbers: Any) -> None:
             calls.append(1)
@@ -451,7 +484,7 @@ def test_an_interrupt_while_steps_are_handed_out(opencl: Any, monkeypatch: Any) 
                 raise KeyboardInterrupt
             update(*numbers)
 
-        device._update = interrupted
+        device._launches[-1] = (interrupted, *sizes)
 
     with monkeypatch.context() as patch:
         patch.setattr(OpenCLTrainer, "load", interrupting)

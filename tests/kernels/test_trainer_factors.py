@@ -141,14 +141,14 @@ def test_the_preset_s_derivatives_are_within_the_bound(opencl: Any, rank: int) -
 
 
 FAULTS = {
-    "a work item is forgotten": ("product[n * SUMS + ", "product[SUMS + "),
-    "a column is forgotten": ("RUN; ++k) {\n            slope +=", "RUN - 1; ++k) {\n            slope +="),
-    "another channel": ("theta + HORIZONTAL) + r", "theta + HORIZONTAL) + (r ^ 1)"),
-    "a row is forgotten": ("dy < ROWS && r < RANK", "dy < ROWS - 1 && r < RANK"),
-    "another neuron": ("vertical = theta[VERTICAL + (dy", "vertical = theta[VERTICAL - j + (dy"),
-    "a product that stays behind": ("theta[PRODUCT + row * NEURONS + j] = sum;", ""),
-    "a rank that is left out": ("r < RANK; ++r) {\n            sum", "r < RANK - 1; ++r) {\n            sum"),
-    "others are not summed": ("n < groups && i < FACTORS", "n < 1"),
+    "a work item is forgotten": ("all += sums[n * SUMS + ", "all += sums[SUMS + "),
+    "a column is forgotten": ("k < 15; ++k) {\n            slope +=", "k < 14; ++k) {\n            slope +="),
+    "another channel": (") * 16)[r];\n        }\n        (sums", ") * 16)[r ^ 1];\n        }\n        (sums"),
+    "a row is forgotten": ("dy < 5 && r < 4", "dy < 4 && r < 4"),
+    "another neuron": ("[j] * (old + ", "[j] * (old - j + "),
+    "a product that stays behind": ("(moved + (dy * 15 + k) * 3)[j] = slope;", ""),
+    "a rank that is left out": ("r < 4; ++r) {\n                s", "r < 3; ++r) {\n                s"),
+    "others are not summed": ("int end = i < ", "int end = 0 * i < 0 * "),
 }  # fmt: skip
 """A piece of the kernels' text, and what makes it wrong."""
 

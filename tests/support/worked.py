@@ -437,7 +437,7 @@ def train_bindings() -> list[str]:
     source = compile_step((12, 20, 3), (1.0, 1.0), 32, 2).source
     found = [
         re.sub(r"\n +", "\n    ", match)
-        for match in re.findall(r"(?ms)^(?:__kernel [^\n]*\n)?(?:__kernel )?void wamnet_\w+\(.*?\)", source)
+        for match in re.findall(r"(?ms)^__kernel void wamnet_\w+\(.*?\)", source)
     ]
     return ["```c", *found, "```"]
 

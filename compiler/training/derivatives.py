@@ -1,0 +1,286 @@
+"""The first launch of a training step: the sums of each work item, scheduled for processors.
+
+1. A work item works by itself on a part of the minibatch, TILE examples at a time. The value of a node for
+   these examples is vectors in memory of its own [`Derivatives.place`].
+2. An affine map is done for EXAMPLES examples at once: every weight that is loaded meets all; the sums
+   stay in registers [`Derivatives.affine`]. Windows are read from the images, without a copy.
+3. A sum over examples of left right^T is done for some inputs at once [`Derivatives.sum`]: its part for
+   these stays in registers while the examples go by. Sums continue from tile to tile.
+4. Neighbouring elementwise nodes share a loop. One operation on a value that is kept is computed again in
+   each loop that reads it: an array would cost more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+from ...refimpl.errors import CompileError
+from ..core.ir import Node
+from ..core.ops import OPS
+from ..kernel.kernel import (
+    FLOAT,
+    INT,
+    WORD,
+    Array,
+    Block,
+    Body,
+    Comment,
+    Expr,
+    For,
+    If,
+    Launch,
+    Let,
+    Statement,
+    Store,
+    apply,
+    const,
+    lanes,
+    load,
+    name,
+    splat,
+)
+from ..schedules.common import Nest, loop
+from .step import TARGET, WINDOW, Step, Sum
+from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for
+
+TILE = 64
+"""Examples that a work item holds at once: their values (19 arrays of 8 KiB for the presets) stay in the
+second-level cache, and the sums in registers are stored once for so many."""
+
+EXAMPLES = 8
+"""Examples of an affine map in registers: with two vectors of neurons 16 sums, enough to hide the latency."""
+
+REGISTERS = 24
+"""Vectors of sums in registers, of AVX-512's 32: the rest is for what they are made of."""
+
+BLOCK = 4
+"""Vectors of neurons in registers at once; wider layers are done block by block."""
+
+INPUTS = 12
+"""Inputs of a sum of products in registers at once; 12 divides the runs of all presets' windows."""
+
+VECTOR = FLOAT.of(LANES)
+"""So many numbers, which are neighbours in memory."""
+
+ZERO = splat(const(0.0), LANES)
+"""What a sum starts with."""
+
+RUNNING = load("failed", 0, kind=INT) < 0
+"""Whether all losses so far were finite."""
+
+GROUPS, GROUP, E, J, K, N, DY = map(name, ("groups", "group", "e", "j", "k", "n", "dy"))
+BATCH, BEGIN, FIRST, LAST, COUNT, OWN, SUM = map(
+    name, ("BATCH", "begin", "first", "last", "count", "own", "sum")
+)
+
+
+class _Rows(NamedTuple):
+    """Where numbers of examples are: an array, the rows of each, and where row `dy` of one begins."""
+
+    array: str
+    rows: int
+    start: Callable[[Expr], Expr]
+
+
+class Derivatives(Nest):
+    """Builds the launch; `size` is the number of rows of the window, `vectors` the memory of a work item."""
+
+    def __init__(self, step: Step, size: int) -> None:
+        self.copies = transposed_slots(step)
+        self.places = {**slots(step), **self.copies}
+        super().__init__(step.program, {}, LANES)
+        self.step, self.size, self.vectors = step, size, 0
+        self.outputs = dict(self.program.outputs)
+        self.arrays: dict[int, int] = {}
+        for index, node in enumerate(self.program.nodes):
+            vector = OPS[node.op].elementwise and node.type.shape
+            if not vector and node.op not in ("constant", "parameter", "input", "affine"):
+                raise CompileError(f"%{index} {node.op} : {node.type} has no schedule in a training kernel")
+            if index in self.group_of and self.is_array(index) and not self.again(index):
+                self.arrays[index] = self.vectors
+                self.vectors += TILE * self.width(index)
+
+    def launch(self) -> Launch:
+        """Return the launch."""
+        begin, last = (BATCH // GROUPS * g + BATCH % GROUPS * g // GROUPS for g in (GROUP, GROUP + 1))
+        example, positions = apply("minimum", FIRST + E, LAST - 1), enumerate(("corner", "row", "target"))
+        found = {each: load("places", BATCH * at + name("example"), kind=INT) for at, each in positions}
+        read = [Store(each, (E,), place) for each, place in found.items()]
+        tile: list[Statement] = [
+            Comment("Where the examples lie; those that fill up the last ones are not added up."),
+            Let("count", apply("minimum", const(TILE), LAST - FIRST)),
+            Let("filled", (COUNT + (EXAMPLES - 1)) // EXAMPLES * EXAMPLES),
+            *(Array(each, INT, (TILE,)) for each in found),
+            loop("e", name("filled"), Let("example", example), *read),
+        ]
+        for group in self.groups:
+            tile += self.of_group(group)
+        for known in self.step.sums:
+            tile += self.sum(known)
+        part = {"begin": begin, "last": last, "own": GROUP * name("SCRATCH"), "sum": GROUP * name("SUMS")}
+        tiles = For("first", LAST, tuple(tile), start=BEGIN, step=const(TILE))
+        body = If(RUNNING, (*(Let(each, value) for each, value in part.items()), tiles))
+        return Launch(("group",), (GROUPS,), (body,), "step")
+
+    # ---- values ------------------------------------------------------------------------------------------
+
+    def is_window(self, index: int) -> bool:
+        """Return whether a value is the window, which is where the images are."""
+        node = self.program.nodes[index]
+        return node.op == "input" and node["name"] == WINDOW
+
+    def is_array(self, index: int) -> bool:
+        """Return whether a value is kept for all examples of a tile: something outside its loop reads it."""
+        outside = any(self.group_of[reader] != self.group_of[index] for reader in self.readers[index])
+        return not self.is_window(index) and (outside or index in self.outputs.values())
+
+    def again(self, index: int) -> bool:
+        """Return whether other loops compute a value again: one operation on one value that is kept."""
+        node = self.program.nodes[index]
+        read = {arg for arg in node.args if self.program.nodes[arg].op not in ("constant", "parameter")}
+        cheap = OPS[node.op].elementwise and len(read) == 1 and read <= self.arrays.keys()
+        return cheap and index not in self.outputs.values()
+
+    def width(self, index: int) -> int:
+        """Return the vectors of a value."""
+        return vectors_for(self.program.nodes[index].type.shape[0])
+
+    def place(self, index: int, example: Expr, vector: Expr | int) -> Expr:
+        """Return where a vector of a value of an example is."""
+        return OWN + self.arrays[index] + example * self.width(index) + vector
+
+    def parameter(self, key: object, vector: Expr | int) -> Expr:
+        """Return a vector of a parameter."""
+        array = "transposed" if key in self.copies else "old"
+        return load(array, const(self.places[str(key)].offset) + vector, kind=VECTOR)
+
+    def read(self, index: int) -> Expr:
+        """Return vector j of a value of example e that another loop has computed."""
+        node = self.program.nodes[index]
+        if node.op == "parameter":
+            return self.parameter(node["name"], J)
+        if self.again(index):
+            return self._value(node, {}, self.read, LANES)
+        if index not in self.arrays:
+            raise CompileError(f"%{index}: only affine maps may read the window in a training kernel")
+        return load("scratch", self.place(index, E, J), kind=VECTOR)
+
+    def numbers(self, index: int) -> _Rows:
+        """Return where the numbers of a value of an example are: the window's are rows of an image."""
+        if self.is_window(index):
+            corner, row = (partial(load, array, kind=INT) for array in ("corner", "row"))
+            return _Rows("values", self.size, lambda n: corner(n) + DY * row(n))
+        return _Rows("scratch", 1, lambda n: self.place(index, n, 0) * LANES)
+
+    # ---- nodes -------------------------------------------------------------------------------------------
+
+    def of_group(self, group: tuple[int, ...]) -> list[Statement]:
+        """Return the statements of one group."""
+        index, node = group[0], self.program.nodes[group[0]]
+        if node.op == "affine":
+            return self.affine(index, node)
+        lines: list[Statement] = []
+        if node.op != "input":
+            for let, each in zip(self.statements(group, self.read, LANES), group, strict=True):
+                kept = (
+                    Store("scratch", (self.place(each, E, J),), name(let.name, VECTOR))
+                    if each in self.arrays
+                    else None
+                )
+                lines += [let, kept] if kept else [let]
+            lines = [self.span(group), loop("e", name("filled"), loop("j", self.width(index), *lines))]
+        elif node["name"] == TARGET:
+            (count,) = node.type.shape
+            i = name("i")
+            target = load("target", E, kind=INT) * count + apply("minimum", i, const(count - 1))
+            value = apply("select", i < count, load("targets", target), const(0.0))
+            copy = Store("scratch", (self.place(index, E, 0) * LANES + i,), value)
+            lines = [Comment(f"%{index}: the targets")]
+            lines.append(loop("e", name("filled"), loop("i", self.width(index) * LANES, copy)))
+        return lines
+
+    def affine(self, index: int, node: Node) -> list[Statement]:
+        """Return v = W x + b for EXAMPLES examples at once, BLOCK vectors of neurons at a time."""
+        slot, bias = self.places[str(node["weight"])], node.get("bias")
+        source = self.numbers(node.args[0])
+        run, i = slot.rows // source.rows, name("i")
+        found: list[Statement] = [self.mapped(index, node)]
+        for block in _blocks(slot):
+            examples = range(EXAMPLES if len(block) * EXAMPLES <= REGISTERS else EXAMPLES // 2)
+            keys = [(n, j) for n in examples for j in block]
+            first = {j: self.parameter(bias, j) if bias else ZERO for j in block}
+            weights = {j: self.parameter(slot.name, (DY * run + i) * slot.vectors + j) for j in block}
+            numbers = [load(source.array, name(f"x{n}") + i) for n in examples]
+            inner = loop("i", run, *_products(weights, numbers))
+            body: Body = (
+                *(Array(f"s{n}_{j}", VECTOR, value=first[j]) for n, j in keys),
+                loop("dy", source.rows, *(Let(f"x{n}", source.start(E + n)) for n in examples), inner),
+                *(Store("scratch", (self.place(index, E + n, j),), _register(n, j)) for n, j in keys),
+            )
+            found.append(For("e", name("filled"), body, step=const(len(examples))))
+        return found
+
+    def sum(self, known: Sum) -> list[Statement]:
+        """Return the addition of the tile's examples to one sum, for some inputs at once."""
+        left, slot = self.outputs[known.left], self.places[known.parameter]
+        title, right = f"sum of %{left}", _Rows("", 1, lambda n: const(0))
+        if known.right is not None:
+            right = self.numbers(self.outputs[known.right])
+            title += f" x %{self.outputs[known.right]}"
+        run, found = slot.rows // right.rows, list[Statement]()
+        for block in _blocks(slot):
+            inputs = min(INPUTS, REGISTERS // len(block))
+            whole, rest = run // inputs * inputs, run % inputs
+            if whole:
+                every = self.part(slot, block, left, right, inputs)
+                found.append(For("k", const(whole), every, step=const(inputs)))
+            if rest:
+                found.append(Block((Let("k", const(whole)), *self.part(slot, block, left, right, rest))))
+        return [Comment(f"{title}: {known.parameter}"), loop("dy", right.rows, *found)]
+
+    def part(self, slot: Slot, block: range, left: int, right: _Rows, inputs: int) -> Body:
+        """Return the addition to a sum for so many inputs from k on; without an array, of `left` alone."""
+        keys = [(i, j) for i in range(inputs) for j in block]
+        row = DY * (slot.rows // right.rows) + K
+        to = {(i, j): (SUM + slot.offset + (row + i) * slot.vectors + j,) for i, j in keys}
+        terms = {j: load("scratch", self.place(left, N, j), kind=VECTOR) for j in block}
+        numbers = [load(right.array, name("from") + i) if right.array else const(1.0) for i in range(inputs)]
+        before = (Store(f"s{i}_{j}", (), load("sums", *to[i, j], kind=VECTOR)) for i, j in keys)
+        return (
+            *(Array(f"s{i}_{j}", VECTOR, value=ZERO) for i, j in keys),
+            If(BEGIN < FIRST, tuple(before)),
+            loop("n", COUNT, Let("from", right.start(N) + K), *_products(terms, numbers)),
+            *(Store("sums", to[i, j], _ended(slot, j, _register(i, j))) for i, j in keys),
+        )
+
+
+def _register(row: int, vector: int) -> Expr:
+    """Return a sum that is in registers."""
+    return name(f"s{row}_{vector}", VECTOR)
+
+
+def _products(vectors: dict[int, Expr], numbers: list[Expr]) -> list[Statement]:
+    """Return the products of some vectors with some numbers, each added to a sum of its own."""
+    adds = [
+        Store(f"s{n}_{j}", (), name(f"w{j}", VECTOR) * splat(number, LANES), add=True)
+        for n, number in enumerate(numbers)
+        for j in vectors
+    ]
+    return [*(Let(f"w{j}", vector) for j, vector in vectors.items()), *adds]
+
+
+def _blocks(slot: Slot) -> list[range]:
+    """Return the vectors of neurons that are in registers at once."""
+    return [range(first, min(first + BLOCK, slot.vectors)) for first in range(0, slot.vectors, BLOCK)]
+
+
+def _ended(slot: Slot, vector: int, value: Expr) -> Expr:
+    """Return a vector of a row with zeros beyond the row's end."""
+    left = slot.width - vector * LANES
+    return (
+        value
+        if left >= LANES
+        else apply("select", lanes(LANES) < splat(const(left, WORD), LANES), value, ZERO)
+    )

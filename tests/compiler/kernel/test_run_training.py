@@ -1,0 +1,151 @@
+"""A training step in NumPy: sums within their bounds, Adam's bits, and what wrong kernels do with memory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.kernel.run import run_on
+from wamnet.compiler.kernel.verify import KernelError
+from wamnet.compiler.training import derivatives, step
+from wamnet.compiler.training.lower_step import ADAM_INPUTS, lower_adam
+from wamnet.compiler.training.step_kernel import compile_step
+from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
+from wamnet.refimpl.network import adam, factored
+from wamnet.refimpl.network.factored import Factors
+
+WIDTHS, SIZE, BATCH, GROUPS = (2 * 2 * 3, 18, 5, 3), 2, 39, 2
+"""Layers of less than one vector and of more; 19 and 20 examples for each of two items."""
+
+
+@pytest.fixture(autouse=True)
+def small_tiles(monkeypatch):
+    """Let each item have two tiles, of which the second is not full."""
+    monkeypatch.setattr(derivatives, "TILE", 16)
+
+
+def made(rank=0):
+    """Return the kernel and its step, arrays of random numbers, and the examples in them."""
+    random, found = np.random.default_rng(rank + 1), compile_step(WIDTHS, (1.0, 3.0), BATCH, SIZE, rank)
+    corner, row = 3 * random.integers(0, 50, BATCH), 3 * random.integers(2, 9, BATCH)
+    values, targets = random.uniform(-1, 1, 230), random.uniform(0, 1, (40, 3))
+    target, trained, copies = (
+        random.integers(0, 40, BATCH),
+        trained_of(found.step),
+        transposed_slots(found.step),
+    )
+    theta, m, v = (
+        {key: random.uniform(low, 1, (slot.width, slot.rows)) for key, slot in trained.items()}
+        for low in (-1, -1, 0)
+    )
+    arrays = {
+        "values": values.astype(np.float32),
+        "targets": targets.astype(np.float32).ravel(),
+        "places": np.concatenate([corner, row, target]),
+        "rates": np.array([0, 0, 0, 1e-3, *adam.growth(7)], np.float32),
+        "old": np.concatenate([pack(trained, each) for each in (theta, m, v)]),
+        "transposed": pack(copies, {key: theta[key.removesuffix(step.TRANSPOSED)].T for key in copies}),
+        "losses": np.zeros(2, np.float32),
+        "failed": np.array([-1]),
+    }
+    taps = corner[:, None, None] + row[:, None, None] * np.arange(SIZE)[:, None] + np.arange(6)
+    examples = arrays["values"][taps].reshape(BATCH, -1), targets.astype(np.float32)[target]
+    return found, arrays, examples
+
+
+def trained_of(found):
+    return {key: slot for key, slot in slots(found).items() if key != step.SQUARES}
+
+
+def ran(kernel, arrays):
+    """Return what step 7 leaves, the second of its block."""
+    return run_on(kernel, arrays, {"groups": GROUPS, "at": 1, "step": 7})
+
+
+def summed(found, sums):
+    """Return the sums of both items by name; those of factors and of their product are one already."""
+    both, places = sums.reshape(GROUPS, -1, LANES).copy(), slots(found)
+    for key in (found.split.parameter, *found.split.factors) if found.split else ():
+        both[1, places[key].offset : places[key].end] = 0
+    return unpack(places, both[0] + both[1])
+
+
+def factors_of(arrays):
+    vertical, horizontal = (arrays[key].astype(np.float64) for key in step.factor_names("W0"))
+    return Factors(vertical.reshape(len(vertical), SIZE, -1), horizontal)
+
+
+@pytest.mark.parametrize("rank", [0, 2])
+def test_a_step(rank):
+    """TRK-2, TRK-3: sums. TRK-5: their loss, Adam of them to the bit, the copies. TRK-8: factors, product."""
+    made_step, arrays, examples = made(rank)
+    found, trained = made_step.step, trained_of(made_step.step)
+    left = ran(made_step.kernel, arrays)
+    sums, places = summed(found, left["sums"]), slots(found)
+    before, after = (
+        [unpack(trained, part) for part in state.reshape(3, -1)] for state in (arrays["old"], left["moved"])
+    )
+    at = step.with_parameters(
+        found, {key: before[0][key].reshape(found.program.parameters[key].shape) for key in found.trained}
+    )
+    exact, bound = step.sums(at, *examples), step.sum_errors(at, *examples)
+    for key, error in bound.items():
+        assert np.all(np.abs(sums[key].reshape(exact[key].shape) - exact[key]) <= error), key
+    assert left["losses"][0] == 0
+    assert abs(left["losses"][1] * 3 * BATCH / exact[step.SQUARES].sum() - 1) <= 1e-5
+    assert left["failed"] == [-1]
+    for key in trained.keys() - ({"W0"} if rank else set()):
+        state = (before[0][key], sums[key], before[1][key], before[2][key], *arrays["rates"][3:])
+        wanted = interpret(lower_adam(), dict(zip(ADAM_INPUTS, state, strict=True)), np.float32)
+        for number, each in enumerate(("theta", "m", "v")):
+            assert np.array_equal(after[number][key], wanted[each]), (key, each)
+    copies = unpack(transposed_slots(found), left["transposed"])
+    assert all(np.array_equal(copies[key], after[0][key.removesuffix(step.TRANSPOSED)].T) for key in copies)
+    padded = left["sums"].reshape(GROUPS, -1)[0]
+    assert np.array_equal(pack(places, unpack(places, padded)), padded)
+    if rank:
+        old, new = factors_of(before[0]), factors_of(after[0])
+        wanted = factored.backward(old, exact["W0"])
+        errors = step.factor_errors(old, exact["W0"], bound["W0"])
+        slopes = factors_of(sums)
+        assert np.all(np.abs(slopes.vertical - wanted.vertical) <= errors.vertical)
+        assert np.all(np.abs(slopes.horizontal - wanted.horizontal) <= errors.horizontal)
+        assert np.all(np.abs(after[0]["W0"] - factored.expand(new)) <= step.expansion_error(new))
+
+
+def test_a_loss_that_is_not_finite_leaves_its_step():
+    """TRK-6: the parameters are not written, by this step or by a later one."""
+    found, arrays, _ = made()
+    left = ran(found.kernel, {**arrays, "targets": np.full(120, np.inf, np.float32)})
+    assert (left["failed"], np.isnan(left["moved"]).all()) == ([7], True)
+    later = ran(found.kernel, {**arrays, "failed": left["failed"]})
+    assert (later["failed"], np.isnan(later["moved"]).all(), later["losses"][1]) == ([7], True, 0)
+
+
+def without(kernel, launch):
+    return replace(kernel, body=tuple(each for each in kernel.body if each.name != launch))
+
+
+def smaller(kernel, constant, by=1):
+    """Return a kernel with one of its integers smaller."""
+    constants = (replace(c, value=c.value - by * (c.name == constant)) for c in kernel.constants)
+    return replace(kernel, constants=tuple(constants))
+
+
+WRONG = {
+    "no derivatives": (lambda k: without(k, "step"), "sums is read before it is written"),
+    "another item's sums": (lambda k: smaller(k, "SUMS"), "one element of sums|reads sums where another"),
+    "another item's values": (lambda k: smaller(k, "SCRATCH"), "one element of scratch|reads scratch where"),
+    "another minibatch": (lambda k: smaller(k, "BATCH", -1), "index 117 is beyond places, which has 117"),
+    "a shorter state": (lambda k: smaller(k, "COUNT", -1), "is beyond old"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_kernels_are_found(change, message):
+    found, arrays, _ = made()
+    with pytest.raises(KernelError, match=message):
+        ran(change(found.kernel), arrays)

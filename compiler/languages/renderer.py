@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.lines import Lines
 from ..kernel.interface import (
     DENOISE,
     IMAGE,
@@ -114,7 +113,7 @@ def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32] = NO_WE
     return replace(kernel, interface=interface, tables=tables)
 
 
-class Renderer(Lines):
+class Renderer:
     """Prints one kernel in one language."""
 
     def __init__(
@@ -188,6 +187,18 @@ class Renderer(Lines):
         if result is not None:
             self._line(f"return {self.text(result)};")
         self.lines.append("}")
+
+    def _nest(self, head: str, body: Body) -> None:
+        """Write statements in braces."""
+        self._line(head)
+        self.depth += 1
+        self.body(body)
+        self.depth -= 1
+        self._line("}")
+
+    def _line(self, text: str) -> None:
+        """Write a line."""
+        self.lines.append("    " * self.depth + text)
 
     # ---- types -------------------------------------------------------------------------------------------
 
@@ -370,7 +381,8 @@ class Renderer(Lines):
 
     def _write_comment(self, statement: Comment) -> None:
         """Write a comment on a line of its own, after an empty one."""
-        self._comment(statement.text)
+        self.lines.append("")
+        self._line(f"/* {statement.text} */")
 
     def _write_let(self, statement: Let) -> None:
         """Write a value that never changes."""
@@ -513,9 +525,7 @@ class Renderer(Lines):
             self._line(self.dialect.unroll)
         start, count, step = (self.text(e) for e in (statement.start, statement.count, statement.step))
         until = f" && {self.text(statement.until, 4)}" if statement.until else ""
-        self._open(self.dialect.for_loop(statement.name, start, count + until, step))
-        self.body(statement.body)
-        self._close()
+        self._nest(self.dialect.for_loop(statement.name, start, count + until, step), statement.body)
 
     def _splits(self, statement: For) -> bool:
         """Return whether a loop chooses among results that no variable may choose of."""
@@ -526,25 +536,18 @@ class Renderer(Lines):
 
     def _write_break(self, statement: Break) -> None:
         """Write the end of a loop."""
-        self._open(f"if ({self.text(statement.condition)}) {{")
-        self._line("break;")
-        self._close()
+        for line in (f"if ({self.text(statement.condition)}) {{", "    break;", "}"):
+            self._line(line)
 
     def _write_if(self, statement: If) -> None:
         """Write a branch."""
-        self._open(f"if ({self.text(statement.condition)}) {{")
-        self.body(statement.body)
-        self._close()
+        self._nest(f"if ({self.text(statement.condition)}) {{", statement.body)
         if statement.otherwise:
-            self._open("else {")
-            self.body(statement.otherwise)
-            self._close()
+            self._nest("else {", statement.otherwise)
 
     def _write_block(self, statement: Block) -> None:
         """Write statements whose names end with them."""
-        self._open("{")
-        self.body(statement.body)
-        self._close()
+        self._nest("{", statement.body)
 
     def _write_barrier(self, statement: Barrier) -> None:
         """Write that all items of a group wait."""

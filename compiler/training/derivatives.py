@@ -93,6 +93,9 @@ class Derivatives(Nest):
         super().__init__(step.program, {}, LANES)
         self.step, self.size, self.vectors = step, size, 0
         self.outputs = dict(self.program.outputs)
+        (self.window,) = (
+            i for i, n in enumerate(self.program.nodes) if n.op == "input" and n["name"] == WINDOW
+        )
         self.arrays: dict[int, int] = {}
         for index, node in enumerate(self.program.nodes):
             vector = OPS[node.op].elementwise and node.type.shape
@@ -126,15 +129,10 @@ class Derivatives(Nest):
 
     # ---- values ------------------------------------------------------------------------------------------
 
-    def is_window(self, index: int) -> bool:
-        """Return whether a value is the window, which is where the images are."""
-        node = self.program.nodes[index]
-        return node.op == "input" and node["name"] == WINDOW
-
     def is_array(self, index: int) -> bool:
         """Return whether a value is kept for all examples of a tile: something outside its loop reads it."""
         outside = any(self.group_of[reader] != self.group_of[index] for reader in self.readers[index])
-        return not self.is_window(index) and (outside or index in self.outputs.values())
+        return index != self.window and (outside or index in self.outputs.values())
 
     def again(self, index: int) -> bool:
         """Return whether other loops compute a value again: one operation on one value that is kept."""
@@ -169,7 +167,7 @@ class Derivatives(Nest):
 
     def numbers(self, index: int) -> _Rows:
         """Return where the numbers of a value of an example are: the window's are rows of an image."""
-        if self.is_window(index):
+        if index == self.window:
             corner, row = (partial(load, array, kind=INT) for array in ("corner", "row"))
             return _Rows("values", self.size, lambda n: corner(n) + DY * row(n))
         return _Rows("scratch", 1, lambda n: self.place(index, n, 0) * LANES)

@@ -19,6 +19,7 @@ from typing import NamedTuple
 from ...refimpl.errors import CompileError
 from ..core.ir import Node
 from ..core.ops import OPS
+from ..core.passes.gradient import Sum
 from ..kernel.kernel import (
     FLOAT,
     INT,
@@ -42,7 +43,7 @@ from ..kernel.kernel import (
     splat,
 )
 from ..schedules.common import Nest, loop
-from .step import TARGET, WINDOW, Step, Sum
+from .step import TARGET, WINDOW, Step
 from .step_layout import LANES, Slot, slots, transposed_slots, vectors_for
 
 TILE = 64

@@ -2,7 +2,7 @@
 
 1. Trace the network and the squared error as refimpl writes them [`lower_step`]. The arrays that are traced
    stand for weights that change: each is filled with a number of its own, so that no two become one.
-2. Derive the backward pass [gradient.py] and simplify both.
+2. Derive the backward pass [core/passes/gradient.py] and simplify both.
 3. Trace Adam's update of one number [`lower_adam`]: learning rate and the growth of the means are inputs.
 """
 
@@ -21,9 +21,9 @@ from ...refimpl.network.siren import Siren
 from ...refimpl.network.train import squared_error
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
+from ..core.passes.gradient import Sum, gradient
 from ..core.trace import trace
-from .gradient import gradient
-from .step import SQUARES, TARGET, WINDOW, Step, Sum
+from .step import SQUARES, TARGET, WINDOW, Step
 
 OUTPUT, SLOPE = "output", "slope"
 """Outputs of the traced step: the network's value, and the derivative of the loss by it."""

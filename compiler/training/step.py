@@ -25,29 +25,18 @@ from ...refimpl.network import factored
 from ...refimpl.network.factored import Factors
 from ..core.interpret import interpret
 from ..core.ir import Program
+from ..core.passes.gradient import TRANSPOSED, Sum
 from ..core.profiles import EMITTED_COSINE, EMITTED_SINE, FLUSH
 from ..core.sums import gamma
 from ..proof.bounds import OUTWARD, Enclosure, enclose
 
 Array = NDArray[Any]
 
-TRANSPOSED = ".T"
-"""What the name of a transposed matrix ends in."""
-
 SQUARES = "squares"
 """The output and the sum of squared errors."""
 
 WINDOW, TARGET = "window", "target"
 """The program's inputs."""
-
-
-@dataclass(frozen=True)
-class Sum:
-    """The derivative by `parameter`: over the lanes, the sum of outputs left right^T, or of `left`."""
-
-    parameter: str
-    left: str
-    right: str | None = None
 
 
 def factor_names(parameter: str) -> tuple[str, str]:

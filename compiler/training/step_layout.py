@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ir import Program
-from .step import SQUARES, TRANSPOSED, Step
+from ..core.passes.gradient import TRANSPOSED
+from .step import SQUARES, Step
 
 LANES = 16
 """Numbers in a vector: the longest vectors that OpenCL has, one AVX-512 register, two of AVX2."""

@@ -15,6 +15,7 @@ from functools import partial, reduce
 
 import numpy as np
 
+from ..core.passes.gradient import TRANSPOSED
 from ..kernel.kernel import (
     FLOAT,
     Array,
@@ -35,7 +36,7 @@ from ..kernel.kernel import (
 from ..schedules.common import lets, loop
 from .derivatives import DY, GROUPS, RUNNING, VECTOR, ZERO, J, K, N
 from .lower_step import lower_adam
-from .step import SQUARES, TRANSPOSED, Step
+from .step import SQUARES, Step
 from .step_layout import LANES, slots, transposed_slots
 
 AT, COUNT, SUMS, R = map(name, ("at", "COUNT", "SUMS", "r"))

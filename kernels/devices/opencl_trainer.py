@@ -17,10 +17,11 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ...compiler.core.passes.gradient import TRANSPOSED
 from ...compiler.kernel.kernel import Kernel, Launch, const, substituted
 from ...compiler.kernel.sizes import integer
 from ...compiler.training.derivatives import TILE
-from ...compiler.training.step import SQUARES, TRANSPOSED
+from ...compiler.training.step import SQUARES
 from ...compiler.training.step_kernel import StepKernel
 from ...compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from ...refimpl.errors import InputError

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.core.passes.gradient import TRANSPOSED
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.training import derivatives, step
@@ -47,7 +48,7 @@ def made(rank=0):
         "places": np.concatenate([corner, row, target]),
         "rates": np.array([0, 0, 0, 1e-3, *adam.growth(7)], np.float32),
         "old": np.concatenate([pack(trained, each) for each in (theta, m, v)]),
-        "transposed": pack(copies, {key: theta[key.removesuffix(step.TRANSPOSED)].T for key in copies}),
+        "transposed": pack(copies, {key: theta[key.removesuffix(TRANSPOSED)].T for key in copies}),
         "losses": np.zeros(2, np.float32),
         "failed": np.array([-1]),
     }
@@ -103,7 +104,7 @@ def test_a_step(rank):
         for number, each in enumerate(("theta", "m", "v")):
             assert np.array_equal(after[number][key], wanted[each]), (key, each)
     copies = unpack(transposed_slots(found), left["transposed"])
-    assert all(np.array_equal(copies[key], after[0][key.removesuffix(step.TRANSPOSED)].T) for key in copies)
+    assert all(np.array_equal(copies[key], after[0][key.removesuffix(TRANSPOSED)].T) for key in copies)
     padded = left["sums"].reshape(GROUPS, -1)[0]
     assert np.array_equal(pack(places, unpack(places, padded)), padded)
     if rank:

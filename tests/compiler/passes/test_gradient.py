@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from wamnet.compiler.core.ir import Type
 from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
 from wamnet.compiler.core.passes.fuse_bias import fuse_bias
+from wamnet.compiler.core.passes.gradient import RULES, gradient
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.training import step
-from wamnet.compiler.training.gradient import RULES, gradient
 from wamnet.compiler.training.lower_step import lower_step, step_of
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren, train

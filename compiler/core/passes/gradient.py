@@ -4,7 +4,7 @@
    value: the output's is given, those of operands follow by the chain rule. Slopes of a value with several
    readers add up. Values that depend on no parameter need none.
 2. In one lane an affine map y = W x + b with slope dy gives dx = W^T dy, one more affine map, dW = dy x^T and
-   db = dy. The derivative of a loss over many lanes is their sum [`step.Sum`], which is not a node: a program
+   db = dy. The derivative of a loss over many lanes is their sum [`Sum`], which is not a node: a program
    works on each lane by itself. So the program gets dy and x as outputs, and the sum is kept beside it.
 
 Source: the chain rule in reverse order, as in Griewank and Walther, "Evaluating Derivatives", 2008, section
@@ -15,15 +15,27 @@ refimpl/network/siren.py, and each rule with central differences.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...refimpl.errors import CompileError
-from ..core.ir import Builder, Node, Program, attributes
-from ..core.ops import OPS
-from ..core.trace import Traced, emit
-from .step import TRANSPOSED, Sum
+from ....refimpl.errors import CompileError
+from ..ir import Builder, Node, Program, attributes
+from ..ops import OPS
+from ..trace import Traced, emit
+
+TRANSPOSED = ".T"
+"""What the name of a transposed matrix ends in."""
+
+
+@dataclass(frozen=True)
+class Sum:
+    """The derivative by `parameter`: over the lanes, the sum of outputs left right^T, or of `left`."""
+
+    parameter: str
+    left: str
+    right: str | None = None
+
 
 Slopes = tuple[Traced, ...]
 """The slope of each operand."""

@@ -72,8 +72,8 @@ SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
 kernel computes some 14,000 pixels of the bundled network."""
 
-BATCH_TILES = 256
-"""Tiles that passes compute at once: 100 MB of the bundled network's."""
+BATCH_TILES = 128
+"""Most tiles that passes compute at once: 50 MB of the bundled network's."""
 
 ITEMS = 8
 """Items of a group of a pass, as many as vectors of llvmpipe have lanes."""
@@ -121,6 +121,7 @@ class OpenGLExecutor(Executor):
     def __init__(self, context: str | None = None) -> None:
         super().__init__()
         kind, self._context = _open(context or os.environ.get(CONTEXT_VARIABLE) or "auto")
+        self._between_passes: list[Any] = []
         # Enter it and leave it: EGL would take it for the current one also after OSMesa has made its own
         # current, and do nothing when it is asked to change.
         with self._context:
@@ -366,19 +367,25 @@ class OpenGLExecutor(Executor):
         launches, across, down = schedule["launches"], schedule["pixels"], schedule["rows"]
         whole = ITEMS * max(launch["tiles"] for launch in launches)
         tiles = -(-target.size[0] // across) * -(-target.size[1] // down)
-        batch = -(-min(tiles, BATCH_TILES) // whole) * whole
-        with ExitStack() as made:
-            for number, count in enumerate(schedule["memory"].values()):
-                buffer = self._context.buffer(reserve=4 * count * batch)
-                made.callback(buffer.release)
-                buffer.bind_to_storage_buffer(number + 1)
-            prepared.weights.bind_to_storage_buffer(0)
-            target.bind_to_image(0, read=False, write=True)
-            for first in range(0, tiles, batch):
-                for program, launch in zip(prepared.passes, launches, strict=True):
-                    self._bind(program, textures, {"first_tile": first, "tile_count": batch})
-                    program.run(batch // (launch["tiles"] * ITEMS), launch["lines"], 1)
-                    self._context.memory_barrier()
+        batch = -(-tiles // -(-tiles // BATCH_TILES))
+        batch = -(-batch // whole) * whole
+        self._reserve([4 * count * batch for count in schedule["memory"].values()])
+        for number, buffer in enumerate((prepared.weights, *self._between_passes)):
+            buffer.bind_to_storage_buffer(number)
+        target.bind_to_image(0, read=False, write=True)
+        for first in range(0, tiles, batch):
+            for program, launch in zip(prepared.passes, launches, strict=True):
+                self._bind(program, textures, {"first_tile": first, "tile_count": batch})
+                program.run(batch // (launch["tiles"] * ITEMS), launch["lines"], 1)
+                self._context.memory_barrier()
+
+    def _reserve(self, sizes: Sequence[int]) -> None:
+        """Reserve buffers of so many bytes for what passes hand on, unless they are as large."""
+        if [buffer.size for buffer in self._between_passes] != sizes:
+            while self._between_passes:
+                self._between_passes.pop().release()
+            for size in sizes:
+                self._between_passes.append(self._context.buffer(reserve=size))
 
     def _bind(self, program: Any, textures: Mapping[str, Any], values: Mapping[str, Any]) -> None:
         """Give a program its textures and numbers."""

@@ -384,3 +384,15 @@ def test_the_device_s_schedule_is_taken_and_told(executor, kit):
     assert artifact.manifest["schedule"]["name"] == executor.schedule == executor.schedule_for((2000, 2000))
     if executor.schedule_pixels:
         assert executor.schedule_for((1, executor.schedule_pixels - 1)) == "plain"
+
+
+def test_pictures_of_a_size_share_what_launches_hand_on(executor_named, kit):
+    program = kit.denoiser(kit.network([192, 8, 3], (3.0, 3.0)), {"a": 3}, 8, "clamp")
+    artifact = compile_program(program, "opengl", "ieee", "fftpasses:32")
+    executor, held = executor_named("opengl-egl"), []
+    for width in (40, 40, 900):
+        images = {"a": np.random.default_rng(width).uniform(-2, 2, (9, width, 3)).astype(np.float32)}
+        assert kit.excess(executor, program, images, artifact) <= 1
+        held.append(list(executor._between_passes))
+    assert held[0] == held[1]
+    assert not set(held[1]) & set(held[2])

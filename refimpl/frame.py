@@ -70,6 +70,7 @@ LAYERS: Mapping[str, Layer] = {
         Layer("history", 3, "linear radiance: mean of this colour and those of the pictures before"),
         Layer("history_weight", 1, "share of the pictures before in the history, in [0, 1); 0: it is new"),
         Layer("sun", 3, "unit direction in world space towards the sun of the sky: the same in all pixels"),
+        Layer("direct", 3, "the layer unshadowed with its shadows, as few shadow rays estimate it"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""
@@ -91,7 +92,10 @@ HISTORY = ("history", "history_weight")
 SUN = "sun"
 """The layer that a frame has whose scene has a sun (light/environment.py)."""
 
-USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN))
+DIRECT = "direct"
+"""The layer of the lamps' light with shadows (light/transport.py: direct), which a frame has on request."""
+
+USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN, DIRECT))
 """The layers that any rendered frame has."""
 
 

@@ -1,4 +1,4 @@
-"""How far an image is from its reference: five numbers, each with all of its conventions stated.
+"""How far an image is from its reference: numbers, each with all of its conventions stated.
 
 1. Both images are checked (one shape, every value finite) and taken to float64 [`_pair`].
 2. On display-encoded colour: the mean squared error [`mse`], the same in decibels [`psnr`] and structural
@@ -9,6 +9,8 @@
    Error Minimization", ACM Transactions on Graphics 30(6), 2011, and the symmetric absolute error [`smape`],
    in the form of Vogels et al., "Denoising with Kernel Prediction and Asymmetric Loss Functions", ACM
    Transactions on Graphics 37(4), 2018.
+4. What a person sees first and means over pixels hide: the error after a blur, which noise does not have and
+   a missing shadow has [`blurred`], and the error where lamps are partly hidden [`penumbra`, `inside`].
 
 The paper's table gives PSNR as 10 times the *natural* logarithm; here it is in decibels, as everywhere else.
 """
@@ -45,6 +47,16 @@ RELMSE_EPSILON = 1e-2
 
 SMAPE_EPSILON = 1e-2
 """Added to the sum of both radiances, so that two black pixels have error 0 rather than 0 / 0."""
+
+
+BLUR_SIGMA_PX = 8.0
+"""Standard deviation of the blur, in pixels: noise of single pixels falls to 1/28, a penumbra stays."""
+
+BLUR_RADIUS_PX = 24
+"""Radius of the blur's window, in pixels: three standard deviations."""
+
+PENUMBRA = (0.05, 0.95)
+"""Least and largest share of the lamps' light in a penumbra: less is shadow, more is full light."""
 
 
 def mse(image: Floats, reference: Floats) -> float:
@@ -95,6 +107,49 @@ def smape(image: Floats, reference: Floats) -> float:
     return float(np.mean(np.abs(x - r) / (np.abs(x) + np.abs(r) + SMAPE_EPSILON)))
 
 
+def blurred(image: Floats, reference: Floats) -> float:
+    """Root of the mean squared difference of two images (H, W, C) after a Gaussian blur of 8 pixels.
+
+    At the border the window is what is inside of the image, its weights divided by their sum.
+    """
+    x, r = _pair(image, reference)
+    if x.ndim != 3:
+        rule = "a blur needs (height, width, channels)"
+        raise InputError("shape of the images", x.shape, rule, "compare images")
+    return float(np.sqrt(np.mean(_blur(x - r) ** 2)))
+
+
+def _blur(values: Float64) -> Float64:
+    """Return values (H, W, C) blurred down the columns, then along the rows."""
+    for axis in (0, 1):
+        at = np.arange(values.shape[axis])
+        distance = at[:, np.newaxis] - at
+        weights = np.exp(-0.5 * (distance / BLUR_SIGMA_PX) ** 2) * (np.abs(distance) <= BLUR_RADIUS_PX)
+        weights /= weights.sum(axis=1, keepdims=True)
+        values = np.moveaxis(np.tensordot(weights, values, (1, axis)), 0, axis)
+    return values
+
+
+def penumbra(direct: Floats, unshadowed: Floats) -> NDArray[np.bool_]:
+    """Tell (H, W) where the lamps' light, a reference's layer `direct`, is partly hidden.
+
+    Both layers (H, W, 3) are added over their channels; where no lamp would shine there is no penumbra.
+    """
+    light, most = (values.sum(axis=-1) for values in _pair(direct, unshadowed))
+    low, high = PENUMBRA
+    found: NDArray[np.bool_] = (light > low * most) & (light < high * most)
+    return found
+
+
+def inside(mask: NDArray[np.bool_], image: Floats, reference: Floats) -> float:
+    """Root of the mean squared difference of two images (H, W, C) at the pixels of a mask (H, W)."""
+    x, r = _pair(image, reference)
+    if mask.shape != x.shape[:2] or not mask.any():
+        rule = "must have a pixel at least, and the images' height and width"
+        raise InputError("mask of pixels", int(mask.sum()), rule, "choose another one")
+    return float(np.sqrt(np.mean((x[mask] - r[mask]) ** 2)))
+
+
 def largest_error(image: Floats, reference: Floats) -> float:
     """Largest absolute difference of two images (...): what an error bound speaks of."""
     x, r = _pair(image, reference)
@@ -125,6 +180,7 @@ METRICS: Mapping[str, Metric] = {
         Metric("MSE", mse, "display", "", higher_is_better=False),
         Metric("PSNR", psnr, "display", "dB", higher_is_better=True),
         Metric("SSIM", ssim, "display", "", higher_is_better=True),
+        Metric("blurred RMSE", blurred, "display", "", higher_is_better=False),
         Metric("relMSE", relmse, "linear", "", higher_is_better=False),
         Metric("SMAPE", smape, "linear", "", higher_is_better=False),
     )

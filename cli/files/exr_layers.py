@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import HISTORY, LAYERS, SEEN, SUN
+from ...refimpl.frame import DIRECT, HISTORY, LAYERS, SEEN, SUN
 from .exr_header import Part
 
 CHANNELS: Mapping[str, tuple[str, ...]] = {
@@ -38,6 +38,7 @@ CHANNELS: Mapping[str, tuple[str, ...]] = {
     "history": ("history.R", "history.G", "history.B"),
     "history_weight": ("history_weight.V",),
     "sun": ("sun.X", "sun.Y", "sun.Z"),
+    "direct": ("direct.R", "direct.G", "direct.B"),
 }
 """The channels that hold each layer in the files that are written here."""
 
@@ -49,7 +50,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "p"),
     "direction": ("direction", "raydirection"),
     "unshadowed": ("unshadowed",),
-    **{name: (name,) for name in (*SEEN, *HISTORY, SUN)},
+    **{name: (name,) for name in (*SEEN, *HISTORY, SUN, DIRECT)},
 }
 """Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here.
 

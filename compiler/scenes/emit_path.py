@@ -4,13 +4,13 @@
         start: the path at the camera
         for depth = 0, 1, ... MAX_DEPTH
             arrive: the next surface; radiance of the paths that are alive
-            depth 0: look, add the features of the first surface
+            depth 0: look, add the features of the first surface; shadow, for each shadow ray
             while the path is followed: see, add the features of what is seen past mirrors and glass
             depth MAX_DEPTH: done
             scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
     for each ray of the features beyond the first sample's [`_Builder._rays`]
-        ray: the path at the camera; arrive; look
+        ray: the path at the camera; arrive; look; shadow, for each shadow ray
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
    [`_Builder.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
@@ -19,7 +19,7 @@
    computed on with the others of its item, and changes nothing: radiance is assigned where it is alive.
 3. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
 4. With an encoding, sums stay variables, and become channels of images at the end [`_Builder._images`].
-5. `see` is in a kernel that has a plane of it, and no other [`asked`].
+5. `see` and `shadow` are in a kernel that has a plane of them, and no other [`asked`].
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from .lower_scene import LAYERS, SEEN, SURFACE, WAY, PathPrograms, kinds, names
+from .lower_scene import LAYERS, LIT, SEEN, SURFACE, WAY, PathPrograms, kinds, names
 from .lower_scene import PATH as STATE
 
 FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
@@ -70,6 +70,9 @@ FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
 
 PAST = {layer: names({layer: value}) for layer, value in SEEN.items()}
 """Planes of what is seen past mirrors and glass: outputs of `see`, by group."""
+
+DIRECT = {layer: names({layer: value}) for layer, value in LIT.items()}
+"""Planes of the first surface's light: outputs of `shadow`, by group."""
 
 END = {
     "alive": ["alive"],
@@ -88,6 +91,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "deviation": DEVIATION,
     **FIRST,
     **PAST,
+    **DIRECT,
     **{group: [f"last_{n}" if n != "alive" else n for n in members] for group, members in END.items()},
 }
 """What a kernel can add up: groups of planes, by name."""
@@ -131,11 +135,14 @@ def path_kernel(
 
 
 def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
-    """Return the programs that groups of planes need: `see` only for its own, which it must be there for."""
-    wanted = [group for group in groups if group in PAST]
-    if wanted and "see" not in programs.parts:
-        raise CompileError(f"planes {wanted[0]!r} need the program 'see': lower the scene with seen=True")
-    parts = {part: program for part, program in programs.parts.items() if wanted or part != "see"}
+    """Return the programs that groups of planes need: some only for their own, which must be there then."""
+    parts = dict(programs.parts)
+    for part, own, how in (("see", PAST, "seen=True"), ("shadow", DIRECT, "shadow_rays=N")):
+        wanted = [group for group in groups if group in own]
+        if wanted and part not in parts:
+            raise CompileError(f"planes {wanted[0]!r} need the program {part!r}: lower the scene with {how}")
+        if not wanted:
+            parts.pop(part, None)
     return replace(programs, parts=parts)
 
 
@@ -337,9 +344,9 @@ class _Builder:
         first, radiance = apply("equal", BOUNCE, 0), names({"radiance": STATE["radiance"]})
         body: list[Statement] = [Let("depth", self.all(apply("convert", BOUNCE, value="uint32")))]
         body += self.block("arrive", "the next surface", masked=radiance)
-        if set(self.groups) & set(FIRST):
+        if found := self._features("the features of the first surface"):
             when = first & apply("equal", N, 0) if self.programs.rays else first
-            body.append(If(when, self.block("look", "the features of the first surface", summed=True)))
+            body.append(If(when, found))
         if "see" in self.programs.parts:
             when = any_lane(going) if self.followed else first
             body.append(If(when, self.block("see", "what is seen past mirrors and glass", summed=True)))
@@ -349,13 +356,26 @@ class _Builder:
         body.append(Break(apply("logical_not", left)))
         return For("bounce", MAX_DEPTH + 1, tuple(body))
 
+    def _features(self, comment: str) -> tuple[Statement, ...]:
+        """Return what adds up the features of a camera ray's surface, the loop over shadow rays last."""
+        found: tuple[Statement, ...] = ()
+        if set(self.groups) & set(FIRST):
+            found = self.block("look", comment, summed=True)
+        program = self.programs.parts.get("shadow")
+        # Without lamps the layer is 0, and no ray is sent.
+        if program and any(program.nodes[index].op != "constant" for _, index in program.outputs):
+            number = Let("shadow_number", self.all(apply("convert", name("shadow"), value="uint32")))
+            body = (number, *self.block("shadow", "a lamp's light, if nothing is in between", summed=True))
+            found += (For("shadow", const(self.programs.shadow_rays), body),)
+        return found
+
     def _rays(self) -> list[Statement]:
         """Return the loop over the features' own rays; the path of the first sample has been one of them."""
         rays = self.programs.rays
-        if rays is None or not set(self.groups) & set(FIRST):
+        if rays is None or not (found := self._features("its features")):
             return []
-        # The rays of a feature draw no further numbers; a compiler may refuse what nothing reads.
-        nodes = [*self.programs.parts["arrive"].nodes, *self.programs.parts["look"].nodes]
+        # The rays of most features draw no further numbers; a compiler may refuse what nothing reads.
+        nodes = [n for part in ("arrive", "look", "shadow") for n in self._nodes(part)]
         unread = () if any(n.op == "input" and n["name"] == "pixel" for n in nodes) else ("pixel",)
         known = {"pixel": "uint32", **kinds({**STATE, **SURFACE})}
         body = (
@@ -363,12 +383,17 @@ class _Builder:
             *self.variables({each: kind for each, kind in known.items() if each not in unread}),
             *self.block("ray", "the ray at the camera", unread=unread),
             *self.block("arrive", "the first surface"),
-            *self.block("look", "its features", summed=True),
+            *found,
         )
         return [
             Comment("the features of further camera rays"),
             For("n", const(rays.count), body, start=const(1)),
         ]
+
+    def _nodes(self, part: str) -> Sequence[Node]:
+        """Return the nodes of a program; none if it is not there."""
+        program = self.programs.parts.get(part)
+        return program.nodes if program else ()
 
     def _gathered(self) -> list[Statement]:
         """Return what adds what a path has gathered."""

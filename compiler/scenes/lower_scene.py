@@ -6,7 +6,8 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 2. `arrive`: path -> its next surface and the radiance gathered so far (refimpl/light/transport.py).
 3. `look`: the first surface -> the feature layers (refimpl/light/render.py).
 4. `scatter`: path, surface, depth and counters -> the path after it, and whether it continues.
-5. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
+5. On request `shadow`: surface, counters and the number of a shadow ray -> its part of the layer `direct`.
+6. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
    after it (refimpl/light/following.py). Where nothing is followed it is the first surface's layers [`_see`].
 
 Where features are means over more camera rays [`FeatureRays`] there is a fifth one, `ray`: `start` with
@@ -85,6 +86,12 @@ SEEN: Values = {
 }
 """The feature layers past mirrors and glass, as refimpl/light/following.py: see."""
 
+LIT: Values = {frame.DIRECT: (RGB, FLOAT)}
+"""The feature layer of shadow rays, as refimpl/light/transport.py: direct."""
+
+SHADOW: Values = {"shadow_number": (NUMBER, COUNTER)}
+"""The number of a shadow ray among those of a camera ray."""
+
 WAY: Values = {"way_going": (NUMBER, TRUTH), "way_length": (NUMBER, FLOAT)}
 """State of the way to what is seen, as refimpl/light/following.py: Way."""
 
@@ -108,9 +115,9 @@ class PathPrograms:
     """The programs of one path in one scene; `alive`, `scatter`'s boolean, says whether it continues.
 
     `parts` are the programs by name: `see` is there where it was requested, and the path is followed past
-    `most_followed` surfaces at most; `ray` starts the features' own `rays`, if any. `inputs` are the names of
-    the scene's numbers that all of them are given [scene_inputs.py], `places` where they are in its tables,
-    `values` those of this scene.
+    `most_followed` surfaces at most; `ray` starts the features' own `rays`, if any; `shadow` is one of so
+    many `shadow_rays` of each camera ray. `inputs` are the names of the scene's numbers that all of them are
+    given [scene_inputs.py], `places` where they are in its tables, `values` those of this scene.
     """
 
     scene: str
@@ -122,6 +129,7 @@ class PathPrograms:
     values: tuple[float, ...] = ()
     most_followed: int = 0
     rays: FeatureRays | None = None
+    shadow_rays: int = 0
 
 
 def lower_scene(
@@ -133,13 +141,14 @@ def lower_scene(
     keep_places: bool = False,
     seen: bool = False,
     rays: FeatureRays | None = None,
+    shadow_rays: int = 0,
 ) -> PathPrograms:
     """Return the programs of a path through a scene, in float32.
 
     Primitives are statements each, tables and loops, or a tree, as `forms` and their costs say [forms.py].
     `keep_places`: nodes know the lines of the reference that they came from, for listings. Numbers that are
     `moving` are inputs; such a scene has no tree, whose boxes would have to move. `seen`: `see` too. `rays`
-    are the features' own camera rays.
+    are the features' own camera rays; `shadow_rays` of each of them, or of the paths', `shadow`'s.
     """
     moving = moving or SceneInputs(settings, ())
     laid, values, statements = _laid_out(scene, settings, forms, moving)
@@ -173,13 +182,16 @@ def lower_scene(
         "scatter": _reached(scattering, arriving),
     }
     most = _most_followed(laid["world"], moving)
+    if shadow_rays:
+        lit = partial(_shadow, world_of, shadow_rays)
+        parts["shadow"] = lowered("shadow", lit, {**SURFACE, **COUNTERS, **SHADOW, **scene_numbers})
     if seen:
         parts["see"] = lowered("see", *_see(world_of, most, scene_numbers))
     if rays:
         parts["ray"] = lowered("ray", partial(start, rays.sampler), started)
     numbers_of_scene = moving.names, moving.places, tuple(map(float, values))
     identity = scene.name, scene_digest(scene), settings
-    return PathPrograms(*identity, parts, *numbers_of_scene, most if seen else 0, rays)
+    return PathPrograms(*identity, parts, *numbers_of_scene, most if seen else 0, rays, shadow_rays)
 
 
 def _reached(scatter: Program, arrive: Program) -> Program:
@@ -242,6 +254,15 @@ def _see(
     arrived = {name: PATH[name] for name in ("beta", "direction")}
     state = {"depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
     return see, {**SURFACE, **arrived, **state, **WAY, **scene_numbers}
+
+
+def _shadow(
+    world_of: Callable[[Mapping[str, Any]], World], rays: int, given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return what a shadow ray adds to the layer `direct`."""
+    counters = Counters(*(given[name] for name in COUNTERS))
+    at = world_of(given), *_surface(given), counters
+    return _components(LIT, {frame.DIRECT: transport.direct(*at, rays, given["shadow_number"])})
 
 
 def _started(

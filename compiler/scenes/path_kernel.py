@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -60,6 +60,9 @@ SUMS = (
 PAST_SUMS = ("seen_*: the same of what is seen past mirrors and glass; albedo times the tints on the way",)
 """What the planes of `see` mean."""
 
+
+OF_SHADOWS = "direct_*: the lamps' light with shadows, by {0} shadow rays of each camera ray"
+"""What the planes of `shadow` mean."""
 
 OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the number of samples: of one launch"
 """What else is to be known where features have rays of their own."""
@@ -147,9 +150,7 @@ def compile_path(
     emitted, dialect = replace(programs, parts=passed), chosen.dialect
     planes = tuple(emit_path.planes(groups))
     images = encoding.images if encoding else ()
-    written = _written(images) if images else (*SUMS, *(PAST_SUMS if "see" in programs.parts else ()))
-    if programs.rays:
-        written += (OF_RAYS.format(programs.rays.count, programs.rays.sampler),)
+    written = (*(_written(images) if images else SUMS), *_notes(programs, bool(images)))
     at_once = (dialect and dialect.at_once) or f"{lanes} {'path' if lanes == 1 else 'paths'}"
     header = _header(programs, dialect.language if dialect else chosen.language, promised, at_once, written)
     arguments = dialect.said[interface.PATH] if dialect else PRINTED
@@ -178,6 +179,7 @@ def compile_path(
         "arguments": arguments,
         **({"numbers": numbers_of(programs)} if programs.inputs else {}),
         **({"feature_rays": asdict(programs.rays)} if programs.rays else {}),
+        **({"shadow_rays": programs.shadow_rays} if "shadow" in programs.parts else {}),
     }
     name = f"path{suffix}"
     manifest = {**facts, **_identity(emitted, name, text)}
@@ -235,6 +237,16 @@ def _written(images: Sequence[Image]) -> tuple[str, ...]:
     """Return what the numbers of encoded images mean."""
     described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
     return (SUMS[0], "encoded features, means over the samples of one launch:", *described)
+
+
+def _notes(programs: PathPrograms, encoded: bool) -> Iterator[str]:
+    """Yield what else there is to say of the numbers, by the programs that they come from."""
+    if "see" in programs.parts and not encoded:
+        yield from PAST_SUMS
+    if "shadow" in programs.parts:
+        yield OF_SHADOWS.format(programs.shadow_rays)
+    if programs.rays:
+        yield OF_RAYS.format(programs.rays.count, programs.rays.sampler)
 
 
 def _header(

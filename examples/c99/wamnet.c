@@ -712,6 +712,16 @@ static words sobol_block(uint32_t seed, uint32_t pixel, uint32_t sample, uint32_
     return made;
 }
 
+/* SOB-5 */
+static words net_words(uint32_t seed, uint32_t pixel, uint32_t sample, uint32_t b) {
+    words made = random_block(seed, pixel, 0, b);
+    for (int d = 0; d < 2; d++) {
+        uint32_t key = made.w[2 + d];
+        made.w[d] ^= scrambled(sobol(sample, d), key) ^ scrambled(0, key);
+    }
+    return made;
+}
+
 /* ---- sampling: SMP -------------------------------------------------------------------------------------- */
 
 /* SMP-1 */
@@ -1656,6 +1666,38 @@ static v3 unshadowed(parts lights, v3 point, v3 normal, v3 reflectance) {
     return scale(mul(reflectance, found), 1 / PI);
 }
 
+/* LTR-12: lamp k's light, without its hue. */
+static double lamp_light(const part *l, v3 point, v3 normal) {
+    v3 light = unshadowed((parts){(part *)l, 1}, point, normal, vec(PI, PI, PI));
+    return light.c[0] + light.c[1] + light.c[2];
+}
+
+/* LTR-12 */
+static v3 direct(const world *w, const hit *h, v3 reflectance, uint32_t seed, uint32_t pixel, uint32_t sample,
+                 uint32_t rays, uint32_t number) {
+    parts lamps = w->from.lights;
+    double total = 0, before = 0, u = 0;
+    if (h->id >= w->nothing || w->surfaces[h->id].light >= 0) return BLACK;
+    for (size_t k = 0; k < lamps.count; k++) total += lamp_light(&lamps.items[k], h->point, h->normal);
+    words at = net_words(seed, pixel, sample * rays + number, 0xFFFFFFFFu);
+    const part *chosen = NULL;
+    for (size_t k = 0; k < lamps.count && before <= uniform(at.w[0]) * total; k++) {
+        double own = lamp_light(&lamps.items[k], h->point, h->normal);
+        chosen = &lamps.items[k];
+        u = fmin((uniform(at.w[0]) * total - before) / fmax(own, 1e-15), 1);
+        before += own;
+    }
+    if (!chosen || !(total > 0)) return BLACK;
+    v3 origin = spawned(h->point, h->normal, h->t), front = unit(cross(chosen->edge_u, chosen->edge_v));
+    v3 point = quad_point(u, uniform(at.w[1]), chosen->corner, chosen->edge_u, chosen->edge_v);
+    double size = fmax(fabs(origin.c[0]), fmax(fabs(origin.c[1]), fabs(origin.c[2])));
+    v3 offset = sub(spawned(point, front, size), origin), wi = scale(offset, 1 / length(offset));
+    if (!(dot(h->normal, wi) > 0 && dot(front, wi) < 0) || occluded(w, origin, wi, length(offset))) return BLACK;
+    v3 radiance = light_radiance(chosen);
+    double sum = radiance.c[0] + radiance.c[1] + radiance.c[2];
+    return scale(mul(reflectance, radiance), total / (sum * PI * rays));
+}
+
 /* LTR-2 */
 static hit arrive(const world *w, path *p) {
     hit h = closest(w, p->origin, p->direction);
@@ -1734,7 +1776,7 @@ static const char *const FEATURES[] = {"color",       "albedo",        "normal",
                                        "position",    "direction",     "unshadowed", "highlights",
                                        "seen_albedo", "seen_normal",   "seen_depth", "seen_position",
                                        "seen_emission", "history", "history_weight", "smoothed", "seen_smoothed",
-                                       "sun"};
+                                       "sun", "direct"};
 
 typedef enum {
     COLOR,
@@ -1755,6 +1797,7 @@ typedef enum {
     SMOOTHED,
     SEEN_SMOOTHED,
     SUN,
+    DIRECT,
     FEATURE_COUNT
 } feature;
 
@@ -1810,7 +1853,8 @@ static const char *layer_of(feature f) {
 /* DAT-1, DAT-10 */
 static double encoded(feature f, double x, size_t channel, const scales *s) {
     if (isnan(x)) x = 0;
-    if (f == COLOR || f == UNSHADOWED || f == SEEN_EMISSION || f == HISTORY || f == SMOOTHED || f == SEEN_SMOOTHED)
+    if (f == COLOR || f == UNSHADOWED || f == SEEN_EMISSION || f == HISTORY || f == DIRECT || f == SMOOTHED ||
+        f == SEEN_SMOOTHED)
         return to_display(x, s->stops);
     if (f == HIGHLIGHTS) return to_display(x, s->stops - 4);
     if (f == ALBEDO || f == SEEN_ALBEDO || f == HISTORY_WEIGHT) return clamp(x, 0, 1);
@@ -2420,6 +2464,30 @@ static double ssim(const array *x, const array *r) {
     return found / (double)((rows - SIZE + 1) * (columns - SIZE + 1) * channels);
 }
 
+/* MET-10 */
+static double blurred(const array *x, const array *r) {
+    size_t sides[2] = {x->shape[0], x->shape[1]}, channels = x->shape[2];
+    double *d = get(x->count, sizeof *d), *after = get(x->count, sizeof *d), total = 0;
+    for (size_t i = 0; i < x->count; i++) d[i] = x->values[i] - r->values[i];
+    for (int axis = 0; axis < 2; axis++) {
+        size_t step = axis ? channels : sides[1] * channels;
+        for (size_t i = 0; i < x->count; i++) {
+            int at = (int)(i / step % sides[axis]);
+            double sum = 0, weights = 0;
+            for (int k = -24; k <= 24; k++) {
+                if (at + k < 0 || at + k >= (int)sides[axis]) continue;
+                double weight = exp(-0.5 * squared(k / 8.0));
+                weights += weight;
+                sum += weight * d[(long)i + k * (long)step];
+            }
+            after[i] = sum / weights;
+        }
+        memcpy(d, after, x->count * sizeof *d);
+    }
+    for (size_t i = 0; i < x->count; i++) total += squared(d[i]);
+    return sqrt(total / (double)x->count);
+}
+
 /* MET-1 */
 static void read_pair(const json *in, array *x, array *r) {
     *x = array_in(in, "image", 3);
@@ -3012,6 +3080,13 @@ static void do_scatter(const json *in) {
     answer_number("pdf", p.pdf);
 }
 
+static void do_shadow(const json *in) {
+    world w = world_in(in);
+    hit h = {number(in, "t"), counter(in, "surface"), vec_in(in, "point"), vec_in(in, "normal")};
+    answer_vec("direct", direct(&w, &h, vec_in(in, "reflectance"), counter(in, "seed"), counter(in, "pixel"),
+                                counter(in, "sample"), counter(in, "shadow_rays"), counter(in, "shadow_number")));
+}
+
 static void do_whole(const json *in) {
     world w = world_in(in);
     path p = start_in(in, &w);
@@ -3295,6 +3370,12 @@ static void do_ssim(const json *in) {
     answer_number("value", ssim(&x, &r));
 }
 
+static void do_blurred(const json *in) {
+    array x, r;
+    read_pair(in, &x, &r);
+    answer_number("value", blurred(&x, &r));
+}
+
 static void do_relmse(const json *in) {
     array x, r;
     read_pair(in, &x, &r);
@@ -3426,6 +3507,7 @@ static const struct {
     {"path.start", do_start},
     {"path.arrive", do_arrive},
     {"path.scatter", do_scatter},
+    {"path.shadow", do_shadow},
     {"path.whole", do_whole},
     {"picture.rendered", do_rendered},
     {"picture.exact", do_rendered},
@@ -3454,6 +3536,7 @@ static const struct {
     {"metric.ssim", do_ssim},
     {"metric.relmse", do_relmse},
     {"metric.smape", do_smape},
+    {"metric.blurred", do_blurred},
     {"file.model", do_model},
     {"file.camera", do_camera_text},
     {"file.scene", do_scene},

@@ -54,6 +54,7 @@ export const FEATURES = {
   smoothed: smoothed(""),
   seen_smoothed: smoothed("seen_"),
   sun: feature("sun", 3, asSigned),
+  direct: feature("direct", 3, asColor),
 };
 
 // FRM-2: the layers that features are made of, and the channels of each.

@@ -87,7 +87,7 @@ def _traced(
             state["sample_number"] = np.full(shape, (integers["first_sample"] + n) % 2**32, np.uint32)
             for plane, value in looked(kernel.programs, state).items():
                 if plane in sums:
-                    sums[plane] += value
+                    _sum(sums, plane, value)
     return np.stack(list(sums.values()))
 
 
@@ -120,7 +120,7 @@ def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, 
         state["depth"] = np.full(state["x"].shape, depth, np.uint32)
         state = _masked(state, interpret(programs.parts["arrive"], state))
         if depth == 0:
-            first = interpret(programs.parts["look"], state)
+            first = interpret(programs.parts["look"], state) | lit(programs, state)
         if "see" in programs.parts and (depth == 0 or programs.most_followed > 0):
             found = interpret(programs.parts["see"], state)
             state |= {name: found.pop(name) for name in WAY if name in found}
@@ -136,7 +136,18 @@ def follow(programs: PathPrograms, given: Mapping[str, Any]) -> tuple[dict[str, 
 def looked(programs: PathPrograms, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the features of the first surfaces of the features' own rays; given as for [`follow`]."""
     state = {**given, **interpret(programs.parts["ray"], given)}
-    return interpret(programs.parts["look"], {**state, **interpret(programs.parts["arrive"], state)})
+    state |= interpret(programs.parts["arrive"], state)
+    return interpret(programs.parts["look"], state) | lit(programs, state)
+
+
+def lit(programs: PathPrograms, state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of the layer `direct`, by plane lists over the shadow rays of first surfaces."""
+    found: dict[str, Any] = {}
+    for number in range(programs.shadow_rays if "shadow" in programs.parts else 0):
+        given = {**state, "shadow_number": np.full(state["x"].shape, number, np.uint32)}
+        for plane, part in interpret(programs.parts["shadow"], given).items():
+            found[plane] = [*found.get(plane, ()), part]
+    return found
 
 
 def _masked(state: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,6 +156,12 @@ def _masked(state: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     kept = {name: np.where(alive, new[name], state[name]) for name in new if name.startswith("radiance")}
     ended = {"alive": alive & new["alive"]} if "alive" in new else {}
     return {**state, **new, **kept, **ended}
+
+
+def _sum(sums: dict[str, Any], plane: str, value: Any) -> None:
+    """Add a value to a plane, or a list of values one after another, as a kernel does."""
+    for part in value if isinstance(value, list) else (value,):
+        sums[plane] += part
 
 
 def _add(sums: dict[str, Any], first: Mapping[str, Any], end: Mapping[str, Any], n: np.float32) -> None:
@@ -156,7 +173,7 @@ def _add(sums: dict[str, Any], first: Mapping[str, Any], end: Mapping[str, Any],
             sums[f"deviation_{c}"] += (end[f"radiance_{c}"] * n - sums[f"color_{c}"]) ** 2 * weight
     for plane in sums:
         if plane in first:
-            sums[plane] += first[plane]
+            _sum(sums, plane, first[plane])
         elif plane.startswith("color"):
             sums[plane] += end[plane.replace("color", "radiance")]
         elif not plane.startswith("deviation"):

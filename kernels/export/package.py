@@ -38,7 +38,7 @@ from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
-from ...refimpl.network.denoise import Model, learned_feature_spp
+from ...refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
 from ...refimpl.network.domain import of_model
 from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
@@ -411,7 +411,8 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
     # A pass of a host writes a feature of one sample.
     rays = None if row.single else learned_rays(request.model, request.settings)
     forms = forms_of(_usual(row))
-    return lower_scene(request.scene, request.settings, forms, moving, seen=seen, rays=rays)
+    more = {"seen": seen, "rays": rays, "shadow_rays": learned_shadow_rays(request.model)}
+    return lower_scene(request.scene, request.settings, forms, moving, **more)  # type: ignore[arg-type]
 
 
 def _usual(row: Row) -> str:

@@ -67,7 +67,7 @@ class Film:
 
 def jobs_before(job: Job, count: int) -> Iterator[Job]:
     """Yield the jobs of so many pictures before a job's, the earliest first: of colour, by other samples."""
-    plain = replace(job, feature_spp=0, feature_sampler="", seen=False)
+    plain = replace(job, feature_spp=0, feature_sampler="", seen=False, shadow_rays=0)
     return (replace(plain, first_sample=job.first_sample + job.spp * k) for k in range(count, 0, -1))
 
 

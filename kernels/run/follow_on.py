@@ -69,7 +69,8 @@ def follow_on(
 def first_hits_on(executor: Executor, scene: Scene, job: Job, frames: Frames | None = None) -> First:
     """Return the first hits (H, W) of a job's first sample."""
     unscattered = replace(job.settings, max_depth=0)
-    plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False, settings=unscattered)
+    plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False)
+    plain = replace(plain, shadow_rays=0, settings=unscattered)
     moment = (frames or Frames([scene])).of(executor, scene, plain, groups=END)
     sums = sums_of(executor, moment, plain)
     found = dict(zip(planes(END), sums, strict=True))

@@ -51,7 +51,7 @@ from ...refimpl.light.transport import Settings
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network import factored
 from ...refimpl.network.dataset import FEATURES, feature_image
-from ...refimpl.network.denoise import Model, check_model
+from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
 
 SCHEMA = "wamnet-page-4"
@@ -163,11 +163,12 @@ def page_data(
     # Whole paths give colour; the other features are of their first hit, or of what is seen.
     lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
     rays = learned_rays(replace(first, features=shown), settings)
+    shadows = learned_shadow_rays(replace(first, features=shown))
     paths = [
-        path_kernel(scene, length, inputs, part, profile, rays)
+        path_kernel(scene, length, inputs, part, profile, rays, shadows)
         for length, part in zip(lengths, together, strict=True)
     ]
-    images = check(animation, first, shown, settings, rays)
+    images = check(animation, first, shown, settings, rays, shadows)
     return {
         "schema": SCHEMA,
         "scene": scene.name,
@@ -230,9 +231,11 @@ def path_kernel(
     features: Sequence[str],
     profile: str,
     rays: FeatureRays | None,
+    shadows: int = 0,
 ) -> PathArtifact:
     """Return the kernel that adds up the planes of some features."""
-    programs = lower_scene(scene, settings, STATEMENTS, inputs, seen=sees(features), rays=rays)
+    more = {"seen": sees(features), "rays": rays, "shadow_rays": shadows}
+    programs = lower_scene(scene, settings, STATEMENTS, inputs, **more)  # type: ignore[arg-type]
     return compile_path(programs, TARGET, profile, 1, layers_of(features))
 
 
@@ -387,9 +390,10 @@ def check(
     features: Sequence[str],
     settings: Settings,
     rays: FeatureRays | None,
+    shadows: int = 0,
 ) -> dict[str, NDArray[np.float32]]:
     """Return the encoded features (H, W, C) of a small noisy picture by name, as floats."""
-    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features))
+    job = Job(CHECK_PX, CHECK_PX, 1, CHECK_SEED, settings, seen=sees(features), shadow_rays=shadows)
     if rays:
         job = replace(job, feature_spp=rays.count, feature_sampler=rays.sampler)
     frame = render(animation.scenes[0], job).frame

@@ -36,7 +36,7 @@ from ...refimpl.light.render import Job, feature_job, feature_sampler
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import SPREAD, Settings
 from ...refimpl.network.dataset import check_features
-from ...refimpl.network.denoise import Model, check_model
+from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS
 from ..devices.executor import Executor
 from ..devices.kernel import Part
@@ -115,6 +115,7 @@ class Pipeline:
         # The job refuses sizes and numbers that mean nothing.
         rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
         job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
+        self._shadow_rays = learned_shadow_rays(replace(model, features=self._features))
         self._rays = _rays_of(job, whole, sees(self._features))
         if whole and sees(self._features):
             rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
@@ -153,10 +154,11 @@ class Pipeline:
         executor, profile = self._executor, self._profile
         seen = sees(self._features)
         forms = forms_of(executor.name)
-        programs = lower_scene(scene, self._settings, forms, inputs, seen=seen, rays=self._rays)
+        more = {"seen": seen, "rays": self._rays, "shadow_rays": self._shadow_rays}
+        programs = lower_scene(scene, self._settings, forms, inputs, **more)  # type: ignore[arg-type]
         groups = layers_of(self._features)
         if self._whole:
-            groups = FRAME_GROUPS
+            groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups)))
         kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel

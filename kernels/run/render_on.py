@@ -26,7 +26,7 @@ from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of, most_planes
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import NO_VALUE, InputError
-from ...refimpl.frame import SEEN, Frame
+from ...refimpl.frame import DIRECT, SEEN, Frame
 from ...refimpl.light.render import (
     Job,
     Render,
@@ -56,22 +56,30 @@ KEPT_SCENES = 8
 
 def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> PathArtifact:
     """Return the kernel that renders a scene on an executor."""
-    return _compiled(scene, job.settings, executor.name, profile, executor.lanes, groups_of(job))
+    chosen = executor.name, profile, executor.lanes, groups_of(job), job.shadow_rays
+    return _compiled(scene, job.settings, *chosen)
 
 
 @lru_cache(KEPT_SCENES)
 def _compiled(
-    scene: Scene, settings: Settings, target: str, profile: str, lanes: int, groups: tuple[str, ...]
+    scene: Scene,
+    settings: Settings,
+    target: str,
+    profile: str,
+    lanes: int,
+    groups: tuple[str, ...],
+    shadow_rays: int,
 ) -> PathArtifact:
     """Return the kernel; it depends on nothing else."""
-    programs = lower_scene(scene, settings, forms_of(target), seen=not set(groups).isdisjoint(SEEN))
+    seen = not set(groups).isdisjoint(SEEN)
+    programs = lower_scene(scene, settings, forms_of(target), seen=seen, shadow_rays=shadow_rays)
     return compile_path(programs, target, profile, lanes, groups)
 
 
 def groups_of(job: Job) -> tuple[str, ...]:
     """Return the groups of planes that a job's kernel adds up: its layers, and what its variance is of."""
     wanted = {*job.layers, "deviation"} if job.color else {*job.layers}
-    return tuple(group for group in (*FRAME_GROUPS, *SEEN) if group in wanted)
+    return tuple(group for group in (*FRAME_GROUPS, *SEEN, DIRECT) if group in wanted)
 
 
 class Frames:
@@ -89,12 +97,14 @@ class Frames:
         `groups` are those of its planes, by default what the job's frame is made of.
         """
         settings, groups = job.settings, tuple(groups) or groups_of(job)
-        key = (executor.name, executor.lanes, profile, settings, groups)
+        key = (executor.name, executor.lanes, profile, settings, groups, job.shadow_rays)
         if key not in self._paths:
             target, lanes = executor.name, executor.lanes
 
             def compiled(scene: Scene, inputs: SceneInputs) -> PathArtifact:
-                programs = lower_scene(scene, settings, forms_of(target), inputs, seen=job.seen)
+                programs = lower_scene(
+                    scene, settings, forms_of(target), inputs, seen=job.seen, shadow_rays=job.shadow_rays
+                )
                 return compile_path(programs, target, profile, lanes, groups)
 
             self._paths[key] = MovingPaths(target, compiled, settings, self._scenes)
@@ -125,7 +135,7 @@ def render_on(
     if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name, executor.lanes):
         # The same paths twice, for layers that no kernel of this device writes at once.
         again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
-        color = again(replace(job, seen=False), on_progress=on_progress)
+        color = again(replace(job, seen=False, shadow_rays=0), on_progress=on_progress)
         return joined(scene, job, color, again(replace(job, color=False)))
     first, last = checked_rows(job, rows)
     if moment is None and frames is not None:

@@ -10,6 +10,7 @@
    [`with_own_features`], whose rays are spread evenly over a pixel and begin with the colour's first one.
 5. Features of what is seen past mirrors and glass are layers of their own, on request (following.py). They
    follow the same paths; those of more camera rays end where the features do.
+6. On request each camera ray sends shadow rays to the lamps, for the layer `direct`.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from .. import rng, vectors
 from ..errors import InputError, choice
-from ..frame import LAYERS, SEEN, USUAL, Frame
+from ..frame import DIRECT, LAYERS, SEEN, USUAL, Frame
 from ..vectors import Directions, Ids
 from . import following, intersection, transport
 from .camera import CameraBasis, camera_basis, camera_ray
@@ -46,6 +47,12 @@ TILE_PIXELS = 8192
 FEATURE_SPP = "feature_spp"
 """Name of the fact, in a frame's info, that its features are means over more camera rays than its colour."""
 
+SHADOW_RAYS = "shadow_rays"
+"""Name of the fact of how many shadow rays each of these camera rays sends."""
+
+MOST_SHADOW_RAYS = 64
+"""Most shadow rays of a camera ray: more camera rays spread them over the pixel too."""
+
 FEATURE_SAMPLER = "feature_sampler"
 """Name of the fact of the source of these rays; without it they come from the colour's."""
 
@@ -58,7 +65,8 @@ class Job:
     render. `feature_spp` is the number of camera rays whose first hits the feature layers are means over; 0,
     as any number up to spp, means those of the colour's samples. `feature_sampler` is where they come from;
     "" is an even spread [`spread`]. `seen`: the frame has the layers of what is seen past mirrors and glass
-    too. `color` is False where paths end with their features.
+    too. `color` is False where paths end with their features. `shadow_rays` is how many shadow rays each
+    camera ray sends for the layer `direct`; with 0 the frame does not have it.
     """
 
     width: int
@@ -72,6 +80,7 @@ class Job:
     seen: bool = False
     color: bool = True
     feature_sampler: str = ""
+    shadow_rays: int = 0
 
     def __post_init__(self) -> None:
         """Refuse sizes and counts outside their rules."""
@@ -81,6 +90,7 @@ class Job:
         _check_range("seed", self.seed, 0, (1 << 32) - 1)
         _check_range("first_sample", self.first_sample, 0, MAX_SAMPLES - self.spp)
         _check_range("feature_spp", self.feature_spp, 0, MAX_SAMPLES - self.first_sample)
+        _check_range("shadow_rays", self.shadow_rays, 0, MOST_SHADOW_RAYS)
         if self.dtype not in ("float32", "float64"):
             raise InputError("dtype", self.dtype, "must be float32 or float64", "convert it")
         source, known = self.feature_sampler, transport.CAMERA_SAMPLERS
@@ -90,12 +100,12 @@ class Job:
     @property
     def layers(self) -> tuple[str, ...]:
         """Return the names of the frame's layers, in their order."""
-        names = (*USUAL, *SEEN) if self.seen else USUAL
+        names = (*USUAL, *(SEEN if self.seen else ()), *((DIRECT,) if self.shadow_rays else ()))
         return names if self.color else tuple(name for name in names if name != "color")
 
     def facts(self) -> dict[str, Any]:
         """Return what determines the frame by name: parts that jobs have not always had, if not as ever."""
-        usual = {"seen": False, "color": True}
+        usual = {"seen": False, "color": True, "shadow_rays": 0}
         return {name: value for name, value in asdict(self).items() if usual.get(name, ...) != value}
 
     @property
@@ -205,7 +215,8 @@ def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Rende
     """Render colour and features apart, each by `render_part`, and return them as one render."""
     of_features = feature_job(job)
     assert of_features is not None
-    return joined(scene, job, render_part(replace(job, feature_spp=0)), render_part(of_features))
+    color = render_part(replace(job, feature_spp=0, shadow_rays=0))
+    return joined(scene, job, color, render_part(of_features))
 
 
 def joined(scene: Scene, job: Job, color: Render, features: Render) -> Render:
@@ -264,6 +275,9 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
         if depth == 0:
             layers = first_hit_layers(world, surface, hit, direction)
             layers |= {n: np.zeros((len(x), LAYERS[n].channels), dtype) for n in SEEN if n in job.layers}
+            for number in map(np.uint32, range(job.shadow_rays)):
+                part = transport.direct(world, surface, hit, counters, job.shadow_rays, number)
+                layers[DIRECT] = layers[DIRECT] + part if number else part
         if job.seen:
             way, seen = following.see(world, way, path, surface, hit, rng.counter(depth), most)
             for name, values in seen.items():
@@ -353,8 +367,8 @@ def render_info(scene: Scene, job: Job) -> dict[str, str]:
 
 
 def _feature_facts(job: Job) -> dict[str, str]:
-    """Return what is said of features of their own rays: how many, and their source if it is another one."""
-    if feature_job(job) is None:
-        return {}
-    source = other_sampler(job)
-    return {FEATURE_SPP: str(job.feature_spp), **({FEATURE_SAMPLER: source} if source else {})}
+    """Return what is said of features' rays: shadow rays, own rays, and their source if it is another one."""
+    facts = {SHADOW_RAYS: str(job.shadow_rays)} if job.shadow_rays else {}
+    if feature_job(job) is not None:
+        facts[FEATURE_SPP] = str(job.feature_spp)
+    return {**facts, **({FEATURE_SAMPLER: source} if (source := other_sampler(job)) else {})}

@@ -71,6 +71,9 @@ LARGEST_DEPTH = (1 << 32) // BLOCKS_PER_BOUNCE
 ROULETTE_LIMIT = 0.95
 """Greatest probability to survive Russian roulette, so that paths between white walls end too."""
 
+SHADOW_BLOCK = LARGEST_DEPTH * BLOCKS_PER_BOUNCE - 1
+"""Block of the random numbers of the layer `direct`: the last one, which no scattering reaches."""
+
 LEAST_DENSITY = 1e-15
 """Floor of cosines and densities that divide: its inverse squared is still finite in float32."""
 
@@ -354,19 +357,72 @@ def unshadowed(world: World, surface: Surface) -> Radiance:
         values: tuple[Any, ...], middle: Points, normal: Normals, radiance: Radiance, area: Floats
     ) -> tuple[Any, ...]:
         """Add what one lamp gives to each channel's irradiance (...)."""
-        offset = middle - surface.point
-        square = vectors.dot(offset, offset)
-        # Cosines are products by the distance here: their two divisions are one by its square.
-        along_surface = np.maximum(vectors.dot(surface.normal, offset), 0.0)
-        along_light = np.maximum(-vectors.dot(normal, offset), 0.0)
-        near = np.maximum(square, LEAST_SQUARE) * (square + area * world.geometry.dtype.type(1 / np.pi))
-        factor = area * along_surface * along_light / near
+        factor = _disk(world, surface, middle, normal, area)
         return tuple(value + factor * radiance[..., i] for i, value in enumerate(values))
 
     tables = middle, lights.normal, lights.radiance, lights.area
     irradiance = vectors.fold_rows(add, tables, (black, black, black))
     light: Radiance = surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
     return light
+
+
+def _disk(world: World, surface: Surface, middle: Points, normal: Normals, area: Floats) -> Floats:
+    """Return the irradiance (...) of a surface by a lamp of radiance 1, taken for a disk."""
+    offset = middle - surface.point
+    square = vectors.dot(offset, offset)
+    # Cosines are products by the distance here: their two divisions are one by its square.
+    along_surface = np.maximum(vectors.dot(surface.normal, offset), 0.0)
+    along_light = np.maximum(-vectors.dot(normal, offset), 0.0)
+    near = np.maximum(square, LEAST_SQUARE) * (square + area * world.geometry.dtype.type(1 / np.pi))
+    factor: Floats = area * along_surface * along_light / near
+    return factor
+
+
+def direct(world: World, surface: Surface, hit: Hit, counters: Counters, rays: int, number: Any) -> Radiance:
+    """Return what shadow ray `number` (...) of so many `rays` adds to the layer `direct` (..., 3).
+
+    Their sum estimates `unshadowed` with each lamp's light times the share of its area that the surface sees.
+    A lamp is picked in proportion to its unshadowed light, and a point on it uniformly, by two numbers: what
+    is left of the first one, after the choice, is uniform again. The rays of all samples of a pixel are one
+    sequence of points that are spread evenly over lamps and areas (sobol.py: net_uniforms).
+    """
+    black = np.zeros_like(surface.reflectance[..., 0])
+    if world.lights is None:
+        return vectors.vector(black, black, black)
+    lights, dtype = world.lights, world.geometry.dtype
+    middle = lights.corner + (lights.edge_u + lights.edge_v) / 2
+    power = lights.radiance[:, 0] + lights.radiance[:, 1] + lights.radiance[:, 2]
+
+    def add(values: tuple[Any], power: Floats, *disk: Any) -> tuple[Any]:
+        """Add a lamp's light (...)."""
+        return (values[0] + power * _disk(world, surface, *disk),)
+
+    def pick(values: tuple[Any, ...], index: Any, power: Floats, *disk: Any) -> tuple[Any, ...]:
+        """Choose a lamp if the light before it does not exceed what is looked for."""
+        before, chosen, share = values
+        own = power * _disk(world, surface, *disk)
+        here = wanted >= before
+        share = np.where(here, (wanted - before) / np.maximum(own, LEAST_DENSITY), share)
+        return before + own, np.where(here, index, chosen), share
+
+    tables = power, middle, lights.normal, lights.area
+    (total,) = vectors.fold_rows(add, tables, (black,))
+    sample = counters.sample * np.uint32(rays) + number
+    block = np.full_like(sample, SHADOW_BLOCK)
+    u0, u1, _, _ = sobol.net_uniforms(counters.seed, counters.pixel, sample, block, dtype)
+    wanted = u0 * total
+    first = np.zeros_like(black, dtype=np.int32)
+    ids = np.arange(len(power), dtype=np.int32)
+    _, index, share = vectors.fold_rows(pick, (ids, *tables), (black, first, black))
+    # Send the shadow ray, from the surface to the point.
+    reflects = hit.surface < world.materials.ends
+    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(reflects, hit.t, 0.0))
+    way = _towards_point(lights, surface.normal, origin, index, np.minimum(share, 1.0), u1)
+    facing = reflects & (way.cos_surface > 0.0) & (way.cos_light > 0.0)
+    blocked = intersection.occluded(world.geometry, origin, way.wi, way.distance, facing)
+    power = way.radiance[..., 0] + way.radiance[..., 1] + way.radiance[..., 2]
+    part = total / np.maximum(power, LEAST_DENSITY) * dtype.type(1 / (np.pi * rays))
+    return vectors.scale(surface.reflectance * way.radiance, np.where(facing & ~blocked, part, 0.0))
 
 
 class Towards(NamedTuple):
@@ -411,12 +467,19 @@ def _towards_light(
     """Sample a point on a light."""
     lights = world.lights
     assert lights is not None
-    # Pick a light and a point on it, a little off its surface.
     index = sampling.sample_discrete(u_pick, lights.cumulative)
+    return _towards_point(lights, site.normal, origin, index, u0, u1)
+
+
+def _towards_point(
+    lights: Lights, normal: Normals, origin: Points, index: Ids, u0: Floats, u1: Floats
+) -> Towards:
+    """Return the way from a surface to a uniform point of light `index` (...)."""
     corner, edge_u, edge_v, light_normal, radiance = (
         vectors.look_up_rows(table, index)
         for table in (lights.corner, lights.edge_u, lights.edge_v, lights.normal, lights.radiance)
     )
+    # A point on the light, a little off its surface.
     point = sampling.sample_quad(u0, u1, corner, edge_u, edge_v)
     target = intersection.spawn_origin(point, light_normal, vectors.largest(np.abs(origin)))
     # Measure direction, distance and the cosines at both ends.
@@ -424,7 +487,7 @@ def _towards_light(
     square = np.maximum(vectors.dot(offset, offset), LEAST_SQUARE)
     distance = np.sqrt(square)
     wi = offset / distance[..., np.newaxis]
-    cos_surface = np.maximum(vectors.dot(site.normal, wi), 0.0)
+    cos_surface = np.maximum(vectors.dot(normal, wi), 0.0)
     cos_light = np.maximum(-vectors.dot(light_normal, wi), 0.0)
     return Towards(
         wi, cos_surface, cos_light, light_pdf(lights, index, square, cos_light), radiance, distance

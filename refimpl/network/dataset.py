@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
-from ..frame import FIRST_HIT, SUN, Frame, check_finite
+from ..frame import DIRECT, FIRST_HIT, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -188,12 +188,7 @@ FIRST_HITS: Mapping[str, Feature] = {
             "(world position - {position_center}) / {position_scale!r}, clipped to -1 .. 1; a miss is at 0",
         ),
         Feature(
-            "direction",
-            "direction",
-            3,
-            -1.0,
-            1.0,
-            encode_signed,
+            *("direction", "direction", 3, -1.0, 1.0, encode_signed),
             "unit direction of the camera ray in world space",
         ),
         Feature(
@@ -271,6 +266,9 @@ FEATURES: Mapping[str, Feature] = {
     **PICTURES_BEFORE,
     **SMOOTHED,
     SUN: Feature(SUN, SUN, 3, -1.0, 1.0, encode_signed, "unit direction in world space towards the sun"),
+    DIRECT: Feature(
+        *(DIRECT, DIRECT, 3, 0.0, 1.0, encode_color, "unshadowed with its shadows: " + DISPLAY_FORMULA)
+    ),
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales."""

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..errors import InputError
-from ..frame import Frame
+from ..frame import DIRECT, Frame
 from . import dataset
 from .activation import activation_named
 from .dataset import Normalization, Window
@@ -119,7 +119,17 @@ def _check_layers(siren: Siren) -> None:
 
 def learned_feature_spp(model: Model) -> int:
     """Return the camera rays of the features that a model has learned from, the most of several; or 0."""
-    texts = model.info.get("trained_on_feature_spp", "").split(", ")
+    return _most(model, "feature_spp")
+
+
+def learned_shadow_rays(model: Model) -> int:
+    """Return the shadow rays of a camera ray that a model has learned from; 0 if no feature has any."""
+    return max(1, _most(model, "shadow_rays")) if DIRECT in model.features else 0
+
+
+def _most(model: Model, fact: str) -> int:
+    """Return the largest number that the frames of a model's training have had as a fact, or 0."""
+    texts = model.info.get(f"trained_on_{fact}", "").split(", ")
     return max((int(text) for text in texts if re.fullmatch("[0-9]{1,9}", text)), default=0)
 
 

@@ -24,7 +24,7 @@ from ...refimpl.errors import InputError
 from ...refimpl.reading import parse_json, plain_name, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
 
-VERSION = "1.11.0"
+VERSION = "1.12.0"
 """Version of format, behaviour and cases."""
 
 FORMAT = "wamnet-vectors"

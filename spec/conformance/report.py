@@ -63,8 +63,8 @@ ELEMENTARY = (
     "material.refracted", "material.fresnel", "material.", "transport.lamp", "transport.light_pdf",
     "transport.", "sky.share", "sky.", "encoding.srgb", "encoding.exposed", "encoding.", "image.smoothed",
     "image.", "file.camera", "file.scene", "file.", "path.start", "path.arrive", "path.scatter",
-    "path.whole", "sine", "network.", "adam.", "whole.sine", "whole.forward", "whole.", "metric.",
-    "picture.denoised", "picture.exact", "picture.",
+    "path.shadow", "path.whole", "sine", "network.", "adam.", "whole.sine", "whole.forward", "whole.",
+    "metric.", "picture.denoised", "picture.exact", "picture.",
 )  # fmt: skip
 """How kinds begin, those that others are made of first: what fails there makes the others fail."""
 

@@ -14,7 +14,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES
 from wamnet.compiler.kernel.interface import SCENE_NUMBERS
 from wamnet.compiler.kernel.run import run_on
-from wamnet.compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, PAST, path_kernel, planes
+from wamnet.compiler.scenes.emit_path import DIRECT, FRAME_GROUPS, GROUPS, PAST, path_kernel, planes
 from wamnet.compiler.scenes.encode_kernel import encoding_of
 from wamnet.compiler.scenes.lower_encode import SAMPLES
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
@@ -36,7 +36,7 @@ TRACED = [target.name for target in {**DENOISERS, **EXPORTED}.values() if target
 ENCODING = encoding_of(("color",), Normalization(exposure_stops=-1.0))
 """Encoded colour."""
 
-ALL_GROUPS = tuple(group for group in GROUPS if group not in PAST)
+ALL_GROUPS = tuple(group for group in GROUPS if group not in {*PAST, *DIRECT})
 """Groups of planes that any programs have."""
 
 

@@ -22,7 +22,7 @@ SETTINGS = Settings(max_depth=1)
 OF_ONE_PICTURE = tuple(
     name
     for name, feature in dataset.FEATURES.items()
-    if name not in (*dataset.PICTURES_BEFORE, "sun") and not feature.guides
+    if name not in (*dataset.PICTURES_BEFORE, "sun", "direct") and not feature.guides
 )
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
 
@@ -79,6 +79,16 @@ def test_features_are_encoded_in_passes_of_four(model_of):
     vectors = -(-len(data["numbers"]["names"]) // 4)
     assert f"uniform vec4 scene_numbers[{vectors}];" in path["source"]
     assert data["lights"] == [{"color": [1.0, 0.78, 0.5], "power": 14.0, "area": 0.25}]
+
+
+def test_shadow_rays_are_those_of_the_model_s_training(model_of):
+    """PTK-22: by the kernel of paths, as many as the facts of the training say, or one."""
+    model = replace(model_of("color", "direct"), info={"trained_on_shadow_rays": "2, 3"})
+    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
+    (path,) = data["paths"]
+    assert "direct_b" in path["planes"]
+    assert "by 3 shadow rays of each camera ray" in path["source"]
+    assert np.any(floats(data["check"]["images"]["direct"]["values"]) > 0.0)
 
 
 def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):

@@ -37,7 +37,7 @@ SETTINGS = Settings(max_depth=3)
 ALL = tuple(dataset.FIRST_HITS)
 
 CASES = {
-    "minicubes, all features": ("minicubes", ALL, 4, "clamp", (13, 37), 1),
+    "minicubes, all features": ("minicubes", (*ALL, "direct"), 4, "clamp", (13, 37), 1),
     "cornell, colour and normal": ("cornell", ("color", "normal"), 5, "zero", (9, 17), 3),
     "lone light, odd order": ("lone_light", ("depth", "normal", "color"), 3, "clamp", (7, 1), 2),
     "empty, one pixel": ("empty", ("color", "direction"), 2, "zero", (1, 1), 1),
@@ -142,7 +142,8 @@ def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
 def test_the_whole_separate_way(executor, model_of, case):
     """With the path kernel that writes all planes: where all pixels of a window are the same paths."""
     name, features, size, border, shape, samples = CASES[case]
-    model, job = model_of(features, size, border), Job(*shape[::-1], samples, 3, SETTINGS)
+    model, rays = model_of(features, size, border), int("direct" in features)
+    job = Job(*shape[::-1], samples, 3, SETTINGS, shadow_rays=rays)
     with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
         found = pipeline.run(seed=3, spp=samples)
     sums, encode = traced(executor, model, name, (shape, samples), 3)
@@ -183,7 +184,7 @@ def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, la
 
 
 RAYS = {
-    "spread over the pixel": ("minicubes", ALL, (13, 37), "pcg4d", "", (4, 1, 0)),
+    "spread over the pixel": ("minicubes", (*ALL, "direct"), (13, 37), "pcg4d", "", (4, 1, 0)),
     "at random, later samples": ("cornell", ("color", "normal"), (9, 17), "pcg4d", "pcg4d", (3, 2, 5)),
     "of Sobol points": ("cornell", ("albedo", "color"), (5, 12), "sobol", "", (4, 3, 4)),
     "no colour": ("lone_light", ("depth", "normal"), (7, 3), "pcg4d", "net", (16, 1, 0)),
@@ -203,7 +204,7 @@ def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, c
     name, features, size, sampler, source, (rays, spp, first) = RAYS[case]
     model, settings = model_of(features, 3, "clamp"), replace(SETTINGS, sampler=sampler)
     own = {"feature_spp": rays, "feature_sampler": source}
-    job = Job(*size[::-1], spp, 3, settings, first_sample=first, **own)
+    job = Job(*size[::-1], spp, 3, settings, first_sample=first, shadow_rays=int("direct" in features), **own)
     frame = render_on(executor, scene(name), job).frame
     with Pipeline(executor, scene(name), model, size, settings=settings, sums=sums, **own) as pipeline:
         pipeline.draw(3, spp, first)

@@ -208,3 +208,32 @@ def test_rows_of_two_lengths_are_refused():
     """NumPy's own error went through."""
     with pytest.raises(InputError, match="must be arrays of numbers, with rows of one length"):
         metrics.mse([[1.0], [1.0, 2.0]], [[1.0], [1.0, 2.0]])
+
+
+def test_a_blur_leaves_what_is_even_and_takes_noise_away() -> None:
+    """MET-10: a difference that is the same everywhere stays, at the border too; a checkerboard vanishes."""
+    flat, (y, x) = np.zeros((40, 50, 3)), np.mgrid[0:40, 0:50]
+    assert abs(metrics.blurred(flat + 0.25, flat) - 0.25) <= 64 * U64
+    board = flat + np.where((x + y) % 2, 0.25, -0.25)[..., None]
+    assert metrics.blurred(board, flat) <= 0.002 < metrics.mse(board, flat)
+    # One pixel among dark ones: the sum of squares of a Gaussian of unit sum is 1 / (4 pi sigma^2).
+    dot = np.zeros((97, 97, 1))
+    dot[48, 48] = 1.0
+    expected = math.sqrt(1.0 / (4.0 * math.pi * 64.0)) / 97
+    # Cut at three standard deviations: 0.0027 of the weight is missing in each direction.
+    assert abs(metrics.blurred(dot, 0.0 * dot) / expected - 1.0) <= 0.01
+    with pytest.raises(InputError, match="a blur needs"):
+        metrics.blurred(flat[..., 0], flat[..., 0])
+
+
+def test_a_penumbra_is_where_lamps_are_partly_hidden() -> None:
+    """MET-11: shares of 0, 1/20, 1/2, 19/20 and 1 of the light, and no light at all; then the error there."""
+    most = np.ones((1, 6, 3)) * [0.5, 0.25, 0.25]
+    most[0, 5] = 0.0
+    share = np.array([0.0, 0.0499, 0.5, 0.9501, 1.0, 0.0])[None, :, None]
+    mask = metrics.penumbra(share * most, most)
+    assert mask.tolist() == [[False, False, True, False, False, False]]
+    assert metrics.inside(mask, most + share, most) == 0.5
+    for wrong in (mask & False, mask[:, :5]):
+        with pytest.raises(InputError, match=r"mask of pixels .*: must have a pixel at least, and"):
+            metrics.inside(wrong, most, most)

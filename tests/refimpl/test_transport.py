@@ -17,7 +17,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light import scenes, transport
 from wamnet.refimpl.light.camera import camera_basis, camera_ray
-from wamnet.refimpl.light.intersection import Surface
+from wamnet.refimpl.light.intersection import Hit, Surface, reflecting
 from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene
 from wamnet.refimpl.light.transport import Settings
 
@@ -360,3 +360,63 @@ def test_frames_have_unshadowed_light():
         bound += 14.0 * radiance.max() * 2.0**-20
     assert np.max(np.abs(frame["unshadowed"] - expected)) <= bound
     assert expected.max() >= 1000 * bound
+
+
+# ---- the layer direct --------------------------------------------------------------------------------------
+
+
+def shaded(*lights, quads=(), samples=1, rays=1, reflectance=0.5, dtype="float64"):
+    """Return the layers unshadowed and direct (3,) of a floor's point at the origin under some lights."""
+    floor = Quad((-9.0, 0.0, -9.0), (0.0, 0.0, 18.0), (18.0, 0.0, 0.0), (reflectance,) * 3)
+    scene = Scene("lit", Camera((0.0, 1.0, 5.0), (0.0, 0.0, 0.0)), quads=(floor, *quads), lights=lights)
+    world = transport.build(scene, Settings(), dtype)
+    one = np.ones((samples, 1), dtype)
+    surface = reflecting(*(one * np.array(row, dtype) for row in ((0, 0, 0), (0, 1, 0), (reflectance,) * 3)))
+    hit = Hit(one[:, 0], np.zeros(samples, np.int32))
+    counters = transport.Counters(rng.counter(3), rng.counter(8), rng.counter(np.arange(samples)))
+    parts = [transport.direct(world, surface, hit, counters, rays, np.uint32(n)) for n in range(rays)]
+    return transport.unshadowed(world, surface)[0], sum(parts).mean(axis=0)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_direct_light_without_shadows_has_no_noise(dtype):
+    """LTR-12: lamps of one hue, wherever they are: the unshadowed light, up to a few roundings."""
+    lamps = [lamp(1.0, 2.0), lamp(0.5, 1.0, power=1.0, x=1.0), lamp(0.25, 3.0, power=0.0)]
+    unshadowed, direct = shaded(*lamps, samples=4, rays=3, dtype=dtype)
+    assert unshadowed.min() > 0.0
+    assert np.all(np.abs(direct - unshadowed) <= 32 * np.finfo(dtype).eps * unshadowed)
+
+
+@pytest.mark.parametrize(("samples", "rays"), [(64, 1), (4, 16), (1, 64)])
+def test_direct_light_is_the_share_that_is_seen(samples, rays):
+    """A plate hides the half of a lamp beyond x = 0: exactly half of the points of a net are in each half."""
+    plate = Quad((0.0, 1.0, -3.0), (3.0, 0.0, 0.0), (0.0, 0.0, 6.0), (0.0, 0.0, 0.0))
+    unshadowed, direct = shaded(lamp(1.0, 2.0), quads=(plate,), samples=samples, rays=rays)
+    assert np.all(np.abs(direct - unshadowed / 2) <= 1e-9 * unshadowed)
+    covered = replace(plate, corner=(-3.0, 1.0, -3.0), edge_u=(6.0, 0.0, 0.0))
+    assert not shaded(lamp(1.0, 2.0), quads=(covered,), samples=samples, rays=rays)[1].any()
+
+
+def test_lamps_of_other_hues_are_mixed_in_proportion():
+    """Of 64 points in a net, the number in an interval is off by 1 at most from 64 times its length."""
+    lamps = lamp(1.0, 2.0, (1.0, 0.0, 0.0)), lamp(0.5, 1.0, (0.0, 1.0, 0.0), x=1.0)
+    unshadowed, direct = shaded(*lamps, samples=16, rays=4)
+    assert np.all(np.abs(direct - unshadowed) <= unshadowed.sum() / 64)
+    assert (unshadowed > 0.0).tolist() == [True, True, False]
+
+
+def test_the_layer_changes_no_other():
+    """RND-2f: bits of colour and features, with and without their own rays; its facts are reported."""
+    scene = scenes.canonical("cornell")
+    for rays in (0, 4):
+        plain = R.Job(12, 12, 2, 5, Settings(max_depth=2), feature_spp=rays)
+        without, found = (R.render(scene, replace(plain, shadow_rays=n)).frame for n in (0, 2))
+        assert "direct" not in without
+        assert (without.info.get("shadow_rays"), found.info["shadow_rays"]) == (None, "2")
+        assert all(np.array_equal(found[name], without[name]) for name in without.layers)
+        light, most = found["direct"], found["unshadowed"]
+        assert 0.0 < light.sum() < most.sum()
+    dark = R.render(scenes.canonical("furnace"), R.Job(4, 4, shadow_rays=1)).frame
+    assert not dark["direct"].any()
+    with pytest.raises(InputError, match="shadow_rays 65: must be an integer from 0 to 64"):
+        R.Job(4, 4, shadow_rays=65)

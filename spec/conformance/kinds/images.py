@@ -225,6 +225,11 @@ def _psnr_bound(value: float, count: int) -> float:
     return 0.0 if math.isinf(value) else 10.0 / math.log(10.0) * gamma(count + 10) + 8.0 * UNIT * abs(value)
 
 
+def _blur_bound(value: float, count: int) -> float:
+    """Return the bound of a root of a mean: differences of numbers up to 4 after two blurs, 49 taps each."""
+    return 4.0 * gamma(count + 2 * 60)
+
+
 def _ssim_bound(value: float, count: int, largest: float = 1.0) -> float:
     """Means of 121 products lose gamma(32) of the squares' size; the least denominator is c2 = 9e-4.
 
@@ -242,6 +247,7 @@ METRICS: Mapping[str, tuple[str, Callable[[Array, Array], float], Bound]] = {
     "ssim": ("MET-5", metrics.ssim, _ssim_bound),
     "relmse": ("MET-6", metrics.relmse, _sum_bound),
     "smape": ("MET-7", metrics.smape, _sum_bound),
+    "blurred": ("MET-10", metrics.blurred, _blur_bound),
 }
 """Clause, function and bound of each metric."""
 
@@ -289,8 +295,9 @@ def _metric_cases(name: str) -> list[Case]:
         add(_in_file(image), _in_file(reference), function(pictures[image], pictures[reference]), note)
     for note, *small in ROWS["small"]:
         left, right = map(np.array, small)
-        valid = name != "ssim"
-        add(left, right, function(left, right) if valid else None, note if valid else "smaller than a window")
+        valid = name != "ssim" and (name != "blurred" or left.ndim == 3)
+        why = note if valid else "two axes" if name == "blurred" else "smaller than a window"
+        add(left, right, function(left, right) if valid else None, why)
     if name == "ssim":
         left, right = pictures["noisy"][:11, :11, :1], pictures["reference"][:11, :11, :1]
         add(left, right, function(left, right), "exactly a window")

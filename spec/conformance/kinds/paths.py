@@ -21,7 +21,7 @@ import numpy as np
 from ....compiler.core.loops import STATEMENTS
 from ....compiler.proof import ranges
 from ....compiler.proof.ranges import Range
-from ....compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
+from ....compiler.scenes.lower_scene import LIT, PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
 from ....refimpl import rng
 from ....refimpl.light import camera, render, transport
 from ....refimpl.light import scene as scene_module
@@ -87,15 +87,15 @@ def _world(text: str, settings_text: str) -> World:
     return World(transport.build(read, settings, np.float64), camera.camera_basis(read.camera, np.float64))
 
 
-def programs_of(name: str, settings: Settings) -> PathPrograms:
+def programs_of(name: str, settings: Settings, shadow_rays: int = 0) -> PathPrograms:
     """Return the programs of a path; they do not depend on the greatest depth."""
-    return _programs(name, replace(settings, max_depth=0))
+    return _programs(name, replace(settings, max_depth=0), shadow_rays)
 
 
 @cache
-def _programs(name: str, settings: Settings) -> PathPrograms:
+def _programs(name: str, settings: Settings, shadow_rays: int) -> PathPrograms:
     """Return the programs of a path through a canonical scene, made once."""
-    return lower_scene(scene(name), settings, STATEMENTS)
+    return lower_scene(scene(name), settings, STATEMENTS, shadow_rays=shadow_rays)
 
 
 # ---- steps in float64 -----------------------------------------------------------------------------------
@@ -149,6 +149,15 @@ def scatter(inputs: Mapping[str, Any]) -> State:
     return {"alive": np.True_, **{name: getattr(found, name)[0] for name in SCATTERED}}
 
 
+def shadow(inputs: Mapping[str, Any]) -> State:
+    """Return what a shadow ray adds to the layer `direct`."""
+    world, of_surface = world_of(inputs["scene"], inputs["settings"]).world, _lanes(SURFACE, inputs)
+    surface = reflecting(*(of_surface[name] for name in ("point", "normal", "reflectance")))
+    hit = Hit(of_surface["t"], of_surface["surface"])
+    numbers = int(inputs["shadow_rays"]), rng.counter(int(inputs["shadow_number"]))
+    return {"direct": transport.direct(world, surface, hit, _counters(inputs), *numbers)[0]}
+
+
 ARRIVED = ("t", "surface", "point", "normal", "reflectance")
 """The outputs of an arrival before its light, in the order in which they are looked at."""
 
@@ -168,7 +177,8 @@ def _flat(inputs: Mapping[str, Any], values: Values) -> dict[str, Any]:
 
 def _counted(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the counters by the names of programs."""
-    own = {"sample_number": "sample", **{name: name for name in ("seed", "pixel", "x", "y", "depth")}}
+    same = ("seed", "pixel", "x", "y", "depth", "shadow_number")
+    own = {"sample_number": "sample", **{name: name for name in same}}
     found = {name: rng.counter(int(inputs[key])) for name, key in own.items() if key in inputs}
     sizes = {name: np.array([inputs[name]], np.float32) for name in ("width", "height") if name in inputs}
     return {**found, **sizes}
@@ -208,7 +218,7 @@ WITH_ROULETTE = {"alive": "LTR-9", "beta": "LTR-9"}
 
 def _clauses(name: str, view: View, inputs: Mapping[str, Any], wanted: State) -> dict[str, str]:
     """Return the clauses of a case's outputs where they are not the case's own."""
-    found = {**CLAUSES[name], **({"radiance": "SHD-4"} if view.scene == "mirrors" else {})}
+    found = {**CLAUSES.get(name, {}), **({"radiance": "SHD-4"} if view.scene == "mirrors" else {})}
     if name != "path.scatter":
         return found
     seen = scene(view.scene)
@@ -240,7 +250,7 @@ def _expected(
         if name == "pixel":
             outputs[name] = Output(value, clause=clause)
             continue
-        ends, form = {**PATH, **SURFACE, "alive": (("",), "bool")}[name]
+        ends, form = {**PATH, **SURFACE, **LIT, "alive": (("",), "bool")}[name]
         low, high, sure = _ends(found, name, ends)
         if not sure and not guided:
             return None
@@ -276,7 +286,8 @@ def step(
     """
     answer, own_clause = STEPS[name]
     wanted = answer({**inputs, "scene": scene_text(view.scene)})
-    program = programs_of(view.scene, view.settings).parts[name.removeprefix("path.")]
+    programs = programs_of(view.scene, view.settings, inputs.get("shadow_rays", 0))
+    program = programs.parts[name.removeprefix("path.")]
     states = [_flat(inputs, values) for values in (PATH, SURFACE) if values.keys() <= inputs.keys()]
     found = ranges.evaluate(program, dict(ChainMap(*states, _counted(inputs))), guided=guided)
     if of_light is None:
@@ -290,7 +301,12 @@ def step(
     return wanted
 
 
-STEPS = {"path.start": (start, "CAM-3"), "path.arrive": (arrive, "LTR-2"), "path.scatter": (scatter, "LTR-7")}
+STEPS = {
+    "path.start": (start, "CAM-3"),
+    "path.arrive": (arrive, "LTR-2"),
+    "path.scatter": (scatter, "LTR-7"),
+    "path.shadow": (shadow, "LTR-12"),
+}
 """Function and clause of each step."""
 
 
@@ -307,7 +323,25 @@ def _steps() -> Cases:
         walk(cases, view)
     _refuse(cases, "no_integers")
     _decide(cases)
+    _shade(cases)
     return cases
+
+
+def _shade(cases: Cases) -> None:
+    """Add shadow rays from the surfaces of scatterings; counts and numbers of rays in turn."""
+    settings = asdict(Settings())
+    for index, case in enumerate(cases["path.scatter"]):
+        name = case.inputs["scene"]["file"].removeprefix("scenes/").removesuffix(".json")
+        if name not in SHADED:
+            continue
+        kept = {key: case.inputs[key] for key in ("scene", "seed", "sample", "pixel", *SURFACE)}
+        rays = (1, 4, 64)[index % 3]
+        numbers = {"settings": settings, "shadow_rays": rays, "shadow_number": 5 * index % rays}
+        step(cases, "path.shadow", View(name, Settings()), {**kept, **numbers}, note=f"{name}, {rays} rays")
+
+
+SHADED = ("terrace", "foundry", "minicubes", "cornell", "daylight", "vitrine")
+"""Scenes of shadow rays: of several lamps, of one, of none, of lamps next to blocks and spheres."""
 
 
 def _decide(cases: Cases) -> None:

@@ -79,6 +79,7 @@ def render(
     spp: int = 1,
     feature_spp: int = 0,
     seen: bool = False,
+    shadow_rays: int = 0,
     seed: int = 0,
     max_depth: int = 5,
     time: float | None = None,
@@ -90,8 +91,9 @@ def render(
     `scene` is the name of a canonical scene, with its `parameters` (`wamnet scene NAME` prints it), the path
     of a scene file (`.json`), or a scene. `width` and `height` are in pixels, `spp` is in paths per pixel,
     `feature_spp` in camera rays per pixel for the features (0: those of the paths), `time` in the scene's
-    own unit. `seen` adds the layers of what is seen through mirrors and glass. `max_depth` is the largest
-    number of bounces. The same arguments give the same frame, on every executor up to rounding.
+    own unit. `seen` adds the layers of what is seen through mirrors and glass, `shadow_rays` per camera ray
+    the layer `direct`: the lamps' light with shadows. `max_depth` is the largest number of bounces. The same
+    arguments give the same frame, on every executor up to rounding.
 
     Returns a `Frame` of float32 layers (height, width, channels): `frame["color"]`, linear radiance;
     `"albedo"` in [0, 1]; `"normal"`, unit length; `"position"` and `"depth"` in scene units, and others.
@@ -105,7 +107,8 @@ def render(
     from .refimpl.light.transport import Settings
 
     settings = Settings(max_depth=max_depth)
-    job = Job(width, height, spp, seed, settings, "float32", feature_spp=feature_spp, seen=seen)
+    more = {"feature_spp": feature_spp, "seen": seen, "shadow_rays": shadow_rays}
+    job = Job(width, height, spp, seed, settings, "float32", **more)  # type: ignore[arg-type]
     loaded = _scene(scene, parameters if time is None else {**parameters, "time": time})
     return render_frame(_name(executor), loaded, job).frame
 

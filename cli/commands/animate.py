@@ -131,6 +131,7 @@ def animate(
     """
     from ...compiler.scenes.lower_encode import feature_rays
     from ...models.data.frame_plan import animation_times
+    from ...refimpl.network.denoise import learned_shadow_rays
 
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
@@ -143,7 +144,8 @@ def animate(
     view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
-    shots = plan_shots(folder, named, times, (size, reference_spp, seed, rays), facts, network.features)
+    numbers = size, reference_spp, seed, rays, learned_shadow_rays(network)
+    shots = plan_shots(folder, named, times, numbers, facts, network.features)
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)
@@ -267,25 +269,26 @@ def plan_shots(
     folder: Path,
     named: tuple[str, dict[str, Any], options.View],
     times: Sequence[float],
-    numbers: tuple[int, int, int, int],
+    numbers: tuple[int, int, int, int, int],
     facts: Sequence[str],
     features: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation at some times.
 
     `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
-    and camera rays of the features (or 0).
+    and, or 0, camera rays of the features and shadow rays of each.
     """
     from ...compiler.scenes.lower_encode import sees
     from ...models.data.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
 
-    (name, parameters, view), (size, spp, seed, rays) = named, numbers
+    (name, parameters, view), (size, spp, seed, rays, shadow_rays) = named, numbers
     source, shots = scene_source(name, parameters), []
+    features_of = {"feature_spp": rays, "seen": sees(features), "shadow_rays": shadow_rays}
     for index, time in enumerate(times):
         scene = view.of(source.at(time))
-        noisy = Job(size, size, 1, seed + 2 * index, feature_spp=rays, seen=sees(features))
+        noisy = Job(size, size, 1, seed + 2 * index, **features_of)  # type: ignore[arg-type]
         reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
         made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]
         text = json.dumps([*made_from, machine.versions()["wamnet"]])
@@ -367,7 +370,7 @@ def draw_frames(
         return
     first, scenes, model = shots[0], [shot.scene for shot in shots], watch.model
     # A reference is traced by the pipeline's kernel, unless that has rays of features too, or sees more.
-    apart = feature_job(first.noisy) is not None or first.noisy.seen
+    apart = feature_job(first.noisy) is not None or first.noisy.seen or first.noisy.shadow_rays
     frames = Frames(scenes) if apart else None
     with Pipeline(
         executor,

@@ -110,13 +110,13 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     from ...compiler.scenes.lower_encode import sees
     from ...models.data.frame_plan import Request
     from ...refimpl.light.render import FEATURE_SAMPLER
-    from ...refimpl.network.denoise import learned_feature_spp
+    from ...refimpl.network.denoise import learned_feature_spp, learned_shadow_rays
 
     scene = trained_scene(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
     rays = learned_feature_spp(model)
     numbers = {**numbers, **ranges_of(model), "feature_spp": rays if rays > 1 else 0}
-    numbers["seen"] = sees(model.features)
+    numbers |= {"seen": sees(model.features), "shadow_rays": learned_shadow_rays(model)}
     # Frames of before say no source: theirs was the colour's.
     numbers["feature_sampler"] = model.info.get(f"trained_on_{FEATURE_SAMPLER}", Request.sampler)
     found = Request(scene, executor=executor, **numbers)

@@ -176,6 +176,7 @@ def dataset(
     test_spp: TestSpp = 0,
     feature_spp: options.FeatureSpp = 0,
     seen: options.Seen = False,
+    shadow_rays: options.ShadowRays = 0,
     start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
     seconds: Duration = 8.0,
     arc: Arc = 0.0,
@@ -218,7 +219,7 @@ def dataset(
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
     ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
-    request = _request(command, named, (*numbers, *ways), limits, (seen, power, before))
+    request = _request(command, named, (*numbers, *ways), limits, (seen, power, before, shadow_rays))
     _check_workers(workers, scheduler)
     request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
     _make_from_scene(output, request, workers, scheduler)
@@ -229,20 +230,21 @@ def _request(
     named: tuple[str, Parameters],
     numbers: tuple[Any, ...],
     limits: Mapping[str, str | None],
-    last: tuple[bool, str | None, int],
+    last: tuple[bool, str | None, int, int],
 ) -> Request:
-    """Return the request of a scene's name and parameters, of fields, ranges by option and the last three."""
+    """Return the request of a scene's name and parameters, of fields, ranges by option and the last four."""
     from ...models.data.frame_plan import Request
     from ...models.data.scene_source import scene_source
 
     options.refuse_given(command, OF_BLENDER, "without --from-blender")
-    source, (seen, power, before) = scene_source(*named), last
+    source, (seen, power, before, shadow_rays) = scene_source(*named), last
     if source.still is not None:
         options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
     ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
     factors = None if power is None else options.parse_limits("--power", power)
     request = Request(source.name, source.parameters, *numbers, *ranges)
-    return replace(request, seen=seen, power=factors, before=before, still=source.still)
+    request = replace(request, seen=seen, power=factors, before=before, still=source.still)
+    return replace(request, shadow_rays=shadow_rays)
 
 
 def _make_from_scene(folder: Path, request: Request, workers: int | None, scheduler: str | None) -> None:

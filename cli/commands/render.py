@@ -25,6 +25,8 @@ wamnet render minicubes --feature-spp 4 -o noisy.exr
 
 wamnet render glossy --seen -o mirrors.exr
 
+wamnet render minicubes --feature-spp 4 --shadow-rays 4 -o shadows.exr
+
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
 
 wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
@@ -61,6 +63,7 @@ def render(
     spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
     feature_spp: options.FeatureSpp = 0,
     seen: options.Seen = False,
+    shadow_rays: options.ShadowRays = 0,
     seed: options.Seed = 0,
     time: options.Time = None,
     parameters: options.Parameters = None,
@@ -89,21 +92,20 @@ def render(
     from ...refimpl.light.render import Job
     from ...refimpl.light.transport import Settings
 
-    view = options.View(yaw, pitch, distance, tuple(light or ()))
-    loaded = load_scene(scene, time, parameters or [], view)
+    loaded = load_scene(scene, time, parameters or [], options.View(yaw, pitch, distance, tuple(light or ())))
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler.value)
-    job = Job(width, height, spp, seed, settings, dtype.value, feature_spp=feature_spp, seen=seen)
+    job = Job(width, height, spp, seed, settings, dtype.value, 0, feature_spp, seen, shadow_rays=shadow_rays)
     tracer = _tracer(executor, workers, dtype)
     for line in said_of_rendering(loaded, job.samples, width * height, tracer, workers):
         say(line)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples, "samples") as advance:
         frame = render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
-    seconds = clock.perf_counter() - started
+    taken = f"{clock.perf_counter() - started:.1f} s"
     write_picture(path, frame, exposure)
-    say(f"{path}: {width}x{height} pixels, {spp} spp, {seconds:.1f} s")
+    say(f"{path}: {width}x{height} pixels, {spp} spp, {taken}")
 
 
 def _tracer(executor: ExecutorChoice, workers: int | None, dtype: FloatType) -> str:

@@ -82,6 +82,7 @@ def trained_scene(model: Model) -> str | None:
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
     from ...models.data.scene_source import SCENE_FILE
+    from ...refimpl.light.render import SHADOW_RAYS
 
     told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
@@ -93,6 +94,9 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
         told.append(f"outside the training ranges: {', '.join(beyond)}; expect errors")
     if scenes and "spp" in info and (rule := unlike_features(model, info)):
         told.append(f"{rule}: expect worse edges")
+    rays, learned = info.get(SHADOW_RAYS, ""), model.info.get(f"trained_on_{SHADOW_RAYS}", "")
+    if rays and learned and rays not in learned.split(", "):
+        told.append(f"its --shadow-rays are {rays}, those of the training {learned}: expect other shadows")
     return told
 
 

@@ -127,6 +127,7 @@ class Preset(str, Enum):
 
     best = "best"
     mirrors = "mirrors"
+    shadows = "shadows"
     paper = "paper"
     short = "short"
     sky = "sky"
@@ -315,6 +316,15 @@ FeatureSpp = Annotated[
         help="Stratified camera rays per pixel for the features; 4 give smooth edges, and each "
         "costs a fraction of a path.",
         show_default="same as --spp",
+    ),
+]
+ShadowRays = Annotated[
+    int,
+    typer.Option(
+        "--shadow-rays",
+        metavar="N",
+        help="Also write the layer direct: direct light with its soft shadows, by N shadow rays per camera "
+        "ray.",
     ),
 ]
 Seen = Annotated[

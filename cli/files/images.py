@@ -17,9 +17,13 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...refimpl import encoding
 from ...refimpl.errors import InputError
-from ...refimpl.frame import Floats
+from ...refimpl.frame import DIRECT, Floats
+from ...refimpl.metrics import penumbra
 from ...refimpl.reading import check_room, read_file
 from ..common.inputs import check_input
 from ..common.packages import need
@@ -38,10 +42,11 @@ ORIGIN = "wamnet.origin"
 
 @dataclass(frozen=True)
 class Image:
-    """Colour (H, W, 3) display-encoded in [0, 1], and as linear radiance."""
+    """Colour (H, W, 3) display-encoded in [0, 1], and as linear radiance; a reference's penumbra (H, W)."""
 
     display: Floats
     linear: Floats
+    penumbra: NDArray[np.bool_] | None = None
 
 
 def write_png(path: Path, encoded: Floats, origin: str = "") -> None:
@@ -150,8 +155,9 @@ def read_image(path: Path, exposure_stops: float = 0.0, tell: Callable[[str], No
     if suffix == ".exr":
         frame = exr.read_frame(path, tell=tell)
         exr.need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
-        linear = frame["color"]
-        return Image(encoding.to_display(linear, exposure_stops), linear)
+        linear, lit = frame["color"], DIRECT in frame and "unshadowed" in frame
+        mask = penumbra(frame[DIRECT], frame["unshadowed"]) if lit else None
+        return Image(encoding.to_display(linear, exposure_stops), linear, mask)
     if path.is_dir():
         check_input(path)
     raise InputError("input file", str(path), "must end in .exr or .png", "convert it")

@@ -28,8 +28,11 @@ class Score:
 
 
 def measure(image: Image, reference: Image) -> tuple[Score, ...]:
-    """Return the score of each metric, on the form of the colours that it is meant for."""
-    from ...refimpl.metrics import METRICS
+    """Return the score of each metric, on the form of the colours that it is meant for.
+
+    In the penumbra too, where the reference has the layers that it is computed from.
+    """
+    from ...refimpl.metrics import METRICS, inside
 
     scores = []
     for metric in METRICS.values():
@@ -42,6 +45,9 @@ def measure(image: Image, reference: Image) -> tuple[Score, ...]:
             scores.append(Score(metric.name, None, metric.unit, "infinite: no difference"))
         else:
             scores.append(Score(metric.name, value, metric.unit))
+    if reference.penumbra is not None and reference.penumbra.any():
+        inner = inside(reference.penumbra, image.display, reference.display)
+        scores.append(Score("penumbra RMSE", inner, ""))
     return tuple(scores)
 
 

@@ -74,6 +74,8 @@ class Request:
     from `feature_sampler`, "" is an even spread. Targets have `spp` samples, those of test frames `test_spp`;
     0: as many. `seen`: noisy pictures have the layers of what is seen past mirrors and glass too. `before`:
     they have layers of history after so many pictures, in which the animation runs and the camera rests.
+    `shadow_rays`: they, and targets of tests, have the layer `direct`, by so many shadow rays of each camera
+    ray.
     """
 
     scene: str
@@ -100,6 +102,7 @@ class Request:
     feature_sampler: str = ""
     power: Pair | None = None
     before: int = 0
+    shadow_rays: int = 0
     still: Scene | None = None
 
     def as_data(self) -> dict[str, Any]:
@@ -113,9 +116,8 @@ class Request:
         if self.feature_spp > NOISY_SPP and source != self.sampler:
             data["feature_sampler"] = source
         lists = {k: list(v) if isinstance(v, tuple) else v for k, v in sorted(self.parameters.items())}
-        later = (("seen", self.seen), ("power", self.power is not None), ("before", self.before > 0))
-        for name, given in later:
-            if not given:
+        for name in ("seen", "power", "before", "shadow_rays"):
+            if data[name] in (False, None, 0):
                 del data[name]
         return {**data, "parameters": lists}
 
@@ -284,9 +286,12 @@ def plan(request: Request) -> list[FramePlan]:
         target_spp = request.spp if split == TRAIN else request.test_spp or request.spp
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
+            if split != TRAIN:  # a penumbra is measured by its reference
+                job = replace(job, shadow_rays=request.shadow_rays)
             if kind == KINDS[0]:
                 rays, sampler = request.feature_spp, request.feature_sampler
                 job = replace(job, feature_spp=rays, feature_sampler=sampler, seen=request.seen)
+                job = replace(job, shadow_rays=request.shadow_rays)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
         frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1

@@ -131,6 +131,9 @@ SHORT = Recipe(
 BEST = replace(SHORT, steps=30_000)
 """The same for longer, which pays with many frames; chosen by `experiments/quality.py`."""
 
+SHADOWS = replace(BEST, features=("color", "normal", "albedo", "position", "direct"))
+"""For soft shadows, of frames that have the layer `direct`; chosen by `experiments/shadows.py`."""
+
 MIRRORS = replace(
     BEST,
     features=(
@@ -153,6 +156,7 @@ PRESETS: Mapping[str, Recipe] = {
     "best": BEST,
     "mirrors": MIRRORS,
     "paper": PAPER,
+    "shadows": SHADOWS,
     "short": SHORT,
     "sky": SKY,
 }

@@ -36,6 +36,19 @@ def test_the_table(wamnet, samples) -> None:
     assert " dB" in out
 
 
+def test_the_penumbra_is_the_reference_s(wamnet, tmp_path) -> None:
+    """MET-11: a row more where the reference has the layers that it is made of."""
+    size = ("--width", 16, "--height", 16, "--executor", "numpy", "--workers", 1)
+    assert wamnet("render", "cornell", *size, "-o", "noisy.exr").status == 0
+    assert wamnet("render", "cornell", *size, "--spp", 4, "--shadow-rays", 4, "-o", "clean.exr").status == 0
+    found = json.loads(wamnet("compare", "noisy.exr", "clean.exr", "--json").out)["metrics"]
+    noisy, clean = (exr.read_frame(tmp_path / f"{name}.exr") for name in ("noisy", "clean"))
+    mask = metrics.penumbra(clean["direct"], clean["unshadowed"])
+    error = metrics.inside(mask, *(to_display(frame["color"]) for frame in (noisy, clean)))
+    assert found["penumbra RMSE"] == error > 0.0
+    assert "direct" not in noisy
+
+
 def test_identical_and_tiny_pictures(wamnet, tmp_path) -> None:
     """Infinity and metrics that are not defined are null in JSON, with the reason."""
     write_png(tmp_path / "a.png", np.full((2, 3, 3), 0.5))

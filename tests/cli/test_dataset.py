@@ -20,6 +20,7 @@ from wamnet.cli.common import cluster
 from wamnet.cli.files import dataset_files, exr
 from wamnet.kernels.run import render_frame
 from wamnet.models.data import draws, frame_plan
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
@@ -27,6 +28,7 @@ from wamnet.refimpl.light.scene import from_json, scene_digest
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges, Variation, ranges_from_json, varied
+from wamnet.refimpl.network.denoise import learned_shadow_rays
 
 TINY = ("minicubes", "--frames", 2, "--test", 1, "--size", 12, "--spp", 4)
 
@@ -100,6 +102,22 @@ def test_the_sampler_is_the_request_s(wamnet, tmp_path) -> None:
     outcome = wamnet("dataset", *TINY, "-o", "a")
     assert outcome.status == 2
     assert "sampler sobol (now pcg4d)" in outcome.err
+
+
+def test_shadow_rays_are_the_request_s(wamnet, tmp_path) -> None:
+    """DSF-3, MET-11, TRN-9d: noisy frames and targets of tests have the layer; a model keeps their number."""
+    assert wamnet("dataset", *TINY, "--shadow-rays", 2, "-o", "a").status == 0
+    assert json.loads((tmp_path / "a/manifest.json").read_text())["request"]["shadow_rays"] == 2
+    frames = {name: exr.read_frame(tmp_path / f"a/{name}.exr") for name in NAMES}
+    assert [name for name, frame in frames.items() if "direct" in frame] == [*NAMES[:1], *NAMES[2:]]
+    few = ("--preset", "shadows", "--steps", 2, "-o", "m.safetensors")
+    assert wamnet("train", "--dataset", "a", *few).status == 0
+    model = load_model(tmp_path / "m.safetensors")
+    assert (model.features[-1], learned_shadow_rays(model)) == ("direct", 2)
+
+
+NAMES = ("train/00000-noisy", "train/00000-target", "test/00000-noisy", "test/00000-target")
+"""Frames of a data set."""
 
 
 def test_what_is_seen_is_the_request_s(wamnet, tmp_path) -> None:

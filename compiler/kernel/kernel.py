@@ -199,7 +199,8 @@ class Barrier:
 class Launch:
     """A grid of items, which start when all items of the previous launch have ended.
 
-    `place`: names of an item's column and row, or of its column alone; `counts`: how many there are.
+    `place`: names of an item's column and row, or of its column alone; `counts`: how many there are. `name`:
+    that of its function, where a source has one for each launch.
     """
 
     place: tuple[str, ...]

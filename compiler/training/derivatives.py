@@ -94,7 +94,7 @@ class Derivatives(Nest):
         super().__init__(step.program, {}, LANES)
         self.step, self.size, self.vectors = step, size, 0
         self.outputs = dict(self.program.outputs)
-        (self.window,) = (
+        (self.gathered,) = (
             i for i, n in enumerate(self.program.nodes) if n.op == "input" and n["name"] == WINDOW
         )
         self.arrays: dict[int, int] = {}
@@ -133,7 +133,7 @@ class Derivatives(Nest):
     def is_array(self, index: int) -> bool:
         """Return whether a value is kept for all examples of a tile: something outside its loop reads it."""
         outside = any(self.group_of[reader] != self.group_of[index] for reader in self.readers[index])
-        return index != self.window and (outside or index in self.outputs.values())
+        return index != self.gathered and (outside or index in self.outputs.values())
 
     def again(self, index: int) -> bool:
         """Return whether other loops compute a value again: one operation on one value that is kept."""
@@ -149,6 +149,12 @@ class Derivatives(Nest):
     def place(self, index: int, example: Expr, vector: Expr | int) -> Expr:
         """Return where a vector of a value of an example is."""
         return OWN + self.arrays[index] + example * self.width(index) + vector
+
+    def kept(self, index: int, example: Expr, vector: Expr | int, value: Expr) -> list[Store]:
+        """Return the store of a vector of a value, if other loops read it."""
+        return (
+            [Store("scratch", (self.place(index, example, vector),), value)] if index in self.arrays else []
+        )
 
     def parameter(self, key: object, vector: Expr | int) -> Expr:
         """Return a vector of a parameter."""
@@ -168,7 +174,7 @@ class Derivatives(Nest):
 
     def numbers(self, index: int) -> _Rows:
         """Return where the numbers of a value of an example are: the window's are rows of an image."""
-        if index == self.window:
+        if index == self.gathered:
             corner, row = (partial(load, array, kind=INT) for array in ("corner", "row"))
             return _Rows("values", self.size, lambda n: corner(n) + DY * row(n))
         return _Rows("scratch", 1, lambda n: self.place(index, n, 0) * LANES)
@@ -183,12 +189,7 @@ class Derivatives(Nest):
         lines: list[Statement] = []
         if node.op != "input":
             for let, each in zip(self.statements(group, self.read, LANES), group, strict=True):
-                kept = (
-                    Store("scratch", (self.place(each, E, J),), name(let.name, VECTOR))
-                    if each in self.arrays
-                    else None
-                )
-                lines += [let, kept] if kept else [let]
+                lines += [let, *self.kept(each, E, J, name(let.name, let.value.type))]
             lines = [self.span(group), loop("e", name("filled"), loop("j", self.width(index), *lines))]
         elif node["name"] == TARGET:
             (count,) = node.type.shape
@@ -216,7 +217,7 @@ class Derivatives(Nest):
             body: Body = (
                 *(Array(f"s{n}_{j}", VECTOR, value=first[j]) for n, j in keys),
                 loop("dy", source.rows, *(Let(f"x{n}", source.start(E + n)) for n in examples), inner),
-                *(Store("scratch", (self.place(index, E + n, j),), _register(n, j)) for n, j in keys),
+                *(store for n, j in keys for store in self.kept(index, E + n, j, _register(n, j))),
             )
             found.append(For("e", name("filled"), body, step=const(len(examples))))
         return found
@@ -278,8 +279,5 @@ def _blocks(slot: Slot) -> list[range]:
 def _ended(slot: Slot, vector: int, value: Expr) -> Expr:
     """Return a vector of a row with zeros beyond the row's end."""
     left = slot.width - vector * LANES
-    return (
-        value
-        if left >= LANES
-        else apply("select", lanes(LANES) < splat(const(left, WORD), LANES), value, ZERO)
-    )
+    inside = lanes(LANES) < splat(const(left, WORD), LANES)
+    return apply("select", inside, value, ZERO) if left < LANES else value

@@ -109,12 +109,9 @@ def factors(step: Step) -> tuple[Launch, ...]:
         return ()
     rank, rows, places = step.split.rank, step.split.size, slots(step)
     product, vertical, horizontal = (places[key] for key in (step.split.parameter, *step.split.factors))
-    run, neurons = horizontal.rows, product.vectors
+    run, neurons, ranks = horizontal.rows, product.vectors, horizontal.vectors
     here = (DY * run + K) * neurons + product.offset + J
-    v, h = (
-        (DY * rank + R) * neurons + vertical.offset + J,
-        (K * horizontal.vectors + horizontal.offset) * LANES + R,
-    )
+    v, h = (DY * rank + R) * neurons + vertical.offset + J, (K * ranks + horizontal.offset) * LANES + R
     slope, start = name("slope", VECTOR), Array("slope", VECTOR, value=ZERO)
 
     def add(array: str, left: Expr, right: Expr) -> Store:
@@ -130,6 +127,6 @@ def factors(step: Step) -> tuple[Launch, ...]:
     w = If(RUNNING, (loop("j", neurons, start, terms, Store("moved", (here,), slope)),))
     return (
         Launch(("j", "dy"), (const(neurons), const(rows)), of_v, "vertical"),
-        Launch(("k",), (const(run),), (loop("r", horizontal.vectors * LANES, *of_h),), "horizontal"),
+        Launch(("k",), (const(run),), (loop("r", ranks * LANES, *of_h),), "horizontal"),
         Launch(("k", "dy"), (const(run), const(rows)), (w,), "expand"),
     )

@@ -58,13 +58,10 @@ class OpenCLTrainer:
             )
         self._groups = min(max(LEAST_GROUPS, device.max_compute_units), -(-kernel.step.batch // TILE))
         self._trained = {name: slot for name, slot in self._places.items() if name != SQUARES}
-        sizes = {
-            array.name: 4
-            * array.lanes
-            * math.prod({"groups": self._groups}.get(str(n), n) for n in array.shape)
-            for array in kernel.kernel.interface.arrays
-            if array.name in ("moved", "transposed", "scratch", "sums", "failed")
-        }
+        shared, sizes = [each for each in kernel.kernel.interface.both if each.name != "losses"], {}
+        for array in shared:
+            count = math.prod(self._groups if n == "groups" else int(n) for n in array.shape)
+            sizes[array.name] = 4 * array.lanes * count
         state = sizes.pop("moved")
         self._states = [self._empty(state) for _ in range(2)]
         self._arrays = {"values": self._upload(values), "targets": self._upload(targets)}

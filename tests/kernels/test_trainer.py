@@ -189,28 +189,6 @@ def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
     assert gradient_excess(opencl, SMALL, step_kernel.compile_lowered(lowered, 5)) > 1
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("s0_0 += w0 * 1.0f;", ""),
-        ("n < count", "n < filled"),
-        ("begin < first", "0"),
-        ("int x0 = corner[e] + dy * row[e];", "int x0 = corner[e];"),
-        ("dy * row[n] + k", "k"),
-    ],
-    ids=["bias", "fill", "restart", "rows forwards", "rows backwards"],
-)
-def test_planted_faults_in_the_text_are_found(opencl: Any, old: str, new: str) -> None:
-    """A missing bias derivative, examples counted twice, sums that forget, rows that are not followed."""
-    recipe = replace(SMALL, batch=700)
-    assert gradient_excess(opencl, recipe, with_source(kernel_of(recipe), old, new)) > 1
-
-
-def with_source(kernel: StepKernel, old: str, new: str) -> StepKernel:
-    assert old in kernel.source
-    return replace(kernel, source=kernel.source.replace(old, new))
-
-
 # ---- Adam ------------------------------------------------------------------------------------------------
 
 
@@ -284,13 +262,6 @@ def _inside(theta: Any, g: Any, m: Any, v: Any, rate: Any, grown: Any) -> Any:
 adam_update = adam.update
 
 
-def test_copies_that_stay_behind_are_found(opencl: Any) -> None:
-    """The backward pass reads transposed weights; without their update the second step is wrong."""
-    faulty = with_source(kernel_of(SMALL), "if (neuron", "if (0 && neuron")
-    assert gradient_excess(opencl, SMALL, faulty) <= 1
-    assert adam_excess(opencl, faulty) > 1
-
-
 @pytest.mark.parametrize("fault", [_swapped, _inside], ids=["betas swapped", "epsilon inside the root"])
 def test_planted_faults_in_adam_are_found(opencl: Any, monkeypatch: Any, fault: Any) -> None:
     with monkeypatch.context() as patch:
@@ -317,10 +288,9 @@ def test_a_step_has_the_bits_of_its_kernel_in_numpy(opencl: Any, rank: int) -> N
     flat = {key: np.ravel(value) for key, value in given.items()}
     found = run_on(kernel.kernel, flat, {"groups": run.device._groups, "at": 0, "step": 0})
     assert found["losses"] == [loss]
-    for key, buffer in {**run.device._arrays, "moved": run.device._states[1]}.items():
-        if key in ("moved", "transposed", "sums"):
-            ours = found[key]
-            assert np.array_equal(ours[~np.isnan(ours)], numbers_in(buffer)[~np.isnan(ours)]), key
+    for key, buffer in {"moved": run.device._states[1], "sums": run.device._arrays["sums"]}.items():
+        written = ~np.isnan(found[key])
+        assert np.array_equal(found[key][written], numbers_in(buffer)[written]), key
 
 
 def numbers_in(buffer: Any) -> Any:

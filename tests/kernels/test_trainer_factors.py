@@ -66,11 +66,11 @@ def kernel_of(recipe: Recipe) -> StepKernel:
     return compile_step(recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank)
 
 
-def excesses(opencl: Any, recipe: Recipe, kernel: StepKernel | None = None) -> tuple[float, float]:
+def excesses(opencl: Any, recipe: Recipe) -> tuple[float, float]:
     """Return the excess of the first step's derivatives by the factors, and of the product after it."""
     data = dataset.build(PAIRS, recipe.features, recipe.window, dataset.Normalization())
     state = train.start(recipe, dataset.Normalization(), data.digest)
-    device = opencl.open_trainer(kernel or kernel_of(recipe), data.values, data.targets)
+    device = opencl.open_trainer(kernel_of(recipe), data.values, data.targets)
     trainer.load(device, state)
     run = trainer.Run(device, recipe, data, 0, 0, state, {})
     run.enqueue(run.draw(0, 1))
@@ -91,11 +91,8 @@ def excesses(opencl: Any, recipe: Recipe, kernel: StepKernel | None = None) -> t
     moved = run.state(1)
     after = doubled(moved.factors)
     assert not np.array_equal(after.vertical, given_factors.vertical)
-    # Memory that a planted fault leaves unwritten may hold anything: NaN is beyond every bound.
-    with np.errstate(invalid="ignore"):
-        distance = np.abs(moved.siren.weights[0] - factored.expand(after))
-        excess = distance / step.expansion_error(after)
-    return float(max(far)), float(np.max(np.where(np.isnan(excess), np.inf, excess)))
+    excess = np.abs(moved.siren.weights[0] - factored.expand(after)) / step.expansion_error(after)
+    return float(max(far)), float(np.max(excess))
 
 
 def doubled(factors: Factors | None) -> Factors:
@@ -140,40 +137,10 @@ def test_the_preset_s_derivatives_are_within_the_bound(opencl: Any, rank: int) -
     assert max(excesses(opencl, recipe)) <= 1
 
 
-FAULTS = {
-    "a work item is forgotten": ("all += sums[n * SUMS + ", "all += sums[SUMS + "),
-    "a column is forgotten": ("k < 15; ++k) {\n            slope +=", "k < 14; ++k) {\n            slope +="),
-    "another channel": (") * 16)[r];\n        }\n        (sums", ") * 16)[r ^ 1];\n        }\n        (sums"),
-    "a row is forgotten": ("dy < 5 && r < 4", "dy < 4 && r < 4"),
-    "another neuron": ("[j] * (old + ", "[j] * (old - j + "),
-    "a product that stays behind": ("(moved + (dy * 15 + k) * 3)[j] = slope;", ""),
-    "a rank that is left out": ("r < 4; ++r) {\n                s", "r < 3; ++r) {\n                s"),
-    "others are not summed": ("int end = i < ", "int end = 0 * i < 0 * "),
-}  # fmt: skip
-"""A piece of the kernels' text, and what makes it wrong."""
-
-
-@pytest.mark.nightly(but=("a rank that is left out", "a row is forgotten"))
-@pytest.mark.parametrize("fault", FAULTS)
-def test_planted_faults_are_found(opencl: Any, fault: str) -> None:
-    """By one of the bounds, or by the first steps being others than the reference's (others)."""
-    recipe = replace(SMALL, widths=(40, 20), batch=700)
-    kernel, (old, new) = kernel_of(recipe), FAULTS[fault]
-    assert kernel.source.count(old) == 1
-    wrong = replace(kernel, source=kernel.source.replace(old, new))
-    if fault == "others are not summed":
-        assert distance_to_the_reference(opencl, recipe, wrong) > 8
-    else:
-        assert max(excesses(opencl, recipe, wrong)) > 1
-
-
-def distance_to_the_reference(opencl: Any, recipe: Recipe, kernel: StepKernel | None = None) -> float:
+def distance_to_the_reference(opencl: Any, recipe: Recipe) -> float:
     """Return how far a run ends from float64's, as a multiple of how far float32's reference does."""
     want, exact = (train.train(recipe, PAIRS, dtype=dtype) for dtype in (np.float32, np.float64))
-    with pytest.MonkeyPatch.context() as patch:
-        if kernel is not None:
-            patch.setattr(trainer, "compile_step", lambda *_: kernel)
-        found = train_on(opencl, recipe, PAIRS)
+    found = train_on(opencl, recipe, PAIRS)
     apart = far = 0.0
     states = (state.parameters + state.siren.weights[:1] for state in (want, exact, found))
     for a, b, c in zip(*states, strict=True):

@@ -9,16 +9,18 @@ import pytest
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.passes.gradient import TRANSPOSED
+from wamnet.compiler.kernel.kernel import INT, const, load, name, rewritten, splat
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.training import derivatives, step
+from wamnet.compiler.training.derivatives import BEGIN, DY, FIRST, LAST, VECTOR, ZERO, E, N
 from wamnet.compiler.training.lower_step import ADAM_INPUTS, lower_adam
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from wamnet.refimpl.network import adam, factored
 from wamnet.refimpl.network.factored import Factors
 
-WIDTHS, SIZE, BATCH, GROUPS = (2 * 2 * 3, 18, 5, 3), 2, 39, 2
+WIDTHS, SIZE, BATCH, GROUPS = (2 * 2 * 3, 18, 3), 2, 39, 2
 """Layers of less than one vector and of more; 19 and 20 examples for each of two items."""
 
 
@@ -79,42 +81,72 @@ def factors_of(arrays):
     return Factors(vertical.reshape(len(vertical), SIZE, -1), horizontal)
 
 
-@pytest.mark.parametrize("rank", [0, 2])
-def test_a_step(rank):
-    """TRK-2, TRK-3: sums. TRK-5: their loss, Adam of them to the bit, the copies. TRK-8: factors, product."""
-    made_step, arrays, examples = made(rank)
+def wrong_in(made_step, arrays, examples, left):
+    """Return what a step has left that is beyond its bounds, or has other bits than Adam's."""
     found, trained = made_step.step, trained_of(made_step.step)
-    left = ran(made_step.kernel, arrays)
-    sums, places = summed(found, left["sums"]), slots(found)
+    sums, places, first = summed(found, left["sums"]), slots(found), left["sums"].reshape(GROUPS, -1)[0]
     before, after = (
         [unpack(trained, part) for part in state.reshape(3, -1)] for state in (arrays["old"], left["moved"])
     )
-    at = step.with_parameters(
-        found, {key: before[0][key].reshape(found.program.parameters[key].shape) for key in found.trained}
-    )
+    shapes = {key: found.program.parameters[key].shape for key in found.trained}
+    at = step.with_parameters(found, {key: before[0][key].reshape(shape) for key, shape in shapes.items()})
     exact, bound = step.sums(at, *examples), step.sum_errors(at, *examples)
-    for key, error in bound.items():
-        assert np.all(np.abs(sums[key].reshape(exact[key].shape) - exact[key]) <= error), key
-    assert left["losses"][0] == 0
-    assert abs(left["losses"][1] * 3 * BATCH / exact[step.SQUARES].sum() - 1) <= 1e-5
-    assert left["failed"] == [-1]
-    for key in trained.keys() - ({"W0"} if rank else set()):
+    right = {key: np.abs(sums[key].reshape(exact[key].shape) - exact[key]) <= bound[key] for key in bound}
+    loss = exact[step.SQUARES].sum() / (3 * BATCH)
+    right["loss"] = left["losses"][0] == 0 and abs(left["losses"][1] - loss) <= 1e-5 * loss
+    right["zeros that fill up"] = pack(places, unpack(places, first)) == first
+    for key in trained.keys() - ({"W0"} if found.split else set()):
         state = (before[0][key], sums[key], before[1][key], before[2][key], *arrays["rates"][3:])
         wanted = interpret(lower_adam(), dict(zip(ADAM_INPUTS, state, strict=True)), np.float32)
-        for number, each in enumerate(("theta", "m", "v")):
-            assert np.array_equal(after[number][key], wanted[each]), (key, each)
-    copies = unpack(transposed_slots(found), left["transposed"])
-    assert all(np.array_equal(copies[key], after[0][key.removesuffix(TRANSPOSED)].T) for key in copies)
-    padded = left["sums"].reshape(GROUPS, -1)[0]
-    assert np.array_equal(pack(places, unpack(places, padded)), padded)
-    if rank:
-        old, new = factors_of(before[0]), factors_of(after[0])
+        right[f"Adam of {key}"] = [part[key] == wanted[n] for part, n in zip(after, wanted, strict=True)]
+    for key, copy in unpack(transposed_slots(found), left["transposed"]).items():
+        right["copies"] = copy == after[0][key.removesuffix(TRANSPOSED)].T
+    if found.split:
+        old, new, slopes = map(factors_of, (before[0], after[0], sums))
         wanted = factored.backward(old, exact["W0"])
         errors = step.factor_errors(old, exact["W0"], bound["W0"])
-        slopes = factors_of(sums)
-        assert np.all(np.abs(slopes.vertical - wanted.vertical) <= errors.vertical)
-        assert np.all(np.abs(slopes.horizontal - wanted.horizontal) <= errors.horizontal)
-        assert np.all(np.abs(after[0]["W0"] - factored.expand(new)) <= step.expansion_error(new))
+        right["vertical"] = np.abs(slopes.vertical - wanted.vertical) <= errors.vertical
+        right["horizontal"] = np.abs(slopes.horizontal - wanted.horizontal) <= errors.horizontal
+        right["product"] = np.abs(after[0]["W0"] - factored.expand(new)) <= step.expansion_error(new)
+    return {key for key, each in right.items() if not np.all(each)}
+
+
+@pytest.mark.parametrize("rank", [0, 2])
+def test_a_step(rank):
+    """TRK-2, TRK-3: sums. TRK-5: their loss, Adam of them to the bit, the copies. TRK-8: factors, product."""
+    found, arrays, examples = made(rank)
+    left = ran(found.kernel, arrays)
+    assert wrong_in(found, arrays, examples, left) == set()
+    assert left["failed"] == [-1]
+
+
+def replaced(kernel, old, new):
+    """Return a kernel with another expression in place of one."""
+
+    def deep(value):
+        return new if value == old else replace(value, args=tuple(map(deep, value.args)))
+
+    body = rewritten(kernel.body, deep)
+    assert body != kernel.body
+    return replace(kernel, body=body)
+
+
+FAULTS = {
+    "a bias is forgotten": (0, name("w0", VECTOR) * splat(const(1.0), LANES), ZERO, "b0"),
+    "an example counts twice": (0, LAST - FIRST, LAST - FIRST + 1, "W1"),
+    "a sum begins anew": (0, BEGIN < FIRST, const(False), "W0"),
+    "rows forwards": (0, DY * load("row", E, kind=INT), const(0), "W0"),
+    "rows backwards": (0, DY * load("row", N, kind=INT), const(0), "W0"),
+    "copies stay behind": (0, name("neuron"), const(64), "copies"),
+    "a work item is forgotten": (2, N * name("SUMS"), const(0), "vertical"),
+    "a rank is left out": (2, name("r") < 2, name("r") < 1, "horizontal"),
+}
+
+
+@pytest.mark.parametrize(("rank", "old", "new", "what"), FAULTS.values(), ids=FAULTS)
+def test_planted_faults_are_found(rank, old, new, what):
+    found, arrays, examples = made(rank)
+    assert what in wrong_in(found, arrays, examples, ran(replaced(found.kernel, old, new), arrays))
 
 
 def test_a_loss_that_is_not_finite_leaves_its_step():

@@ -110,19 +110,19 @@ class Derivatives(Nest):
         """Return the launch."""
         begin, last = (BATCH // GROUPS * g + BATCH % GROUPS * g // GROUPS for g in (GROUP, GROUP + 1))
         example, positions = apply("minimum", FIRST + E, LAST - 1), enumerate(("corner", "row", "target"))
-        found = {each: load("places", BATCH * at + name("example"), kind=INT) for at, each in positions}
-        read = [Store(each, (E,), place) for each, place in found.items()]
+        places = {each: load("places", BATCH * at + name("example"), kind=INT) for at, each in positions}
+        read = [Store(each, (E,), place) for each, place in places.items()]
         tile: list[Statement] = [
             Comment("Where the examples lie; those that fill up the last ones are not added up."),
             Let("count", apply("minimum", const(TILE), LAST - FIRST)),
             Let("filled", (COUNT + (EXAMPLES - 1)) // EXAMPLES * EXAMPLES),
-            *(Array(each, INT, (TILE,)) for each in found),
+            *(Array(each, INT, (TILE,)) for each in places),
             loop("e", name("filled"), Let("example", example), *read),
         ]
         for group in self.groups:
             tile += self.of_group(group)
-        for known in self.step.sums:
-            tile += self.sum(known)
+        for term in self.step.sums:
+            tile += self.sum(term)
         part = {"begin": begin, "last": last, "own": GROUP * name("SCRATCH"), "sum": GROUP * name("SUMS")}
         tiles = For("first", LAST, tuple(tile), start=BEGIN, step=const(TILE))
         body = If(RUNNING, (*(Let(each, value) for each, value in part.items()), tiles))
@@ -206,7 +206,7 @@ class Derivatives(Nest):
         slot, bias = self.places[str(node["weight"])], node.get("bias")
         source = self.numbers(node.args[0])
         run, i = slot.rows // source.rows, name("i")
-        found: list[Statement] = [self.mapped(index, node)]
+        loops: list[Statement] = [self.mapped(index, node)]
         for block in _blocks(slot):
             examples = range(EXAMPLES if len(block) * EXAMPLES <= REGISTERS else EXAMPLES // 2)
             keys = [(n, j) for n in examples for j in block]
@@ -219,26 +219,26 @@ class Derivatives(Nest):
                 loop("dy", source.rows, *(Let(f"x{n}", source.start(E + n)) for n in examples), inner),
                 *(store for n, j in keys for store in self.kept(index, E + n, j, _register(n, j))),
             )
-            found.append(For("e", name("filled"), body, step=const(len(examples))))
-        return found
+            loops.append(For("e", name("filled"), body, step=const(len(examples))))
+        return loops
 
-    def sum(self, known: Sum) -> list[Statement]:
+    def sum(self, term: Sum) -> list[Statement]:
         """Return the addition of the tile's examples to one sum, for some inputs at once."""
-        left, slot = self.outputs[known.left], self.places[known.parameter]
+        left, slot = self.outputs[term.left], self.places[term.parameter]
         title, right = f"sum of %{left}", _Rows("", 1, lambda n: const(0))
-        if known.right is not None:
-            right = self.numbers(self.outputs[known.right])
-            title += f" x %{self.outputs[known.right]}"
-        run, found = slot.rows // right.rows, list[Statement]()
+        if term.right is not None:
+            right = self.numbers(self.outputs[term.right])
+            title += f" x %{self.outputs[term.right]}"
+        run, loops = slot.rows // right.rows, list[Statement]()
         for block in _blocks(slot):
             inputs = min(INPUTS, REGISTERS // len(block))
             whole, rest = run // inputs * inputs, run % inputs
             if whole:
                 every = self.part(slot, block, left, right, inputs)
-                found.append(For("k", const(whole), every, step=const(inputs)))
+                loops.append(For("k", const(whole), every, step=const(inputs)))
             if rest:
-                found.append(Block((Let("k", const(whole)), *self.part(slot, block, left, right, rest))))
-        return [Comment(f"{title}: {known.parameter}"), loop("dy", right.rows, *found)]
+                loops.append(Block((Let("k", const(whole)), *self.part(slot, block, left, right, rest))))
+        return [Comment(f"{title}: {term.parameter}"), loop("dy", right.rows, *loops)]
 
     def part(self, slot: Slot, block: range, left: int, right: _Rows, inputs: int) -> Body:
         """Return the addition to a sum for so many inputs from k on; without an array, of `left` alone."""

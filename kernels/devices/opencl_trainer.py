@@ -72,11 +72,11 @@ class OpenCLTrainer:
 
     def _launch(self, program: Any, kernel: Kernel, launch: Launch) -> tuple[Any, Size, Size, Sequence[str]]:
         """Return a launch's function, its items in all and in a group, and the names of its arguments."""
-        bound, known = kernel.interface_of(launch), {"groups": const(self._groups)}
-        counts = [integer(kernel, substituted(count, known)) for count in launch.counts]
+        interface, groups = kernel.interface_of(launch), {"groups": const(self._groups)}
+        counts = [integer(kernel, substituted(count, groups)) for count in launch.counts]
         size = GROUP_SIZE if math.prod(counts) >= MANY else 1
         every = -(-counts[0] // size) * size, *counts[1:]
-        arguments = (*(array.name for array in bound.arrays), *bound.integers)
+        arguments = (*(array.name for array in interface.arrays), *interface.integers)
         return getattr(program, f"wamnet_{launch.name}"), every, (size, *(1 for _ in counts[1:])), arguments
 
     def load(self, step: int, theta: Arrays, m: Arrays, v: Arrays) -> None:
@@ -101,9 +101,9 @@ class OpenCLTrainer:
             old, moved = self._states[(step + at) % 2], self._states[(step + at + 1) % 2]
             drawn = {**block, "places": self._upload(minibatch), "old": old, "moved": moved}
             integers = {"groups": self._groups, "at": at, "step": step + at}
-            given = {**self._arrays, **drawn, **{name: np.int32(value) for name, value in integers.items()}}
+            values = {**self._arrays, **drawn, **{key: np.int32(value) for key, value in integers.items()}}
             for function, every, group, arguments in self._launches:
-                function(self._queue, every, group, *(given[name] for name in arguments))
+                function(self._queue, every, group, *(values[name] for name in arguments))
             drawn_so_far.append(drawn)
         self._queue.flush()
 

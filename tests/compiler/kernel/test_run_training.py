@@ -30,15 +30,15 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr(derivatives, "TILE", 16)
 
 
-def made(rank=0):
+def random_step(rank=0):
     """Return the kernel and its step, arrays of random numbers, and the examples in them."""
-    random, found = np.random.default_rng(rank + 1), compile_step(WIDTHS, (1.0, 3.0), BATCH, SIZE, rank)
+    random, compiled = np.random.default_rng(rank + 1), compile_step(WIDTHS, (1.0, 3.0), BATCH, SIZE, rank)
     corner, row = 3 * random.integers(0, 50, BATCH), 3 * random.integers(2, 9, BATCH)
     values, targets = random.uniform(-1, 1, 230), random.uniform(0, 1, (40, 3))
     target, trained, copies = (
         random.integers(0, 40, BATCH),
-        trained_of(found.step),
-        transposed_slots(found.step),
+        trained_of(compiled.step),
+        transposed_slots(compiled.step),
     )
     theta, m, v = (
         {key: random.uniform(low, 1, (slot.width, slot.rows)) for key, slot in trained.items()}
@@ -56,11 +56,11 @@ def made(rank=0):
     }
     taps = corner[:, None, None] + row[:, None, None] * np.arange(SIZE)[:, None] + np.arange(6)
     examples = arrays["values"][taps].reshape(BATCH, -1), targets.astype(np.float32)[target]
-    return found, arrays, examples
+    return compiled, arrays, examples
 
 
-def trained_of(found):
-    return {key: slot for key, slot in slots(found).items() if key != step.SQUARES}
+def trained_of(traced):
+    return {key: slot for key, slot in slots(traced).items() if key != step.SQUARES}
 
 
 def ran(kernel, arrays):
@@ -68,10 +68,10 @@ def ran(kernel, arrays):
     return run_on(kernel, arrays, {"groups": GROUPS, "at": 1, "step": 7})
 
 
-def summed(found, sums):
+def summed(traced, sums):
     """Return the sums of both items by name; those of factors and of their product are one already."""
-    both, places = sums.reshape(GROUPS, -1, LANES).copy(), slots(found)
-    for key in (found.split.parameter, *found.split.factors) if found.split else ():
+    both, places = sums.reshape(GROUPS, -1, LANES).copy(), slots(traced)
+    for key in (traced.split.parameter, *traced.split.factors) if traced.split else ():
         both[1, places[key].offset : places[key].end] = 0
     return unpack(places, both[0] + both[1])
 
@@ -81,32 +81,32 @@ def factors_of(arrays):
     return Factors(vertical.reshape(len(vertical), SIZE, -1), horizontal)
 
 
-def wrong_in(made_step, arrays, examples, left):
+def wrong_in(compiled, arrays, examples, left):
     """Return what a step has left that is beyond its bounds, or has other bits than Adam's."""
-    found, trained = made_step.step, trained_of(made_step.step)
-    sums, places, first = summed(found, left["sums"]), slots(found), left["sums"].reshape(GROUPS, -1)[0]
+    traced, trained = compiled.step, trained_of(compiled.step)
+    sums, places, first = summed(traced, left["sums"]), slots(traced), left["sums"].reshape(GROUPS, -1)[0]
     before, after = (
         [unpack(trained, part) for part in state.reshape(3, -1)] for state in (arrays["old"], left["moved"])
     )
-    shapes = {key: found.program.parameters[key].shape for key in found.trained}
-    at = step.with_parameters(found, {key: before[0][key].reshape(shape) for key, shape in shapes.items()})
+    shapes = {key: traced.program.parameters[key].shape for key in traced.trained}
+    at = step.with_parameters(traced, {key: before[0][key].reshape(shape) for key, shape in shapes.items()})
     exact, bound = step.sums(at, *examples), step.sum_errors(at, *examples)
     right = {key: np.abs(sums[key].reshape(exact[key].shape) - exact[key]) <= bound[key] for key in bound}
     loss = exact[step.SQUARES].sum() / (3 * BATCH)
     right["loss"] = left["losses"][0] == 0 and abs(left["losses"][1] - loss) <= 1e-5 * loss
     right["zeros that fill up"] = pack(places, unpack(places, first)) == first
-    for key in trained.keys() - ({"W0"} if found.split else set()):
+    for key in trained.keys() - ({"W0"} if traced.split else set()):
         state = (before[0][key], sums[key], before[1][key], before[2][key], *arrays["rates"][3:])
-        wanted = interpret(lower_adam(), dict(zip(ADAM_INPUTS, state, strict=True)), np.float32)
-        right[f"Adam of {key}"] = [part[key] == wanted[n] for part, n in zip(after, wanted, strict=True)]
-    for key, copy in unpack(transposed_slots(found), left["transposed"]).items():
+        expected = interpret(lower_adam(), dict(zip(ADAM_INPUTS, state, strict=True)), np.float32)
+        right[f"Adam of {key}"] = [part[key] == expected[n] for part, n in zip(after, expected, strict=True)]
+    for key, copy in unpack(transposed_slots(traced), left["transposed"]).items():
         right["copies"] = copy == after[0][key.removesuffix(TRANSPOSED)].T
-    if found.split:
+    if traced.split:
         old, new, slopes = map(factors_of, (before[0], after[0], sums))
-        wanted = factored.backward(old, exact["W0"])
+        expected = factored.backward(old, exact["W0"])
         errors = step.factor_errors(old, exact["W0"], bound["W0"])
-        right["vertical"] = np.abs(slopes.vertical - wanted.vertical) <= errors.vertical
-        right["horizontal"] = np.abs(slopes.horizontal - wanted.horizontal) <= errors.horizontal
+        right["vertical"] = np.abs(slopes.vertical - expected.vertical) <= errors.vertical
+        right["horizontal"] = np.abs(slopes.horizontal - expected.horizontal) <= errors.horizontal
         right["product"] = np.abs(after[0]["W0"] - factored.expand(new)) <= step.expansion_error(new)
     return {key for key, each in right.items() if not np.all(each)}
 
@@ -114,9 +114,9 @@ def wrong_in(made_step, arrays, examples, left):
 @pytest.mark.parametrize("rank", [0, 2])
 def test_a_step(rank):
     """TRK-2, TRK-3: sums. TRK-5: their loss, Adam of them to the bit, the copies. TRK-8: factors, product."""
-    found, arrays, examples = made(rank)
-    left = ran(found.kernel, arrays)
-    assert wrong_in(found, arrays, examples, left) == set()
+    compiled, arrays, examples = random_step(rank)
+    left = ran(compiled.kernel, arrays)
+    assert wrong_in(compiled, arrays, examples, left) == set()
     assert left["failed"] == [-1]
 
 
@@ -145,16 +145,16 @@ FAULTS = {
 
 @pytest.mark.parametrize(("rank", "old", "new", "what"), FAULTS.values(), ids=FAULTS)
 def test_planted_faults_are_found(rank, old, new, what):
-    found, arrays, examples = made(rank)
-    assert what in wrong_in(found, arrays, examples, ran(replaced(found.kernel, old, new), arrays))
+    compiled, arrays, examples = random_step(rank)
+    assert what in wrong_in(compiled, arrays, examples, ran(replaced(compiled.kernel, old, new), arrays))
 
 
 def test_a_loss_that_is_not_finite_leaves_its_step():
     """TRK-6: the parameters are not written, by this step or by a later one."""
-    found, arrays, _ = made()
-    left = ran(found.kernel, {**arrays, "targets": np.full(120, np.inf, np.float32)})
+    compiled, arrays, _ = random_step()
+    left = ran(compiled.kernel, {**arrays, "targets": np.full(120, np.inf, np.float32)})
     assert (left["failed"], np.isnan(left["moved"]).all()) == ([7], True)
-    later = ran(found.kernel, {**arrays, "failed": left["failed"]})
+    later = ran(compiled.kernel, {**arrays, "failed": left["failed"]})
     assert (later["failed"], np.isnan(later["moved"]).all(), later["losses"][1]) == ([7], True, 0)
 
 
@@ -179,6 +179,6 @@ WRONG = {
 
 @pytest.mark.parametrize(("change", "message"), WRONG.values(), ids=WRONG)
 def test_wrong_kernels_are_found(change, message):
-    found, arrays, _ = made()
+    compiled, arrays, _ = random_step()
     with pytest.raises(KernelError, match=message):
-        ran(change(found.kernel), arrays)
+        ran(change(compiled.kernel), arrays)

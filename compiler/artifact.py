@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -84,12 +84,20 @@ class Artifact:
         dialect = self.plan.target.dialect
         assert dialect is not None, "the interpreter binds nothing"
         size, taken = self.weights.size, dialect.integers[interface.DENOISE]
-        return interface.denoiser(self.images, size, self.channels, dialect.home, taken)
+        found = interface.denoiser(self.images, size, self.channels, dialect.home, taken)
+        memory = self.manifest["schedule"].get("memory")
+        return found.handing_on(memory) if memory else found
 
     @property
     def kernels(self) -> tuple[Artifact, ...]:
         """Return the kernels in the order in which they run: one, or two passes."""
         return (self.before, self) if self.before else (self,)
+
+    @property
+    def launches(self) -> tuple[Artifact, ...]:
+        """Return a kernel of several launches as one of each, with its source and entry point; else none."""
+        found = interface.launches(self.source, self.manifest)
+        return tuple(replace(self, source=source, manifest=manifest) for source, manifest in found)
 
     def contents(self) -> Mapping[str, bytes]:
         """Return all files except the manifest, by name."""

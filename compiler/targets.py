@@ -114,6 +114,11 @@ def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
     )
 
 
+def passes(dialect: Dialect, instead: str = "group:4") -> tuple[Schedule, ...]:
+    """Return the schedule of transforms for languages whose functions do not take such places."""
+    return (FourierPasses("fftpasses:32", PASSES_IDEA, dialect, 32, instead),)
+
+
 def dots(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedule of bytes for processors."""
     idea = "products of bytes, four at a time, of a network of integers"
@@ -153,7 +158,8 @@ def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
 def processor(dialect: Dialect) -> Target:
     """Return the target of a language for processors, and for graphics processors where it has groups."""
     shared = groups(dialect) if dialect.group else ()
-    return _dialect_target(dialect, *tiles(dialect), *ffts(dialect), *dots(dialect), *shared)
+    spectra = ffts(dialect) if dialect.transforms else passes(dialect)
+    return _dialect_target(dialect, *tiles(dialect), *spectra, *dots(dialect), *shared)
 
 
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
@@ -206,7 +212,7 @@ TARGETS: Mapping[str, Target] = {
             _dialect_target(
                 GLSL(),
                 Inline(GLSL()),
-                FourierPasses("fftpasses:32", PASSES_IDEA, GLSLCompute(), 32),
+                *passes(GLSLCompute(), "inlined"),
                 *groups(GLSLCompute()),
             ),
             planes=(1,),

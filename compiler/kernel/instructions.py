@@ -398,9 +398,13 @@ static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
 {
     a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
 }
+static __device__ inline void operator-=(wamnet_vector &a, wamnet_vector b)
+{
+    a = wamnet_made(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w);
+}
 #endif
 """
-"""Vectors of four, with the two operations that sums need: CUDA's own have none."""
+"""Vectors of four, with the operations that sums need: CUDA's own have none."""
 
 BUILTINS = """\
 #ifdef __has_builtin

@@ -6,8 +6,10 @@ device binds it: none of them lists arrays or integers again.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -70,8 +72,26 @@ INTEGERS: Mapping[str, tuple[str, ...]] = {
 }
 """The integers that a kernel is given, in order, by role; a dialect may know some of them by itself."""
 
+BATCH = ("first_tile", "tile_count")
+"""Integers of a kernel of several launches: the first tile that they compute, and how many of them."""
+
 READ_NUMBER, WRITTEN_NUMBER, FIRST_IMAGE = 1, 2, 3
 """Numbers of what is read, of what is written and of the first image; 0 are the integers."""
+
+
+def staged(source: str, number: int) -> str:
+    """Return a source of GLSL, which has one entry point, for one of several launches."""
+    return re.sub(r"^#version .*$", rf"\g<0>\n#define STAGE {number}", source, count=1, flags=re.MULTILINE)
+
+
+def launches(source: str, manifest: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Return the source and the manifest of each launch of a kernel that is several, as if it were one."""
+    found, schedule = [], manifest.get("schedule", {})
+    for number, facts in enumerate(schedule.get("launches", ())):
+        own = {"entry_point": facts["entry"], "schedule": {**schedule, "launches": [facts]}}
+        text = source if str(number) in facts["entry"] else staged(source, number)
+        found.append((text, {**manifest, **own}))
+    return found
 
 
 @dataclass(frozen=True)
@@ -142,11 +162,16 @@ class Interface:
         """Return the integer that limits the row."""
         return "rows" if self.role == PATH else "height"
 
+    def handing_on(self, memory: Mapping[str, int]) -> Interface:
+        """Return it for several launches: `memory` are the numbers that they hand on, of a tile, by array."""
+        arrays = (Array(name, BOTH, (count // 2, BATCH[1]), lanes=2) for name, count in memory.items())
+        return replace(self, arrays=(*self.arrays, *arrays), integers=(*self.integers, *BATCH))
+
     def numbers(self) -> Mapping[str, int]:
         """Return the number of each array, where arrays have numbers."""
         found, free = {}, FIRST_IMAGE
         for array in self.arrays:
-            if array.is_image:
+            if array.is_image or array.access == BOTH:
                 found[array.name], free = free, free + 1
             else:
                 found[array.name] = READ_NUMBER if array.access == READ else WRITTEN_NUMBER

@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
+from .interface import BATCH as BATCH
 from .interface import READ, Interface
 
 Index = tuple["Expr", ...]
@@ -297,9 +298,6 @@ class Kernel:
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
 """Operations on numbers that give truth."""
-
-BATCH = ("first_tile", "tile_count")
-"""The first tile that launches compute, and how many of them."""
 
 LOGICAL = ("logical_and", "logical_or", "logical_not")
 """Operations on truth."""

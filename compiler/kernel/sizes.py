@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from .kernel import INTEGERS, Array, Expr, Kernel, walk
+from collections.abc import Mapping
+
+from .kernel import BATCH, INTEGERS, Array, Expr, Kernel, const, expr, substituted, walk
 
 BYTES = {"float32": 4, "int32": 4, "uint32": 4, "bool": 4, "uint8": 1, "int8": 1}
 """Bytes of a value of each kind."""
@@ -20,6 +22,17 @@ def integer(kernel: Kernel, value: Expr | int) -> int:
     if not -(2**31) <= found < 2**31:
         raise ArithmeticError(f"{found}, which int32 does not hold")
     return found
+
+
+def of_tile(kernel: Kernel, count: Expr | int, tiles: int = 1) -> int:
+    """Return an integer that the kernel's constants determine, and the number of tiles of a batch."""
+    return integer(kernel, substituted(expr(count), {BATCH[1]: const(tiles)}))
+
+
+def handed_on(kernel: Kernel) -> Mapping[str, int]:
+    """Return the numbers of a tile that launches hand on, by array."""
+    arrays = [s for s in kernel.body if isinstance(s, Array) and s.space == "device"]
+    return {s.name: s.type.lanes * of_tile(kernel, s.sizes[0]) for s in arrays}
 
 
 def bytes_of(kernel: Kernel, array: Array) -> int:

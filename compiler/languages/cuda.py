@@ -52,8 +52,8 @@ class CUDA(Arguments):
     native_sine = CUDA_SINE
     assumes = ASSUMES
     heading = 'extern "C" __global__ void {entry}'
-    reads = "const float *__restrict__ {name}"
-    writes = "float *__restrict__ {name}"
+    reads = "const {kind} *__restrict__ {name}"
+    writes = "{kind} *__restrict__ {name}"
     long = "size_t"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     scalars = {**Dialect.scalars, "uint32": "unsigned int"}
@@ -105,7 +105,7 @@ class CUDA(Arguments):
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type, which has the operators that sums need: CUDA's own have none."""
-        return "wamnet_vector" if dtype == "float32" else f"int{lanes}"
+        return "wamnet_vector" if dtype == "float32" and lanes > 2 else f"{self.scalars[dtype]}{lanes}"
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of values, or of one in all lanes."""

@@ -44,6 +44,20 @@ from ..kernel.interface import (
     Interface,
 )
 
+BATCHES = (
+    "The last arrays are the manifest's `memory`: so many numbers of a tile each. Tiles of {columns} x\n"
+    "{rows} pixels lie in rows from the top; a batch is tile_count of them from first_tile on, a multiple\n"
+    "of `items` times the most `tiles` of an item. For each batch start tile_count / tiles x lines items\n"
+    "of each of the `launches`, in groups of `items` x 1, in order and with barriers between"
+)
+"""How several launches are started."""
+
+STAGED = f"Compile the text once for each launch, STAGE defined as its number.\n{BATCHES}"
+"""The same where each of them is a program by itself."""
+
+LAUNCHED = f"Each launch is an entry point whose name ends with its number.\n{BATCHES}"
+"""The same where they are functions."""
+
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
 
@@ -72,7 +86,8 @@ class Dialect:
     which `at_once` describes; it takes `most_numbers` of a scene, and callers read `said_numbers`. `paints`:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
     `scalars`: the types of single numbers. `staged`: a launch is a program, which is compiled if STAGE is
-    its number. `numbers` makes the address of a vector that of its first number.
+    its number; `declares_memory`: what launches of a denoiser hand on are arrays like others. `numbers`
+    makes the address of a vector that of its first number.
     """
 
     target: str
@@ -136,8 +151,10 @@ class Dialect:
     grouped: Mapping[str, Any] = {}
     staged: bool = False
     numbers: str = ""
+    launching: Mapping[str, Any] = {}
     vectors: Type | None = None
     launches: tuple[str, str, str] = ("", "", "")
+    declares_memory: bool = False
     aligned: tuple[str, str] = ("", "")
     local_place: tuple[str, str] = ("", "")
     group_place: tuple[str, str] = ("", "")
@@ -181,6 +198,8 @@ class Dialect:
             said = said.replace(*self.aligned)
         if not one:
             one = row = group = said
+        if kernel.launches:
+            return said.replace(one, STAGED if self.staged else LAUNCHED)
         if kernel.group:
             across, down = kernel.group
             return said.replace(one, group).replace("{group}", f"{across} x {down}")
@@ -255,7 +274,8 @@ class Dialect:
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: with other words where it has work groups."""
         found = copy(self)
-        vars(found).update(self.grouped if kernel.group else {}, vectors=kernel.weights)
+        words = self.grouped if kernel.group else self.launching if kernel.launches else {}
+        vars(found).update(words, vectors=kernel.weights)
         if kernel.weights.dtype == "int32":
             found.first = (*self.first, *self.extensions)
         return found
@@ -275,6 +295,11 @@ class Dialect:
     def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch, of a grid of so many columns and rows of items."""
         raise NotImplementedError
+
+    def launch_entry(self, number: int) -> str:
+        """Return the entry point of one of several launches."""
+        entry = self.entries[DENOISE]
+        return entry if self.staged else f"{entry}_{number}"
 
     def item_place(self) -> list[str]:
         """Return the declarations of where an item is in its group, and of its first pixel."""

@@ -30,7 +30,7 @@ from ..kernel.interface import (
 from ..kernel.interface import Array as Given
 from ..kernel.kernel import BATCH, Array, Kernel, Launch, values, walk
 from ..kernel.kernel import parts as inside
-from .dialect import Dialect, Parts
+from .dialect import STAGED, Dialect, Parts
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""
@@ -312,7 +312,6 @@ class GLSLCompute(GLSL):
     language = f"GLSL {SHADER_VERSION / 100:.2f}, compute shader"
     suffix = ".comp"
     group = (16, 8)
-
     staged = True
     wait = "barrier();"
     max_output_channels = 4
@@ -367,15 +366,7 @@ class GLSLCompute(GLSL):
         if not kernel.launches:
             return super().called(kernel)
         said, _, _ = self.said[DENOISE].partition("Dispatch")
-        return (
-            f"{said.rstrip()}\n"
-            "Compile the text once for each pass, STAGE defined as its number and ITEMS as the items of a\n"
-            "group. Storage buffers 1 and on are the `memory` of the manifest: so many numbers a tile.\n"
-            "Tiles of {columns} x {rows} pixels lie in rows from the top; a batch is tile_count of them\n"
-            "from first_tile on, a multiple of ITEMS times the most `tiles` of an item. For each batch\n"
-            "dispatch tile_count / (tiles * ITEMS) x lines groups of each of the `launches`, in order and\n"
-            "with barriers between"
-        )
+        return f"{said.rstrip()}\nstorage buffers 1 and on: the last arrays.\n{STAGED}"
 
     def opened(self, kernel: Interface | None = None) -> list[str]:
         """Return the first lines of the function."""

@@ -11,7 +11,17 @@ from abc import abstractmethod
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import PORTABLE, VULKAN_EXTENSION, VULKAN_GROUP
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, PATH, SCENE_NUMBERS, WEIGHTS, WRITE, Array, Interface
+from ..kernel.interface import (
+    BLOCK,
+    DENOISE,
+    ENCODE,
+    PATH,
+    READ,
+    SCENE_NUMBERS,
+    WEIGHTS,
+    Array,
+    Interface,
+)
 from ..kernel.kernel import Kernel
 from .c import C
 from .cuda import GROUPED
@@ -80,6 +90,8 @@ class Declared(Buffers):
 
     def element(self, array: Array) -> tuple[str, str]:
         """Return an array's name in the kernel, and the type of its elements."""
+        if array.lanes > 1:
+            return array.name, self.vector_kind(array.dtype, array.lanes)
         if array.name == WEIGHTS and self.vectors and self.vectors.lanes > 1:
             return "w", self.vector_kind(self.vectors.dtype, self.vectors.lanes)
         return array.name, self.scalars["float32"]
@@ -111,6 +123,8 @@ class Vulkan(Declared):
     operations = GLSL.operations
     group_size: tuple[int | str, int | str] = GROUP
     grouped = {"group_size": ("GROUP_WIDTH", "GROUP_HEIGHT")}
+    staged = True
+    launching = {"group_size": ("ITEMS", 1)}
     shared_array = "shared {kind} {name}[{count}];"
     local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
     group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
@@ -141,7 +155,7 @@ class Vulkan(Declared):
         block = f"{array.name[0].upper()}{array.name[1:]}"
         if array.home == BLOCK:
             return f"layout(std140, binding = {number}) uniform {block} {{ vec4 {name}[{array.quads}]; }};"
-        access = "" if array.access == WRITE else "readonly "
+        access = "readonly " if array.access == READ else ""
         return f"layout(std430, binding = {number}) restrict {access}buffer {block} {{ {kind} {name}[]; }};"
 
     def head(self, kernel: Interface) -> list[str]:

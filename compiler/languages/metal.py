@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.interface import BLOCK, DENOISE, PATH, WRITE, Array, Interface
+from ..kernel.interface import BLOCK, DENOISE, PATH, READ, Array, Interface
 from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
@@ -128,4 +128,5 @@ class Metal(Buffers):
         """Return an argument that is an array, without its number."""
         if array.home == BLOCK:
             return f"constant float *{array.name}"
-        return f"device {'' if array.access == WRITE else 'const '}float *{array.name}"
+        kind = "float" if array.lanes == 1 else self.vector_kind(array.dtype, array.lanes)
+        return f"device {'const ' if array.access == READ else ''}{kind} *{array.name}"

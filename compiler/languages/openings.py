@@ -8,6 +8,7 @@ read by their names; those of a structure by `size` and their names.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 from ..kernel.interface import DENOISE, PATH, READ, UNSIGNED, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Launch, Type
@@ -36,6 +37,7 @@ class Buffers(Dialect):
     """
 
     item: tuple[str, str]
+    declares_memory = True
     size: str = ""
     long: str = ""
 
@@ -66,6 +68,16 @@ class Buffers(Dialect):
     def in_function(self, kernel: Kernel) -> list[str]:
         """Return the declarations of a group's memory, where they are inside the function."""
         return [f"    {line}" for line in self.group_memory(kernel)]
+
+    def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
+        """Return the first lines of a launch of a denoiser, of which no item is beyond the grid."""
+        own, taken = copy(self), kernel.interface
+        own.entries = {DENOISE: self.launch_entry(kernel.launches.index(launch))}
+        integers = [self.index(n, f"{self.size}{n}") for n in taken.integers if self.size]
+        items = zip(launch.place, self.item, strict=True)
+        places = [self.index(name, self.cast("int32", text)) for name, text in items]
+        vectors = self.weights_as_vectors(kernel.weights)
+        return [*own.head(taken), *vectors, *(f"    {line}" for line in (*integers, *places))]
 
     @staticmethod
     def step(step: Expr) -> str:
@@ -187,6 +199,8 @@ class Arguments(Buffers):
 
     def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch, which is a function; items beyond the grid end."""
+        if kernel.interface.role == DENOISE:
+            return super().launched(kernel, launch, counts)
         places = [*zip(launch.place, self.item, counts, strict=False)]
         outside = " || ".join(f"{place} >= {count}" for place, _, count in places)
         return [

@@ -59,6 +59,7 @@ from ..kernel.kernel import (
     values,
     walk,
 )
+from ..kernel.sizes import handed_on
 from .dialect import Dialect, Parts
 
 BINDING: Mapping[str, int] = {
@@ -110,6 +111,8 @@ def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32] = NO_WE
     weights = [] if dialect.home == TABLE else [Memory(WEIGHTS, READ, (packed.size,), dialect.home)]
     tables = kernel.tables if weights else (*kernel.tables, (WEIGHTS, packed))
     interface = Interface(DENOISE, (*images, *weights, result), integers)
+    if kernel.launches and dialect.declares_memory:
+        interface = interface.handing_on(handed_on(kernel))
     return replace(kernel, interface=interface, tables=tables)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, UNSIGNED, WRITE, Array, Interface
+from ..kernel.interface import BLOCK, READ, UNSIGNED, Array, Interface
 from .dialect import Dialect
 from .glsl_buffers import GROUP, SAID, Declared
 
@@ -37,6 +37,7 @@ class WGSL(Declared):
         "places": "@builtin(local_invocation_id) item_place: vec3<u32>, "
         "@builtin(workgroup_id) group_place: vec3<u32>",
     }
+    launching = {"group_size": "@compute @workgroup_size(ITEMS, 1)"}
     shared_array = "var<workgroup> {name}: array<{kind}, {count}>;"
     local_place = ("item_place.x", "item_place.y")
     group_place = ("group_place.x", "group_place.y")
@@ -76,12 +77,12 @@ class WGSL(Declared):
         name, kind = self.element(array)
         if array.home == BLOCK:
             return f"@group(0) @binding({number}) var<uniform> {name}: array<vec4<f32>, {array.quads}>;"
-        access = "read_write" if array.access == WRITE else "read"
+        access = "read" if array.access == READ else "read_write"
         return f"@group(0) @binding({number}) var<storage, {access}> {name}: array<{kind}>;"
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""
-        return [self.group_size, f"fn main({self.places}) {{"]
+        return [self.group_size, f"fn {self.entries[kernel.role]}({self.places}) {{"]
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type."""

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..core.ir import Program
 from ..core.weights import Slot, weights
+from ..kernel.interface import RESULT
 from ..kernel.kernel import (
     BATCH,
     FLOAT,
@@ -39,16 +40,18 @@ from ..kernel.kernel import (
     Let,
     Statement,
     Store,
+    Write,
     apply,
     const,
-    expr,
     load,
     name,
+    parts,
     splat,
     stack,
-    substituted,
+    values,
+    walk,
 )
-from ..kernel.sizes import integer
+from ..kernel.sizes import handed_on, of_tile
 from ..languages.dialect import Dialect
 from . import fourier
 from .common import HEIGHT, WIDTH, clamp, loop, weight
@@ -63,6 +66,9 @@ HALF = 16
 
 TILES, IMAGES = 4, 8
 """Tiles, and complex images of two neurons each, whose products an item computes: 32 sums of four numbers."""
+
+ITEMS = 8
+"""Items of a group, as many as vectors of most processors have lanes."""
 
 COMPLEX = FLOAT.of(2)
 """A complex number in memory of the device."""
@@ -82,17 +88,28 @@ def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
     return {key: a for key, a in spectra_stored(program, HALF, points, 1).items() if key in own}
 
 
-def passes(program: Program, points: int) -> Kernel:
-    """Return the kernel of a program whose neurons are in order."""
-    return Passes(program, placed(stored(program, points)), points).built()
+def passes(program: Program, points: int, wide: bool = True) -> Kernel:
+    """Return the kernel of a program whose neurons are in order; `wide`: vectors have all operations."""
+    return Passes(program, placed(stored(program, points)), points, wide).built()
+
+
+def used(kernel: Kernel, launch: Launch) -> list[str]:
+    """Return the arrays that a launch reads or writes, those of the kernel first."""
+    statements = walk(launch.body)
+    found = {s.array for s in statements if isinstance(s, Store)}
+    found |= {RESULT for s in statements if isinstance(s, Write)}
+    found |= {e.value for s in statements for v in values(s) for e in parts(v) if e.op == "load"}
+    return [
+        name for name in (*(a.name for a in kernel.interface.arrays), *handed_on(kernel)) if name in found
+    ]
 
 
 class Passes(Inlined):
     """Builds the launches."""
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], points: int) -> None:
+    def __init__(self, program: Program, slots: Mapping[str, Slot], points: int, wide: bool) -> None:
         super().__init__(program, slots, 4)
-        self.points = points
+        self.points, self.wide = points, wide
         self.sizes = sizes_of(program, HALF, points, 1)
         self.centres = fourier.arrangement(program, HALF).centres
 
@@ -110,6 +127,7 @@ class Passes(Inlined):
                 "FREQUENCIES", (POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"
             ),
             Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
+            Constant("ITEMS", const(ITEMS), "of a group"),
         ]
 
     def built(self) -> Kernel:
@@ -246,9 +264,9 @@ class Passes(Inlined):
                 "here": (apply("subtract", a, d), apply("add", b, c)),
                 "there": (apply("add", a, d), apply("subtract", c, b)),
             }
-            for place, parts in both.items():
+            for place, pair in both.items():
                 at = (image + name(place)) * TILE_COUNT + self.tile(t)
-                found.append(Store("products", (at,), stack(list(parts))))
+                found.append(Store("products", (at,), stack(pair)))
         return found
 
     def tile(self, t: int) -> Expr:
@@ -322,9 +340,9 @@ class FourierPasses(Fourier):
         "second channel, neurons; weights of the layers after it are constants of the source"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, points: int) -> None:
+    def __init__(self, name: str, idea: str, dialect: Dialect, points: int, instead: str) -> None:
         super().__init__(name, idea, dialect, HALF, 1, points, 1)
-        self.instead = "inlined"
+        self.instead = instead
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -337,24 +355,18 @@ class FourierPasses(Fourier):
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
-        return passes(self.held(program), self.points)
+        return passes(self.held(program), self.points, self.dialect.wide)
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return the weights outside the source as they are stored, by name."""
         return stored(program, self.points)
 
     def details(self, program: Program) -> Mapping[str, Any]:
-        """Return what is launched, and the memory of the device: numbers of each array for a tile."""
+        """Return what is launched, the numbers of each array for a tile, and the items of a group."""
         kernel = self.kernel(program)
-
-        def of(count: Expr, tiles: int) -> int:
-            return integer(kernel, substituted(count, {BATCH[1]: const(tiles)}))
-
-        arrays = [s for s in kernel.body if isinstance(s, Array)]
-        return {
-            "launches": [
-                {"tiles": TILES // of(each.counts[0], TILES), "lines": of(each.counts[1], 1)}
-                for each in kernel.launches
-            ],
-            "memory": {s.name: s.type.lanes * of(expr(s.sizes[0]), 1) for s in arrays},
-        }
+        launches = []
+        for number, each in enumerate(kernel.launches):
+            tiles, lines = (of_tile(kernel, count, TILES) for count in each.counts)
+            known = {"entry": self.dialect.launch_entry(number), "arrays": used(kernel, each)}
+            launches.append({"tiles": TILES // tiles, "lines": lines, **known})
+        return {"launches": launches, "memory": handed_on(kernel), "items": ITEMS}

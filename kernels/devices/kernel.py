@@ -72,6 +72,26 @@ class Denoiser(Kernel, Protocol):
     def kernels(self) -> tuple[Denoiser, ...]:
         """Return the kernels in the order in which they run: this one, or two passes."""
 
+    @property
+    def launches(self) -> tuple[Kernel, ...]:
+        """Return the launches of a kernel that is several, each with its source and entry point."""
+
+
+BATCH_TILES = 128
+"""Most tiles that launches compute at once: 50 MB of the bundled network's."""
+
+
+def batches(schedule: Mapping[str, Any], size: Size) -> tuple[int, range]:
+    """Return how many tiles launches compute at once, all of a picture or as many each time, and the firsts.
+
+    They are whole groups of the items that compute the most.
+    """
+    tiles = -(-size[0] // schedule["rows"]) * -(-size[1] // schedule["pixels"])
+    whole = schedule["items"] * max(launch["tiles"] for launch in schedule["launches"])
+    count = -(-tiles // -(-tiles // BATCH_TILES))
+    count = -(-count // whole) * whole
+    return count, range(0, tiles, count)
+
 
 def is_denoiser(kernel: Kernel) -> TypeGuard[Denoiser]:
     """Tell whether a kernel is that of a network."""

@@ -19,13 +19,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.kernel.interface import PLANES, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
+from ...compiler.kernel.interface import PLANES, READ, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
 from .executor import Executor
-from .kernel import Denoiser, Kernel, Memory, Size, is_denoiser
+from .kernel import Denoiser, Kernel, Memory, Size, batches, is_denoiser
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\
@@ -71,12 +71,6 @@ GPU_SCHEDULE = "group:2"
 SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
 kernel computes some 14,000 pixels of the bundled network."""
-
-BATCH_TILES = 128
-"""Most tiles that passes compute at once: 50 MB of the bundled network's."""
-
-ITEMS = 8
-"""Items of a group of a pass, as many as vectors of llvmpipe have lanes."""
 
 
 @dataclass(frozen=True)
@@ -203,14 +197,7 @@ class OpenGLExecutor(Executor):
             weights = self._context.buffer(data)
             made.callback(weights.release)
             if "launches" in schedule:
-                version = f"#version {SHADER_VERSION} core\n"
-                texts = [
-                    artifact.source.replace(
-                        version, f"{version}#define STAGE {number}\n#define ITEMS {ITEMS}\n"
-                    )
-                    for number in range(len(schedule["launches"]))
-                ]
-                passes = tuple(self._compute(text, made) for text in texts)
+                passes = tuple(self._compute(launch.source, made) for launch in artifact.launches)
                 made.pop_all()
                 return _Prepared(None, None, weights, artifact.interface, passes=passes, schedule=schedule)
             program = self._compute(artifact.source, made)
@@ -338,7 +325,7 @@ class OpenGLExecutor(Executor):
         left = {id(memory): list(memory.held) for memory in arrays.values()}
         named: dict[str, Any] = {}
         for array in taken.arrays:
-            if array.access == WRITE or array.name in (WEIGHTS, SCENE_NUMBERS):
+            if array.access != READ or array.name in (WEIGHTS, SCENE_NUMBERS):
                 continue
             textures = left[id(arrays[array.name])]
             if array.name in PLANES:
@@ -363,20 +350,16 @@ class OpenGLExecutor(Executor):
 
     def _launch(self, prepared: _Prepared, textures: Mapping[str, Any], target: Any) -> None:
         """Run passes for one batch of tiles after another, with memory for the largest."""
-        schedule = prepared.schedule
-        launches, across, down = schedule["launches"], schedule["pixels"], schedule["rows"]
-        whole = ITEMS * max(launch["tiles"] for launch in launches)
-        tiles = -(-target.size[0] // across) * -(-target.size[1] // down)
-        batch = -(-tiles // -(-tiles // BATCH_TILES))
-        batch = -(-batch // whole) * whole
+        schedule, (width, height) = prepared.schedule, target.size
+        batch, firsts = batches(schedule, (height, width))
         self._reserve([4 * count * batch for count in schedule["memory"].values()])
         for number, buffer in enumerate((prepared.weights, *self._between_passes)):
             buffer.bind_to_storage_buffer(number)
         target.bind_to_image(0, read=False, write=True)
-        for first in range(0, tiles, batch):
-            for program, launch in zip(prepared.passes, launches, strict=True):
+        for first in firsts:
+            for program, launch in zip(prepared.passes, schedule["launches"], strict=True):
                 self._bind(program, textures, {"first_tile": first, "tile_count": batch})
-                program.run(batch // (launch["tiles"] * ITEMS), launch["lines"], 1)
+                program.run(batch // (launch["tiles"] * schedule["items"]), launch["lines"], 1)
                 self._context.memory_barrier()
 
     def _reserve(self, sizes: Sequence[int]) -> None:

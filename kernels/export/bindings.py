@@ -69,7 +69,7 @@ def _bound(interface: Interface) -> list[Binding]:
             "name": array.name,
             "access": array.access,
             "type": "uniform" if array.home == BLOCK else "float32",
-            "shape": list(array.shape),
+            "shape": [*array.shape, *[array.lanes] * (array.lanes > 1)],
         }
         for array in arrays
     ]
@@ -116,11 +116,10 @@ def _numbered(interface: Interface) -> list[Binding]:
 
 def _registers(interface: Interface) -> list[Binding]:
     """Return bindings with the registers of HLSL: b constants, t what is read, u what is written."""
-    kind = {READ: "t", WRITE: "u"}
     found = _numbered(interface)
     for each in found:
         constant = each["slot"] == 0 or each["type"] == "uniform"
-        each["slot"] = f"{'b' if constant else kind[each['access']]}{each['slot']}"
+        each["slot"] = f"{'b' if constant else 't' if each['access'] == READ else 'u'}{each['slot']}"
     return found
 
 

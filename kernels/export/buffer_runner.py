@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import BLOCK, WEIGHTS, Interface
+from ...compiler.kernel.interface import BATCH, BLOCK, WEIGHTS, Interface
 from ...compiler.languages.glsl_buffers import GROUP
 from ..devices.executor import Executor
-from ..devices.kernel import Kernel, Memory, words
+from ..devices.kernel import Kernel, Memory, batches, plane_shape, words
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,23 @@ class Launch:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A built kernel, what it takes, its weights, and its schedule's facts."""
+    """A kernel's launches, built, one or several; what it takes, its weights, and its schedule's facts."""
 
-    built: Any
+    built: tuple[Any, ...]
     interface: Interface
     weights: Memory | None
     schedule: Mapping[str, Any]
 
 
 class BufferRunner(Executor):
-    """Runs kernels of one target; a subclass builds one [`_build`] and launches it [`_launch`]."""
+    """Runs kernels of one target; a subclass builds one [`_build`] and launches it [`_launch`].
+
+    What several launches hand on is kept for the next picture of the same size.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._handed_on: dict[str, Memory] = {}
 
     @abstractmethod
     def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
@@ -70,7 +77,9 @@ class BufferRunner(Executor):
             weights = self._store(WEIGHTS, np.pad(kernel.weights, (0, whole)))
         group = schedule.get("group")
         waiting = None if group is None else (int(group[0]), int(group[1]))
-        return Prepared(self._build(kernel, waiting), kernel.interface, weights, schedule)
+        launches = kernel.launches if isinstance(kernel, Artifact) else ()
+        built = tuple(self._build(each, waiting) for each in launches or [kernel])
+        return Prepared(built, kernel.interface, weights, schedule)
 
     def _discard(self, prepared: Prepared) -> None:
         if prepared.weights is not None:
@@ -81,13 +90,41 @@ class BufferRunner(Executor):
     ) -> None:
         taken, picked = prepared.interface, prepared.schedule
         held = {**arrays, WEIGHTS: prepared.weights} if prepared.weights else arrays
-        numbers = taken.numbers()
+        if "launches" in picked:
+            self._batches(prepared, held, integers)
+            return
         threads = (-(-integers["width"] // picked.get("pixels", 1)), integers[taken.rows])
-        launch = Launch(
-            words(taken, integers),
-            {number: held[name].held for name, number in numbers.items()},
-            threads,
-            tuple(picked.get("group", GROUP)),
-            [numbers[array.name] for array in taken.arrays if array.home == BLOCK],
-        )
-        self._launch(prepared.built, launch)
+        group = tuple(picked.get("group", GROUP))
+        self._launch(prepared.built[0], self._of(taken, held, integers, threads, group))
+
+    def _of(
+        self,
+        taken: Interface,
+        held: Mapping[str, Any],
+        integers: Mapping[str, int],
+        threads: tuple[int, int],
+        group: tuple[int, int],
+    ) -> Launch:
+        """Return a call with all arrays and integers that a kernel takes."""
+        numbers = taken.numbers()
+        buffers = {number: held[name].held for name, number in numbers.items()}
+        blocks = [numbers[array.name] for array in taken.arrays if array.home == BLOCK]
+        return Launch(words(taken, integers), buffers, threads, group, blocks)
+
+    def _batches(self, prepared: Prepared, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+        """Start several launches for one batch of tiles after another."""
+        taken, picked = prepared.interface, prepared.schedule
+        count, firsts = batches(picked, (integers["height"], integers["width"]))
+        shapes = {a.name: (*plane_shape(a.shape, {BATCH[1]: count}), a.lanes) for a in taken.both}
+        if shapes != {name: memory.shape for name, memory in self._handed_on.items()}:
+            while self._handed_on:
+                self._release(self._handed_on.popitem()[1])
+            for name, shape in shapes.items():
+                self._handed_on[name] = self._memory(name, shape)
+        for first in firsts:
+            given = {**integers, **dict(zip(BATCH, (first, count), strict=True))}
+            for built, launch in zip(prepared.built, picked["launches"], strict=True):
+                threads = count // launch["tiles"], launch["lines"]
+                self._launch(
+                    built, self._of(taken, {**held, **self._handed_on}, given, threads, (picked["items"], 1))
+                )

@@ -61,7 +61,8 @@ class ComputeRunner(BufferRunner):
             raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
 
     def _discard(self, prepared: Prepared) -> None:
-        prepared.built.release()
+        for built in prepared.built:
+            built.release()
         super()._discard(prepared)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...compiler.kernel.interface import BLOCK, PATH, TABLE, UNSIGNED, Interface
+from ...compiler.kernel.interface import BLOCK, BOTH, PATH, TABLE, UNSIGNED, Array, Interface
 from ...compiler.languages.c import whole
 from ...refimpl.errors import ExecutorUnavailable
 from ..devices.kernel import Kernel
@@ -37,6 +38,8 @@ static thread_local wamnet_place blockIdx, blockDim, threadIdx;
 template <class T> static inline T min(T a, T b) { return b < a ? b : a; }
 template <class T> static inline T max(T a, T b) { return a < b ? b : a; }
 struct alignas(16) int4 { int x, y, z, w; };
+struct alignas(8) float2 { float x, y; };
+static inline float2 make_float2(float x, float y) { return {x, y}; }
 static inline int4 make_int4(int x, int y, int z, int w) { return {x, y, z, w}; }
 static inline float __int_as_float(int bits) { return __builtin_bit_cast(float, bits); }
 static inline int __dp4a(int a, int b, int sum)
@@ -59,6 +62,10 @@ METAL_SHIM = """\
 typedef unsigned int uint;
 struct uint2 { uint x, y; };
 namespace metal {
+struct alignas(8) float2 {
+    float x, y;
+    float2(float a, float b) : x(a), y(b) {}
+};
 struct alignas(16) float4 {
     float x, y, z, w;
     float4() = default;
@@ -70,6 +77,7 @@ static inline void operator+=(float4 &a, float4 b)
 {
     a = float4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
 }
+static inline void operator-=(float4 &a, float4 b) { a += b * -1.0f; }
 enum class mem_flags { mem_threadgroup };
 static inline void threadgroup_barrier(mem_flags) { wamnet_wait(); }
 static inline float fabs(float x) { return __builtin_fabsf(x); }
@@ -190,10 +198,10 @@ class HostRunner(BufferRunner):
         self._folder.cleanup()
 
 
-def _arrays(interface: Interface) -> list[str]:
-    """Return the texts of a kernel's arrays, in the order of its arguments."""
-    numbers = interface.numbers()
-    return [f"buffers[{numbers[array.name]}]" for array in interface.arrays]
+def _arrays(interface: Interface, listed: Sequence[Array] = ()) -> list[str]:
+    """Return the texts of a kernel's arrays, in the order of its arguments, or of others."""
+    numbers, pair = interface.numbers(), {BOTH: "(float2 *)"}
+    return [f"{pair.get(a.access, '')}buffers[{numbers[a.name]}]" for a in listed or interface.arrays]
 
 
 def _integers(interface: Interface) -> list[str]:
@@ -247,8 +255,7 @@ class MetalRunner(HostRunner):
 
     def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
         (folder / "metal_stdlib").write_text(METAL_SHIM, encoding="utf-8")
-        numbers = kernel.interface.numbers()
-        arrays = [f"buffers[{numbers[array.name]}]" for array in kernel.interface.by_number()]
+        arrays = _arrays(kernel.interface, kernel.interface.by_number())
         arguments = ["*(const Size *)sizes", *arrays]
         places = ["{(uint)column, (uint)row}"]
         if group is not None:

@@ -47,7 +47,7 @@ from .hosts import scratch
 from .hosts.picture import beside
 from .hosts.table import HOSTS, host_named
 from .motion import ROWS_NAME, Motion
-from .targets import NAMES, ONNX, TARGETS, Limit, Place, Row
+from .targets import NAMES, ONNX, PASSES, TARGETS, Limit, Place, Row
 
 SCHEMA = "wamnet-export-1"
 """Name and version of the manifest's form; spec/export.schema.json."""
@@ -189,6 +189,9 @@ def _hosted(request: Request) -> Request:
     two = vary(parse(request.variant), request.model).rank > 0
     host.check(scene, request.motion is not None, two, request.variant, request.model.features)
     weights, schedule = request.weights or host.weights, request.schedule or host.schedule
+    if schedule == PASSES:
+        rule = f"is several launches, and host {host.name} starts one for each kernel"
+        raise InputError("--schedule", schedule, rule, "leave it out, or leave --host out")
     return replace(request, weights=weights, schedule=schedule)
 
 

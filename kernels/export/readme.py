@@ -10,6 +10,7 @@ from ...compiler.core.lower import OWN_NUMBERS
 from ...compiler.kernel.interface import SCENE_NUMBERS, WEIGHTS
 from ...compiler.languages.c import whole
 from ...compiler.reading.languages import is_read
+from ..devices.kernel import BATCH_TILES
 from .bindings import input_section
 from .hosts import scratch
 from .hosts.host import Host
@@ -438,8 +439,46 @@ def _dispatch(row: Row, kernel: Mapping[str, Any]) -> str:
     return row.dispatch.format(**started, height="rows" if kernel["role"] == "path" else "height")
 
 
+LAUNCHED = """\
+/* {said}; arguments as above.
+   `start` starts so many items along x and y, in groups of {items} x 1, and waits for the launch before.
+   The last {count} arrays hold the numbers of `memory` in manifest.json for each of tile_count tiles. */
+int tiles = ceil(width / {columns}) * ceil(height / {rows});
+int tile_count = round_up(min(tiles, {most}), {whole});   /* or any other multiple of {whole} */
+for (int first_tile = 0; first_tile < tiles; first_tile += tile_count) {{
+{launches}
+}}"""
+"""Lines that call a denoiser of several launches."""
+
+
+def _launches(kernel: Mapping[str, Any]) -> str:
+    """Return the lines that call a denoiser of several launches."""
+    picked = kernel["schedule"]
+    entries = [each["entry"] for each in picked["launches"]]
+    launches = [
+        f"    start({number}, tile_count / {each['tiles']}, {each['lines']});"
+        f"   /* {', '.join(each['arrays'])} */"
+        for number, each in enumerate(picked["launches"])
+    ]
+    said = f"Start {entries[0]} to {entries[-1]}, by their numbers"
+    if len(set(entries)) == 1:
+        said = f"Compile the text with STAGE defined as 0 to {len(entries) - 1}, or take the files"
+    return LAUNCHED.format(
+        said=said,
+        items=picked["items"],
+        count=len(picked["memory"]),
+        columns=picked["pixels"],
+        rows=picked["rows"],
+        most=BATCH_TILES,
+        whole=picked["items"] * max(each["tiles"] for each in picked["launches"]),
+        launches="\n".join(launches),
+    )
+
+
 def _last(row: Row, kernel: Mapping[str, Any]) -> str:
     """Return the lines that call the denoiser."""
+    if "launches" in kernel["schedule"]:
+        return _launches(kernel)
     read = [b for b in kernel["bindings"] if b["name"].startswith("image_")]
     template = IMAGE_LINES.get(row.name, IMAGE_LINES.get(row.slots, ""))
     each = [template.format(slot=b["slot"], name=b["name"], number=i) for i, b in enumerate(read)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ...compiler.kernel.interface import BLOCK, TABLE
+from ...compiler.kernel.interface import BLOCK, TABLE, staged
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.inlined import LARGEST_WEIGHTS
 from ...compiler.schedules.schedules import PLAIN
@@ -53,15 +53,26 @@ def _as(suffix: str) -> Files:
     return lambda stem, source: {f"{stem}{suffix}": source.encode()}
 
 
+def _launches(stem: str, source: str) -> Mapping[str, str]:
+    """Return the source of each launch by the stem of its files, or of a kernel that is one."""
+    count = source.count(" STAGE == ")
+    return {f"{stem}.{number}": staged(source, number) for number in range(count)} or {stem: source}
+
+
 def _spirv(stem: str, source: str) -> Mapping[str, bytes]:
     """Return SPIR-V, and the GLSL that it is made of."""
-    return {f"{stem}.spv": tools.spirv(source), f"{stem}.comp": source.encode()}
+    made = {f"{name}.spv": tools.spirv(text) for name, text in _launches(stem, source).items()}
+    return {**made, f"{stem}.comp": source.encode()}
 
 
 def _hlsl(stem: str, source: str) -> Mapping[str, bytes]:
     """Return HLSL for both compilers."""
-    binary = tools.spirv(source)
-    return {f"{stem}.{style}.hlsl": tools.hlsl(binary, style).encode() for style in tools.HLSL_STYLES}
+    binaries = {name: tools.spirv(text) for name, text in _launches(stem, source).items()}
+    return {
+        f"{name}.{style}.hlsl": tools.hlsl(binary, style).encode()
+        for name, binary in binaries.items()
+        for style in tools.HLSL_STYLES
+    }
 
 
 @dataclass(frozen=True)
@@ -112,6 +123,9 @@ GROUPED = ("group:4", "group:2", "group:1", PLAIN)
 GROUPED_BYTES = (*GROUPED, "groupdot:4")
 """The same where a language has a word for products of bytes."""
 
+PASSES = "fftpasses:32"
+"""Schedule of spectra in several launches, the fastest where a processor runs shaders."""
+
 
 def _storage(
     kernel: str, uniform: int = 0, name: str = "", schedules: tuple[str, ...] = GROUPED
@@ -138,10 +152,10 @@ def _fragment(kernel: str, rows: int) -> dict[str, Place]:
 UNIFORM_RANGE = (16 * KILOBYTE, "maxUniformBufferRange")
 """What Vulkan promises of a uniform block."""
 
-VULKAN_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, GROUPED_BYTES)
+VULKAN_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED_BYTES, PASSES))
 """Places of weights for Vulkan."""
 
-TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE)
+TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED, PASSES))
 """The same for what is made of its GLSL by way of SPIR-V 1.0, which has no products of bytes."""
 
 DISPATCH = "dispatch(ceil(width / {across}), ceil({height} / {down}), 1)"
@@ -228,7 +242,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "glsl-compute",
         "GLSL 4.30, compute shader",
-        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE", ("group:2", *GROUPED)),
+        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE", ("group:2", *GROUPED, PASSES)),
         _as(".comp"),
         "numbered",
         _buffers_code("GLuint"),
@@ -254,7 +268,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "wgsl",
         "WGSL",
-        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize", GROUPED_BYTES),
+        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize", (*GROUPED_BYTES, PASSES)),
         _as(".wgsl"),
         "numbered",
         _buffers_code("const"),
@@ -273,7 +287,8 @@ ROWS: tuple[Row, ...] = (
     Row(
         "metal",
         "Metal Shading Language",
-        _storage("metal", 64 * KILOBYTE, "constant memory of a kernel") | _tabled("metal"),
+        _storage("metal", 64 * KILOBYTE, "constant memory of a kernel", (*GROUPED, PASSES))
+        | _tabled("metal"),
         _as(".metal"),
         "numbered",
         _buffers_code("id<MTLComputePipelineState>"),
@@ -304,7 +319,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "cuda",
         "CUDA C",
-        _storage("cuda", schedules=GROUPED_BYTES) | _tabled("cuda"),
+        _storage("cuda", schedules=(*GROUPED_BYTES, PASSES)) | _tabled("cuda"),
         _as(".cu"),
         "arguments",
         _arguments_code(

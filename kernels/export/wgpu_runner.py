@@ -48,6 +48,16 @@ def declared(source: str) -> dict[int, str]:
     return {int(m[1] or m[3]): KINDS[m[2] or m[4]] for m in DECLARED.finditer(source)}
 
 
+def bound(kernel: Kernel) -> dict[int, str]:
+    """Return the kinds of the buffers that are bound: of one of several launches those of its own arrays."""
+    kinds = declared(kernel.source)
+    launches = kernel.manifest.get("schedule", {}).get("launches")
+    if launches is None:
+        return kinds
+    numbers = kernel.interface.numbers()
+    return {number: kinds[number] for number in (0, *(numbers[name] for name in launches[0]["arrays"]))}
+
+
 class WgpuRunner(BufferRunner):
     """A device of WebGPU; `translate` makes of a kernel's source what the device is given."""
 
@@ -74,23 +84,22 @@ class WgpuRunner(BufferRunner):
         self._translate = translate
 
     def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
-        source = kernel.source
-        code = self._translate(source)
+        code, kinds = self._translate(kernel.source), bound(kernel)
         try:
             module = self._device.create_shader_module(code=code)
             # A layout of its own holds also what a kernel declares and does not read.
             entries = [
                 {"binding": place, "visibility": self._wgpu.ShaderStage.COMPUTE, "buffer": {"type": kind}}
-                for place, kind in declared(source).items()
+                for place, kind in kinds.items()
             ]
-            bound = self._device.create_bind_group_layout(entries=entries)
-            layout = self._device.create_pipeline_layout(bind_group_layouts=[bound])
+            group_layout = self._device.create_bind_group_layout(entries=entries)
+            layout = self._device.create_pipeline_layout(bind_group_layouts=[group_layout])
             pipeline = self._device.create_compute_pipeline(
                 layout=layout, compute={"module": module, "entry_point": kernel.entry_point}
             )
         except Exception as error:  # noqa: BLE001 (the package has its own kinds)
             raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
-        return pipeline, bound, set(declared(source))
+        return pipeline, group_layout, set(kinds)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         kind = self._wgpu.BufferUsage.UNIFORM if name == WEIGHTS else 0

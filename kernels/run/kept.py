@@ -10,14 +10,14 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.core.ir import Image
-from ...compiler.kernel.interface import Array, Interface
+from ...compiler.kernel.interface import Array, Interface, launches
 from .. import cache
 from ..devices.kernel import Kernel
 
@@ -47,6 +47,12 @@ class KeptKernel:
     def kernels(self) -> tuple[KeptKernel, ...]:
         """Return the kernels in the order in which they run."""
         return (self.before, self) if self.before else (self,)
+
+    @property
+    def launches(self) -> tuple[KeptKernel, ...]:
+        """Return a kernel of several launches as one of each."""
+        found = launches(self.source, self.manifest)
+        return tuple(replace(self, source=s, manifest=m, entry_point=m["entry_point"]) for s, m in found)
 
 
 def kept_kernels(

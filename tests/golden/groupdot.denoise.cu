@@ -24,6 +24,10 @@ static __device__ inline void operator+=(wamnet_vector &a, wamnet_vector b)
 {
     a = wamnet_made(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
 }
+static __device__ inline void operator-=(wamnet_vector &a, wamnet_vector b)
+{
+    a = wamnet_made(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w);
+}
 #endif
 #ifndef WAMNET_DOTS
 #define WAMNET_DOTS

@@ -120,6 +120,14 @@ def test_a_kernel_is_the_same_after_reading(executor_named):
     assert again.weights.tobytes() == kernel.weights.tobytes()
 
 
+def test_the_launches_of_a_kernel_are_the_same_after_reading(kit):
+    program = kit.denoiser(kit.network([192, 32, 3], (3.0, 3.0)), {"a": 3}, 8, "clamp")
+    made = compiling.compile_program(program, "opengl", "ieee", "fftpasses:32")
+    read = kernel_of(json.loads(json.dumps(data_of(made))))
+    assert [each.source for each in read.launches] == [each.source for each in made.launches]
+    assert len({each.source for each in read.launches}) == len(made.manifest["schedule"]["launches"])
+
+
 def test_only_the_newest_entries_of_a_kind_stay(monkeypatch):
     monkeypatch.setattr(cache, "MOST_KEPT", 3)
     for number in range(5):

@@ -133,6 +133,8 @@ def test_what_a_host_does_not_run_is_refused():
         export(Request(model, "c", host="unity"))
     with pytest.raises(InputError, match=r"--target 'wgsl': host c runs kernels of target c \(leave it out"):
         export(Request(model, "wgsl", host="c"))
+    with pytest.raises(InputError, match="--schedule 'fftpasses:32': is several launches, and host webgpu"):
+        export(Request(model, "wgsl", schedule="fftpasses:32", host="webgpu"))
 
 
 # ---- C and C++ -----------------------------------------------------------------------------------

@@ -367,13 +367,22 @@ def gnu_vectors(lanes: str) -> str:
 
 
 VECTORS = f"""\
+/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \\
+    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+#define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#endif
 /* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \\
-    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+#if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \\
+    defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
 {gnu_vectors("LANES")}#else
 {LOOPS}#endif
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
+#endif
 """
-"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
+"""The type of vectors and what is done with them, by GCC and clang, and by other compilers; and the attribute
+of the function that is declared next. On x86 without AVX2 define WAMNET_PORTABLE: the copy for it is slow."""
 
 REFUSED = """\
 #if !defined(__GNUC__)

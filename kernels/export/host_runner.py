@@ -155,7 +155,7 @@ class HostRunner(BufferRunner):
 
     def __init__(self, *last: str) -> None:
         super().__init__()
-        self._last = last
+        self.last: Sequence[str] = last
         self._folder = tempfile.TemporaryDirectory(prefix="wamnet-host-")
         self._count = 0
         try:
@@ -178,7 +178,7 @@ class HostRunner(BufferRunner):
         (folder / f"glue{self.suffix}").write_text(glue, encoding="utf-8")
         tools.run(
             self.program,
-            *(*self.options, *OPTIONS, *self._last, "-I.", "-o", "kernel.so", f"glue{self.suffix}", "-lm"),
+            *(*self.options, *OPTIONS, *self.last, "-I.", "-o", "kernel.so", f"glue{self.suffix}", "-lm"),
             folder=folder,
         )
         function = ctypes.CDLL(str(folder / "kernel.so")).wamnet_call

@@ -228,11 +228,12 @@ def _speed(facts: Mapping[str, Any]) -> list[str]:
     speed = facts.get("speed")
     if speed is None:
         return []
+    plain = f"{speed['plain_ms']:.3g} ms with -O2 alone; " if "plain_ms" in speed else ""
     between = f"{speed['least_ms']:.3g} to {speed['most_ms']:.3g}, {speed['rounds']} runs"
     return [
         f"* Speed: {speed['ms']:.3g} ms ({between}) for {speed['size']} x {speed['size']} pixels",
         f"  on {speed['device']}, with copies of the images there and back;",
-        f"  {speed['compile_s']:.2g} s to compile. `wamnet export --measure` measures it again.",
+        f"  {plain}{speed['compile_s']:.2g} s to compile. `wamnet export --measure` measures it again.",
     ]
 
 

@@ -6,7 +6,7 @@ Conformance runs those in [`RUNNERS`] by name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -20,12 +20,14 @@ Opener = Callable[[], Executor]
 class Way:
     """How a target's kernels are run; `route`: what they are translated to before, if they are.
 
-    `stands_in`: what runs them computes the same, but is nothing that the target's users have.
+    `stands_in`: what runs them computes the same, but is nothing that the target's users have. `timed`: where
+    options of a compiler decide, those that are timed: the advised ones, and those of a plain build.
     """
 
     open: Opener
     route: str = ""
     stands_in: bool = False
+    timed: tuple[Sequence[str], ...] = ()
 
 
 def _opener(module: str, name: str, *arguments: str) -> Opener:
@@ -48,7 +50,7 @@ WAYS: Mapping[str, Way] = {
     "hlsl": Way(_opener("wgpu_runner", "hlsl_runner"), "back to SPIR-V, wgpu, "),
     "wgsl": Way(_opener("wgpu_runner", "WgpuRunner"), "wgpu, "),
     "metal": Way(_opener("host_runner", "MetalRunner"), "as C++ with a shim, ", stands_in=True),
-    "c": Way(_opener("host_runner", "CRunner")),
+    "c": Way(_opener("host_runner", "CRunner"), timed=(("-O3", "-march=native"), ("-O2",))),
     "cuda": Way(_opener("host_runner", "CUDARunner"), "as C++ with a shim, ", stands_in=True),
     "shadertoy": Way(_opener("host_pass_runner", "ShadertoyRunner"), "its uniforms declared, "),
     "godot": Way(_opener("host_pass_runner", "GodotRunner"), "its words declared, "),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from ...refimpl.errors import InputError
 from ..bench.workload import repeated
 from ..measure import PAUSE_S, Clock, Entry, take_turns
 from .check import runner
+from .host_runner import HostRunner
 from .package import Export
 from .runners import WAYS
 
@@ -33,7 +35,10 @@ MS = 1e3
 
 @dataclass(frozen=True)
 class Speed:
-    """Milliseconds of a picture: the median of `rounds`, the least and the most; and seconds to compile."""
+    """Milliseconds of a picture: the median of `rounds`, the least and the most; and seconds to compile.
+
+    `plain_ms`: the median of a program in C that is compiled without the advised options.
+    """
 
     device: str
     size: int
@@ -42,10 +47,11 @@ class Speed:
     least_ms: float
     most_ms: float
     compile_s: float
+    plain_ms: float | None = None
 
     def facts(self) -> dict[str, Any]:
         """Return the entry `speed` of a manifest."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 def measure(
@@ -57,10 +63,18 @@ def measure(
     is missing on this machine.
     """
     check_measured(export.target)
+    found = [_measured(export, size, rounds, clock, each) for each in WAYS[export.target].timed or [()]]
+    return replace(found[0], plain_ms=found[1].ms if found[1:] else None)
+
+
+def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Sequence[str]) -> Speed:
+    """Return how long the denoiser takes, compiled with options."""
     assert export.denoiser is not None, "targets that are measured have kernels"
     denoiser = _unseen(export.denoiser)
     images = {name: repeated(image, size) for name, image in export.pair.images.items()}
     with runner(export.target, denoiser.target) as opened:
+        if isinstance(opened, HostRunner):
+            opened.last = options
 
         def picture(_number: int) -> None:
             opened.run(denoiser, images)
@@ -73,7 +87,8 @@ def measure(
         take_turns([entry], rounds, PAUSE_S, clock=clock)
         median, ms = entry.times.median, [MS * seconds for seconds in entry.seconds]
         # Some drivers compile when a kernel first runs: what that took beyond a picture is theirs.
-        device, compiled = WAYS[export.target].route + opened.device, max(0.0, first - median)
+        device = " ".join([WAYS[export.target].route + opened.device, *options])
+        compiled = max(0.0, first - median)
         return Speed(device, size, rounds, MS * median, min(ms), max(ms), compiled)
 
 

@@ -312,7 +312,9 @@ ROWS: tuple[Row, ...] = (
         "header",
         '#include "{file}"\n'
         + _arguments_code("wamnet_image({arguments});")
-        + "\n/* wamnet_pixel computes {columns} pixels of a row, for your own loops. Use -O3 -march=native.\n"
+        + "\n/* wamnet_pixel computes {columns} pixels of a row, for your own loops. -O3 -march=native\n"
+        "   is the fastest. Without it GCC 12 and later compile tiles for AVX2 and AVX-512, on Linux, and\n"
+        "   the program chooses. For x86 processors without AVX2 define WAMNET_PORTABLE.\n"
         "   Other schedules: tile:8 needs registers of 8 floats (AVX2), tile:4 those of 4 (SSE, NEON).\n"
         "   GCC and clang also compile fft:16, fft:8 and fft:4, which are faster for large windows. */",
     ),

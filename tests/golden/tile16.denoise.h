@@ -60,9 +60,14 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
+/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
+    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+#define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#endif
 /* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && defined(__AVX__)) || defined(__AVX512F__)) && defined(__GNUC__) && \
-    __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
+#if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \
+    defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
 typedef float wamnet_vector __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
 
 static inline void wamnet_clear(wamnet_vector *to)
@@ -136,6 +141,9 @@ static inline void wamnet_add_product(
         sum->lane[i] += weight->lane[i] * value;
     }
 }
+#endif
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
 #endif
 
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written

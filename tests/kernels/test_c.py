@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 from pathlib import Path
 
@@ -120,6 +121,16 @@ def test_tiles_are_clean_and_within_their_bound(executor_named, bordered, tmp_pa
     executor_named("c")
     found = built(tmp_path, bordered, "ieee", ["-std=c99", *options, *WARNINGS, *way], schedule)
     assert within_bound(bordered, found)
+
+
+@pytest.mark.parametrize("portable", [False, True])
+def test_a_plain_build_has_tiles_for_newer_processors(executor_named, case, tmp_path, portable):
+    """KER-16: GCC on x86 with glibc compiles them for AVX2 and AVX-512 too, unless it may not."""
+    if platform.machine() != "x86_64" or "(Debian" not in executor_named("c").device:
+        pytest.skip("the compiler is not Debian's GCC for x86-64")
+    options = ["-std=c99", "-O2", *WARNINGS, *["-DWAMNET_PORTABLE"][: int(portable)]]
+    assert within_bound(case, built(tmp_path, case, "ieee", options, "tile:8"))
+    assert (b"wamnet_pixel.arch_x86_64_v3" in (tmp_path / "main").read_bytes()) != portable
 
 
 @pytest.mark.parametrize(

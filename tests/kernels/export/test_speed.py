@@ -48,6 +48,16 @@ def test_the_readme_says_what_the_clock_said(executor_named):
     assert told.manifest["files"][README_NAME] == hashlib.sha256(text.encode()).hexdigest()
 
 
+@pytest.mark.needs("devices")
+def test_c_is_measured_with_the_advised_options_and_without():
+    made = export(Request(random_model(), "c"))
+    speed = measure(made, size=16, rounds=1, clock=clock_of(2.25, 0.25, 2.5, 0.5))
+    assert (speed.ms, speed.plain_ms) == (250.0, 500.0)
+    said = " ".join(with_speed(made, speed.facts()).contents()[README_NAME].decode().split())
+    assert "there and back; 500 ms with -O2 alone; 2 s to compile." in said
+    assert speed.device.endswith(" -O3 -march=native")
+
+
 def test_a_readme_gives_the_bytes_of_each_kernel():
     made = export(Request(random_model(), "c"))
     text = made.contents()[README_NAME].decode()

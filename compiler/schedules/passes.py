@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -134,9 +135,9 @@ class Passes(Inlined):
         """Return the kernel."""
         constants, images = self.constants(), name("IMAGES")
         spectrum, back = PAIRS * POINTS * POINTS, images * POINTS * POINTS
-        arrays = [
-            ("rows", spectrum), ("columns", spectrum), ("products", back),
-            ("back", images * OUT * POINTS), ("sums", images * OUT * OUT),
+        arrays = [  # in the order of a manifest's keys, which is that of bindings
+            ("back", images * OUT * POINTS), ("columns", spectrum), ("products", back), ("rows", spectrum),
+            ("sums", images * OUT * OUT),
         ]  # fmt: skip
         own, kept = (ITEM // POINTS * (lines * POINTS) + ITEM % POINTS for lines in (POINTS, OUT))
         row = ITEM % OUT * OUT * images + ITEM // OUT
@@ -212,9 +213,9 @@ class Passes(Inlined):
             *self.corner(),
             Let("top", name("tile_y") + ITEM - self.row),
             Let("row", clamp(name("top"), HEIGHT)),
-            Array("gathered", FLOAT, (PAIRS * POINTS * 2,)),
+            Array("gathered", FLOAT, (PAIRS * POINTS * 2,), kept=True),
             loop("dx", POINTS, *lines),
-            loop("pair", PAIRS, *lets, *puts),
+            loop("pair", PAIRS, *kept(lets), *puts),
         ]
 
     def turned(self, source: Path, target: Path, sign: int) -> list[Statement]:
@@ -227,7 +228,7 @@ class Passes(Inlined):
             reads.append(Let(f"z{n}", load(array, at, kind=COMPLEX)))
             parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
         lets, found = line(parts, self.points if sign < 0 else self.sizes.out, sign)
-        return [*reads, *lets, *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
+        return [*reads, *kept(lets), *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
 
     # ---- products ----------------------------------------------------------------------------------------
 
@@ -284,7 +285,7 @@ class Passes(Inlined):
                 z.append(name(f"{place}_{t}", COMPLEX))
             (a, b), (c, d) = ([each.lane(0), each.lane(1)] for each in z)
             both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
-            found += [Let(f"{n}_{t}", value) for n, value in zip("abcd", both, strict=True)]
+            found += [Let(f"{n}_{t}", value, kept=True) for n, value in zip("abcd", both, strict=True)]
         (layer,) = readers_of_window(self.program)
         first = self.offset(layer["weight"]) // 4
         at = ((K * self.sizes.neurons + name("group") // (HALF // IMAGES)) * POINTS + F) * PAIRS + name("own")
@@ -329,6 +330,11 @@ class Passes(Inlined):
             reads = [load("sums", (start + n) * TILE_COUNT + TILE, kind=COMPLEX).lane(part) for n in numbers]
             found.append(Store(self.variable(index, 0, j), (), stack(reads), add=True))
         return found
+
+
+def kept(lets: Sequence[Let]) -> list[Let]:
+    """Return values whose operations stay in order, which the bound is one of (FOU-6)."""
+    return [replace(each, kept=True) for each in lets]
 
 
 class FourierPasses(Fourier):

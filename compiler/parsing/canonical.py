@@ -7,7 +7,7 @@ operations that languages write with others.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -28,15 +28,18 @@ from ..kernel.kernel import (
     Function,
     If,
     Kernel,
+    Launch,
     Let,
     Statement,
     Store,
     Write,
     const,
+    expr,
     rewritten,
     substituted,
     walk,
 )
+from ..kernel.sizes import integer
 
 Terms = list[tuple[Expr, int]]
 """Terms of a sum of integers, each with 1 or -1."""
@@ -49,14 +52,26 @@ def canonical(kernel: Kernel) -> Kernel:
         Function(each.name, each.takes, _body(each.body, ()), each.result and _value(each.result, ()))
         for each in kernel.functions
     )
+    known = {each.name: const(integer(kernel, each.value)) for each in kernel.constants}
+    body = tuple(_counted(each, known) for each in kernel.body)
     return replace(
         kernel,
         interface=Interface(DENOISE, tuple(arrays), ()),
-        body=_body(kernel.body, ()),
+        body=_body(body, ()),
         constants=tuple(Constant(each.name, _value(each.value, ())) for each in kernel.constants),
         functions=tuple(functions),
         step=(_value(kernel.step[0], ()), _value(kernel.step[1], ())),
     )
+
+
+def _counted(statement: Statement, known: Mapping[str, Expr]) -> Statement:
+    """Return an array of the device, or a launch, with integers for constants: no source states them."""
+    if isinstance(statement, Launch):
+        across, down = (substituted(each, known) for each in statement.counts)
+        return replace(statement, counts=(across, down))
+    if isinstance(statement, Array) and statement.space == "device":
+        return replace(statement, sizes=tuple(substituted(expr(each), known) for each in statement.sizes))
+    return statement
 
 
 def _body(body: Body, variables: Collection[str]) -> Body:
@@ -118,8 +133,8 @@ def _statement(statement: Statement, names: Collection[str]) -> Statement:
     if isinstance(statement, If):
         condition = _value(statement.condition, names)
         return If(condition, _body(statement.body, names), _body(statement.otherwise, names))
-    if isinstance(statement, Block):
-        return Block(_body(statement.body, names))
+    if isinstance(statement, Block | Launch):
+        return replace(statement, body=_body(statement.body, names))
     if isinstance(statement, Call):
         views = (
             replace(v, index=tuple(_value(each, names) for each in v.index), step=_value(v.step, names))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS
-from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name
+from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name, parts
 from .canonical import terms, total
 from .grammar import BINARY, COMPARED, PRODUCTS, SHIFTS
 from .reader import Reader, Unread
@@ -373,4 +373,6 @@ def rounds(value: Expr) -> bool:
     """Return whether a value is a sum, a product, or a function of numbers."""
     if value.op in ("select", "negative", "convert"):
         return any(map(rounds, value.args[value.op == "select" :]))
+    if value.op == "stack":  # one operation by itself has no order
+        return any(sum(part.op in ROUNDING for part in parts(each)) > 1 for each in value.args)
     return value.op in ROUNDING

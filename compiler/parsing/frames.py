@@ -55,12 +55,14 @@ OPEN: Mapping[str, str] = {
     "shared": r"(?P<shared>float|int|f32|i32)",
     "lanes": r"(?P<lanes>\d+)",
     "body": r"(?P<body>.*\n)?",
+    "memory": r"(?P<memory>(?:layout\(std430, binding = \d+\) restrict buffer \w+ \{ vec2 \w+\[\]; \};\n)+)",
+    "launches": r"(?P<launches>#if STAGE == 0\n.*)",
 }  # fmt: skip
 """The open places by name; `@each LINE@` are lines, one for each image."""
 
 BLOCKS = (
     "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
-    "tiled", *"(|)<>",
+    "tiled", "memory", "launches", *"(|)<>",
 )  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
@@ -156,6 +158,19 @@ SIZE = "int width = textureSize(@first@, 0).x;\nint height = textureSize(@same_f
 
 EXTENSION = "\n".join(VULKAN_EXTENSION)
 """Products of bytes in Vulkan GLSL."""
+
+LAUNCH = re.compile(
+    r"""#(?:if|elif) STAGE == (?P<number>\d+)
+void main\(\)
+\{
+int width = imageSize\(result\)\.x;
+int height = imageSize\(result\)\.y;
+int (?P<column>tile) = int\(gl_GlobalInvocationID\.x\);
+int (?P<row>line) = int\(gl_WorkGroupID\.y\);
+(?P<body>(?:[^#\n][^\n]*\n)*?)\}
+(?=#|\Z)"""
+)
+"""A launch of passes, each a program that is compiled by its number."""
 
 FRAMES: dict[str, str] = {
     "c": f"""
@@ -343,6 +358,20 @@ void main()
 {begun(*ITEMS, SIZE)}
 @body@
 }}
+@|@@bounded@
+#version 430 core
+#define PRECISE precise
+@constants@
+@functions@
+layout(local_size_x = ITEMS, local_size_y = 1) in;
+@each uniform sampler2D IMAGE;@
+layout(std430, binding = 0) restrict readonly buffer weight_buffer {{ @vector@ w[]; }};
+layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
+@memory@
+uniform int first_tile;
+uniform int tile_count;
+@launches@
+#endif
 @>@
 """,
     "glsl-es": f"""

@@ -154,14 +154,16 @@ LANGUAGES: Mapping[str, Language] = {
 
 CONSTANT = re.compile(
     "WINDOW_(SIZE|CENTRE|ROWS|COLUMNS)|CENTRE_(ROW|COLUMN)|PIXELS|LANES|PATCH_WIDTH|GROUP_(WIDTH|HEIGHT)|"
-    "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE|POINTS|OUT|TILES|PAIRS|BLOCK|INPUTS|NEURONS|STRIDE"
+    "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE|POINTS|OUT|TILES|PAIRS|BLOCK|INPUTS|NEURONS|STRIDE|IMAGES|FREQUENCIES|"
+    "MIRRORED"
 )
 """The names of constants; no macro has another name, so that none changes what surrounds the statements."""
 
 NAME = re.compile(
-    r"[a-z]|dx|dy|(?:[bsvx]|part)_?\d+(?:_\d+)*|(?:bytes|[tw])\d+|(?:whole_)?(?:real|imaginary)|tile_(?:row|column)|"
-    "apart|at|back|block|columns?|first|gathered|inside|last|left|line|opposite|pair|part|product|rows?|"
-    "spectra|sums?|tap|tile|top|value|within"
+    r"[a-z]|dx|dy|(?:[bsvx]|part)_?\d+(?:_\d+)*|(?:bytes|[twz])\d+|(?:whole_)?(?:real|imaginary)(?:_\d+_\d+)?|"
+    r"(?:here|there|[a-d])_\d+|tile_(?:row|column|x|y)|across|apart|at|back|block|columns?|first|gathered|group|"
+    "here|inside|last|left|line|number|opposite|own|pair|part|products?|rest|rows?|spectra|sums?|tap|there|tile|"
+    "to|top|value|within"
 )
 """The names of values and arrays, but those of layers: no language has one of these for something else."""
 

@@ -49,7 +49,8 @@ from .canonical import canonical
 from .expressions import Expressions, rounds
 from .frames import COMMENT, FRAMES, frame, lines_of, parts_of
 from .grammar import CALLS, CONSTANT, FUNCTION, LANGUAGES, PRODUCTS
-from .reader import Scope
+from .launches import batch, launches
+from .reader import Passes, Scope
 from .reader import Unread as Unread
 
 Space = Literal["item", "group"]
@@ -71,12 +72,17 @@ NESTED = re.compile(r"(?<=.)/\*|\\", re.S)
 
 
 def parse(
-    source: str, language: str, channels: Mapping[str, int] | None = None, bounded: bool = False
+    source: str,
+    language: str,
+    channels: Mapping[str, int] | None = None,
+    bounded: bool = False,
+    passes: Passes | None = None,
 ) -> Kernel:
     """Return the canonical kernel of a source.
 
     `channels` of the images and of the result by name, where the source does not state them: of textures.
-    `bounded`: it must say what an error bound rests on, where its language lets it.
+    `bounded`: it must say what an error bound rests on, where its language lets it. `passes`: what a manifest
+    says of launches.
     """
     if re.search(r"[^\n -~]|\?\?", source):
         raise Unread("a character beyond printable ASCII, or a trigraph")
@@ -93,17 +99,19 @@ def parse(
         raise Unread(f"what surrounds the statements is not a frame of {language}")
     if bounded and "@bounded@" in FRAMES[language] and "bounded" not in parts:
         raise Unread("a source that does not refuse compilers which void its bound")
-    own = parts.get("functions", "") + (parts.get("body") or "")
+    own = parts.get("functions", "") + (parts.get("body") or "") + parts.get("launches", "")
+    if ("launches" in parts) != (passes is not None):
+        raise Unread("a source in passes of which its manifest says nothing, or the other way round")
     if undefined := set(WORD.findall(own)) - _made(own, lines, parts):
         raise Unread(f"{undefined.pop()}, which nothing defines")
     if (
         re.search(r"(?m)^.+#pragma|#pragma (?!unroll$)", own)
         or (language != "opencl" and "#pragma" in own)
-        or ((language != "opengl" or "shared" not in parts) and "imageStore" in own)
+        or ((language != "opengl" or not {"shared", "launches"} & {*parts}) and "imageStore" in own)
     ):
         raise Unread(f"a word that {language} does not have")
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
-    parser.bounded = bounded
+    parser.bounded, parser.passes = bounded, passes
     try:
         kernel = canonical(parser.kernel())
         verify(kernel)
@@ -115,7 +123,7 @@ def parse(
 def _made(own: str, lines: str, parts: Mapping[str, str]) -> set[str]:
     """Return the words of a frame that a source has, apart from its functions and statements `own`."""
     around = lines
-    for each in ("functions", "body"):
+    for each in ("functions", "body", "launches"):
         around = around.replace(parts.get(each) or "\0", "")
     functions = set(re.findall(r"\b(wamnet_\w+)\([^;{}]*\)\s*\{", own))
     return set(WORD.findall(around)) | functions
@@ -145,7 +153,7 @@ class Parser(Expressions):
             kind = self.types[parts["shared"]]
             shared = (self._array("tile", kind, [name("TILE_NUMBERS")], "var", space="group"),)
         self._read(parts.get("body", ""))
-        body = (*shared, *self._body(end=""))
+        body = (*shared, *self._body(end=""), *launches(self))
         missing = [key for key in (*images, RESULT) if key not in self.channels]
         if missing:
             raise Unread(f"the channels of {missing[0]} are not stated")
@@ -155,11 +163,19 @@ class Parser(Expressions):
             body,
             constants,
             tuple(self.functions.values()),
-            (self._step("PIXELS" if shared else parts.get("across")), self._step(parts.get("down"))),
+            self._steps(bool(shared)),
             self._group(known) if shared else None,
             self.place,
             self.vector,
+            batch=batch(self.passes) if self.passes else None,
         )
+
+    def _steps(self, shared: bool) -> tuple[Expr, Expr]:
+        """Return how many columns and rows of pixels an item takes: of passes a tile."""
+        if self.passes:
+            return name("OUT"), name("OUT")
+        parts = self.parts
+        return self._step("PIXELS" if shared else parts.get("across")), self._step(parts.get("down"))
 
     def _group(self, known: Mapping[str, Expr]) -> tuple[int, int]:
         """Return the items of a work group."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..kernel.interface import IMAGE
 from ..kernel.kernel import FLOAT, INT, Function, Type
 from .grammar import FUNCTION, NAME, TOKEN, Language
+
+Passes = tuple[Sequence[tuple[int, int]], Mapping[str, int]]
+"""Of each launch the tiles of an item and the lines; of each array of the device its numbers for a tile."""
 
 
 class Unread(Exception):
@@ -54,6 +57,7 @@ class Reader:
         self.scope = Scope(dict.fromkeys((*places, *grouped, "width", "height"), INT))
         self.place = places
         self.by_calls = self.in_floats = self.bounded = False
+        self.passes: Passes | None = None
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []
         self.at, self.depth, self.operator, self.pointer = 0, 0, "", ""

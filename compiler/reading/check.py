@@ -17,9 +17,10 @@ from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
+from ..parsing.reader import Passes
 from ..proof.evidence import NODE, Refused, read, same
 from .claim import Claim
-from .field import add_up_lanes, fold_lanes
+from .field import add_up_lanes
 from .groups import Group, group_lanes, tile_lanes
 from .lanes import Unread, Wrong, lanes_for
 from .languages import TITLES, is_read
@@ -27,6 +28,7 @@ from .limits import limited
 from .machine import Machine
 from .memory import Image, Result
 from .spectra import Tiles
+from .trial import Trial
 
 KEYS = {
     "": "schema digest program target language entry_point profile sine passes window images output "
@@ -37,7 +39,7 @@ KEYS = {
     "output": "name channels encoding",
     "bound": "output against",
     "profile": "name text",
-    "schedule": "name idea pixels rows group shared_bytes weights_a_texel asked reason",
+    "schedule": "name idea pixels rows group shared_bytes weights_a_texel asked reason launches memory",
     "weights": "count layout order folder",
 }
 """All that a manifest, and each of its parts, may state."""
@@ -82,19 +84,29 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     seed = secrets.randbits(31)
     try:
         check_manifest(manifest, str(held["program"]), "spectra" in held)
-        tiles = Tiles(held["spectra"], pixels, rows, window) if "spectra" in held else None
+        passes = passes_of(schedule)
+        slots = max(of for of, _ in passes[0]) if passes else 1
+        tiles = Tiles(held["spectra"], pixels, rows, window, bool(passes)) if "spectra" in held else None
         if tiles:
-            lanes = tile_lanes((pixels, rows), window, seed)
+            lanes = tile_lanes((pixels, rows), window, seed, bool(passes))
         elif group:
             lanes = group_lanes((group[0], group[1]), pixels, window, seed)
         else:
             reach = max(centre, window - centre)
             lanes = lanes_for((reach + pixels - 1, reach), pixels, seed)
         counts = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
-        fold_lanes(counts) if tiles else add_up_lanes(np.ones(lanes.count, dtype=bool) if group else counts)
-        claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles)
+        if not tiles:
+            add_up_lanes(np.ones(lanes.count, dtype=bool) if group else counts)
+        claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles, slots)
         lanes.channels = max(int(manifest["output"]["channels"]), *(int(n) for _, n in claim.images))
-        run_once(parsed(source, manifest), claim, manifest)
+        kernel = parsed(source, manifest)
+        check_interface(kernel, claim, manifest)
+        if tiles:
+            trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
+            trial.body(kernel.body)
+            trial.complete()
+        else:
+            run_once(kernel, claim, manifest)
     except Wrong as error:
         raise Refused(f"source: {error}") from error
     except RecursionError as error:
@@ -103,7 +115,21 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         raise Refused(f"source: it has no meaning to the checker ({error})") from error
     finally:
         add_up_lanes(None)
-    return {"sums": len(claim.tables) * claim.together, "lanes": lanes.count}
+    return {"sums": len(claim.tables) * claim.together // slots, "lanes": lanes.count}
+
+
+def passes_of(schedule: Any) -> Passes | None:
+    """Return what a manifest says of launches: integers above 0, each item of one tile or of the most."""
+    if "launches" not in schedule and "memory" not in schedule:
+        return None
+    launches = [(each["tiles"], each["lines"]) for each in schedule["launches"]]
+    memory = dict(schedule["memory"])
+    counts = [n for pair in launches for n in pair] + [*memory.values()]
+    if not all(type(n) is int and n > 0 for n in counts) or {*map(len, schedule["launches"])} != {2}:
+        raise Wrong("its manifest has launches, or memory, of no size")
+    if {of for of, _ in launches} - {1, max(of for of, _ in launches)}:
+        raise Wrong("its manifest has launches of several numbers of tiles")
+    return launches, memory
 
 
 def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
@@ -120,9 +146,11 @@ def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
         raise Wrong("its manifest has other images, another window or other work items than its program")
     name, (family, _, pixels) = schedule["name"], schedule["name"].partition(":")
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
+    right = right and {key in schedule for key in ("launches", "memory")} == {name.startswith("fftpasses")}
     if not right or (family == "group" and str(items[0]) != pixels):
         raise Wrong(f"its manifest has other work items than schedule {name}")
-    if not manifest["language"].startswith(TITLES[manifest["target"]]):
+    title = "GLSL 4.30" if "launches" in schedule else TITLES[manifest["target"]]
+    if not manifest["language"].startswith(title):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")
     if items[1] != 1 and not tiles:
         raise Wrong("its manifest gives a work item several rows")
@@ -185,13 +213,13 @@ def parsed(source: str, manifest: Any) -> Kernel:
     output = manifest["output"]
     channels = {f"{IMAGE}{image['name']}": image["channels"] for image in manifest["images"]}
     bounded = any(manifest["bound"]["output"])
-    return parse(source, manifest["target"], {**channels, RESULT: output["channels"]}, bounded)
+    channels[RESULT] = output["channels"]
+    return parse(source, manifest["target"], channels, bounded, passes_of(manifest["schedule"]))
 
 
 def run_once(kernel: Kernel, claim: Claim, manifest: Any) -> None:
     """Run a kernel: `Wrong` unless it writes the claim's outputs, and nothing else."""
     lanes, schedule = claim.lanes, manifest["schedule"]
-    check_interface(kernel, claim, manifest)
     size = schedule.get("group")
     group = Group(lanes, size[0] * size[1]) if size else None
     extent, spans = (lanes.place(1), lanes.place(3)), claim.ranges.images(claim.text)

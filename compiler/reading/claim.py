@@ -8,6 +8,7 @@ from there on [`Claim.added`]; all other operations must be those of the program
 
 from __future__ import annotations
 
+import base64
 import re
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -36,6 +37,7 @@ from .field import (
 from .lanes import Lanes, Unread
 from .memory import Weights
 from .spectra import Tiles
+from .terms import Fold
 
 COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
 """Operations whose operands may be exchanged, sums and products apart."""
@@ -71,7 +73,8 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
 class Claim:
     """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are.
 
-    A lane's pixels are `stride` columns apart; of `tiles` they are those of `rows` rows too, all at once.
+    A lane's pixels are `stride` columns apart; of `tiles` they are those of `rows` rows too, all at once, in
+    `slots` [terms.py]: `expected` has the shapes (slots, pixels, channels) of what these are.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class Claim:
         pixels: int,
         stride: int = 1,
         tiles: Tiles | None = None,
+        slots: int = 1,
     ) -> None:
         self.text, self.lanes, self.pixels, self.stride = str(held["program"]), lanes, pixels, stride
         self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
@@ -97,10 +101,11 @@ class Claim:
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
         self.centre = int(manifest["window"]["centre"])
-        self.together = pixels * self.rows if tiles else 1
+        self.together, self.outputs = 1, []
         if tiles:
-            numbers = self._pixel(0).known.reshape(1, self.together, -1)
-            self.outputs = [leaf(numbers[:, p]) for p in range(self.together)]
+            self.fold = Fold((lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3]), slots)
+            self.together = pixels * self.rows * slots
+            self.expected = self._pixel(0).known.reshape(slots, pixels * self.rows, -1)
         else:
             self.outputs = [self._pixel(p * stride) for p in range(pixels)]
 
@@ -140,7 +145,9 @@ class Claim:
             array = self.stated[name]
             return words.integers(array.ravel(), "float32", True) if array.ndim > 1 else words.floats(array)
         if "base64" in self.parameters[name]:
-            raise Unread("weights that the file does not hold")
+            if self.tiles is None:
+                raise Unread("weights that the file does not hold")
+            return words.floats(np.frombuffer(base64.b64decode(self.parameters[name]["base64"]), "<f4"))
         numbers = self.weights.numbers
         at = places(name, self.parameters[name], numbers.value.shape[-1]).ravel()
         return Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
@@ -234,7 +241,7 @@ class Claim:
         assert self.tiles is not None
         if biased != (self.tiles.bias is not None) or len(re.findall(r"= affine %0\b", self.text)) != 1:
             raise Unread("spectra of a layer that is not the only one to read the window, or of another bias")
-        channels = self.tiles.channels(self.lanes, self.images, self.centre, self.window[2])
+        channels = self.tiles.channels(self.lanes, self.fold, self.images, self.centre, self.window[2])
         found = leaf(self.tiles.sums(channels))
         if not biased:
             return found

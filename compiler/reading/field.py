@@ -16,6 +16,7 @@ number without lanes from there on: it is the same function of each lane's own p
 from __future__ import annotations
 
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -98,33 +99,12 @@ FACTORS: dict[str, Words] = {}
 """The factors (lanes,) of "lanes", 0 of those that do not count, and their "sum"."""
 
 
-FOLDED: dict[str, NDArray[np.bool_]] = {}
-"""The "lanes" (lanes,) that count, where the numbers of all of them are kept as one; else empty."""
-
-
 def add_up_lanes(count: NDArray[np.bool_] | None) -> None:
     """Add up sums over the lanes that count from now on; None after a source has been run."""
     FACTORS.clear()
-    FOLDED.clear()
     if count is not None:
         FACTORS["lanes"] = hashed("factor", secrets.randbits(63), np.arange(len(count))) % P * count
         FACTORS["sum"] = FACTORS["lanes"].sum() % P
-
-
-def fold_lanes(count: NDArray[np.bool_]) -> None:
-    """Keep what all lanes that count have in an array's element as one number from now on [`folded`]."""
-    add_up_lanes(np.ones(1, dtype=bool))
-    FOLDED["lanes"] = count
-
-
-def folded(known: Words) -> Words:
-    """Return one shape (...) for the shapes (lanes, ...) of a number in all lanes that count.
-
-    Numbers that differ in any lane have different ones, but with a probability of 2^-64.
-    """
-    at = np.flatnonzero(FOLDED["lanes"])
-    found: Words = hashed("lane", known[at], at.reshape((-1,) + (1,) * (known.ndim - 1))).sum(axis=0)
-    return found
 
 
 def added_up(value: Words, factors: Words) -> Words:
@@ -265,6 +245,11 @@ def expression(name: str, *operands: Number, commutes: bool = False, kind: str |
     parts = [operand.known for operand in operands]
     if len({part.ndim for part in parts}) > 1:
         parts = alike(*parts)
+    return leaf(combined(name, kinds, parts, commutes), kind or operands[-1].kind)
+
+
+def combined(name: str, kinds: tuple[str, ...], parts: Sequence[Words], commutes: bool) -> Words:
+    """Return the shapes of an operation's results, of the kinds and the shapes of its operands."""
     if (name, kinds) not in SALT:
         SALT[name, kinds] = hashed(f"{name} {'/'.join(sorted(set(kinds)))}", np.arange(2, dtype=np.uint64))
         SALT[name, kinds] = (*SALT[name, kinds], *SALT[name, kinds].tolist())
@@ -274,12 +259,12 @@ def expression(name: str, *operands: Number, commutes: bool = False, kind: str |
         one, *others = [part.item() for part in parts]
         for other in others:
             one = (one if commutes else _mixed_one(one + whole[0] & MOST)) + other & MOST
-        words = np.array([_mixed_one(one ^ whole[1])], dtype=np.uint64)
-        return leaf(words if parts[0].ndim == 1 else words[:, None], kind or operands[-1].kind)
+        shape = max([part.shape for part in parts], key=len)
+        return np.full(shape, _mixed_one(one ^ whole[1]), dtype=np.uint64)
     found = sum(parts[1:], parts[0]) if commutes else parts[0]
     for part in [] if commutes else parts[1:]:
         found = mixed(found + first) + part
-    return leaf(mixed(found ^ second), kind or operands[-1].kind)
+    return mixed(found ^ second)
 
 
 def choice(condition: Number, a: Number, b: Number) -> Number:

@@ -44,13 +44,23 @@ def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> 
     )  # fmt: skip
 
 
-def tile_lanes(steps: tuple[int, int], window: int, seed: int) -> Lanes:
+def tile_lanes(steps: tuple[int, int], window: int, seed: int, beyond: bool) -> Lanes:
     """Return work items of all cases, of so many columns and rows of pixels.
 
-    The cases are those of groups of as many pixels [`group_lanes`].
+    The cases are those of groups of as many pixels [`group_lanes`]. `beyond`: and tiles below the picture, at
+    each distance from it, or far.
     """
     known, caps = _cases(steps, window, seed, every=True)
-    return Lanes(known, caps, np.ones(len(known[0]), dtype=bool), steps=steps)
+    if beyond:
+        near = np.arange(caps[1] + 2)
+        down = np.concatenate(
+            [(near // steps[1] + 1) * steps[1], np.full(len(near), 2 * FAR // steps[1] * steps[1])]
+        )
+        cases = known[:, np.arange(len(down)) * 7 % known.shape[1]].copy()
+        cases[2], cases[3] = down, down - np.concatenate([near, near])
+        cases[3, len(near) - 1], cases[3, -1] = 1, 1
+        known = np.concatenate([known, cases], axis=1)
+    return Lanes(known, caps, np.ones(known.shape[1], dtype=bool), steps=steps)
 
 
 def _cases(

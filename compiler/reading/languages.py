@@ -15,7 +15,7 @@ GROUPS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group",))
 """Languages of which work groups are read, with floats and with integers."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
-    **GROUPS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"),
+    **GROUPS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "opengl": ("fftpasses",),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 

@@ -11,8 +11,8 @@ from typing import Any
 from ..proof.evidence import Refused
 from .lanes import Unread
 
-SECONDS = 180
-"""Most seconds of computing time: FFT kernels in C of the bundled networks take half of it on a busy core."""
+SECONDS = 60
+"""Most seconds of computing time: FFT kernels of the bundled networks take 15 on a busy core."""
 
 BYTES = 2**30
 """Most memory, in addition to what the process has."""

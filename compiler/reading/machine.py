@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -23,12 +22,9 @@ from ..kernel.kernel import (
     For,
     If,
     Kernel,
-    Let,
     Statement,
     Store,
     Type,
-    const,
-    name,
     parts,
     walk,
 )
@@ -37,7 +33,6 @@ from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
 from . import words
 from .field import (
-    FOLDED,
     Number,
     Span,
     blended,
@@ -53,12 +48,7 @@ from .field import (
 from .groups import Group
 from .lanes import Lanes, Mask, Place, Unread, Wrong, chosen, clamped, plus, times
 from .memory import Image, Memory, Result, Slice
-
-COMPARES: Mapping[str, Callable[[Any, Any], Any]] = {
-    "less": operator.lt, "greater": operator.gt, "less_equal": operator.le,
-    "greater_equal": operator.ge, "equal": operator.eq, "not_equal": operator.ne,
-}  # fmt: skip
-"""Comparisons of a difference with 0."""
+from .places import COMPARES
 
 BITS = ("bitwise_and", "bitwise_or", "bitwise_xor", "right_shift", "left_shift")
 """Operations on bits."""
@@ -68,10 +58,6 @@ MOST_TURNS = 2**16
 
 MOST_NUMBERS = 2**20
 """Most numbers of all arrays: no kernel comes near, and more would not fit the stack of a thread."""
-
-
-EVERY = object()
-"""The index of a loop all of whose turns are run at once."""
 
 
 class Machine(Runner):
@@ -98,8 +84,6 @@ class Machine(Runner):
         self.memory: dict[str, Any] = dict(memory)
         self.numbers: dict[Any, Any] = {}
         self.size: dict[int, int] = {}
-        self.turns = 1
-        self.loops: dict[int, tuple[str, ...]] = {}
         self.fixed: dict[int, bool] = {}
         x, width, y, height = (lanes.place(axis) for axis in range(4))
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
@@ -181,8 +165,6 @@ class Machine(Runner):
                 raise Wrong("it writes a result that is not its own")
             at = times(plus(times(row, self.names["width"]), column), memory.channels)
             memory.store(self._whole(plus(at, channel)), 1, value, self)
-        elif isinstance(memory, Slice) and index and index[0] is EVERY:
-            memory.memory.store(0, kind.lanes * self.turns, value, self)
         elif isinstance(memory, Slice):
             memory.memory.store(memory.place(index, kind), kind.lanes, value, self)
         else:
@@ -193,11 +175,6 @@ class Machine(Runner):
         turn, count, step = map(self.value, (statement.start, statement.count, statement.step))
         if type(step) is not int or step < 1:
             raise Wrong(f"the loop over {statement.name} has a step that is not positive")
-        if FOLDED and self._is_elementwise(statement, count):
-            self.names[statement.name], self.turns = EVERY, count
-            self.body(statement.body)
-            self.turns = 1
-            return
         if id(statement) not in self.fixed:
             self.fixed[id(statement)] = not _changes_its_end(statement)
         if not self.fixed[id(statement)]:
@@ -220,16 +197,6 @@ class Machine(Runner):
         else:
             raise Wrong(f"a loop runs more than {MOST_TURNS} times")
         self.mask = outer
-
-    def _is_elementwise(self, loop: For, count: Any) -> bool:
-        """Return whether turn i of a loop has to do with elements i alone, of whole arrays."""
-        if id(loop) not in self.loops:
-            self.loops[id(loop)] = elementwise(loop)
-        arrays = [self.memory[name] for name in self.loops[id(loop)]]
-        whole = (isinstance(a, Slice) and a.first == 0 and len(a.sizes) == 1 for a in arrays)
-        return bool(arrays) and all(whole) and type(count) is int and all(
-            count <= (a.sizes[0] or 0) and a.kind == arrays[0].kind for a in arrays
-        )  # fmt: skip
 
     def _where(self, lanes: Any, value: Expr) -> Any:
         """Return a truth, of which only some lanes' counts."""
@@ -397,8 +364,6 @@ class Machine(Runner):
     def _load(self, array: str, index: Sequence[Any], kind: Type) -> Any:
         memory = self.memory[array]
         if isinstance(memory, Slice):
-            if index and index[0] is EVERY:
-                return memory.memory.load(0, kind.lanes * self.turns, self)
             return memory.memory.load(memory.place(index, kind), kind.lanes, self)
         if isinstance(memory, Result):
             raise Wrong("the result is read")
@@ -514,10 +479,6 @@ class Machine(Runner):
         return words.dots(words.bytes_of(weights, signed=True), given)
 
 
-MIXING = ("call", "component", "stack", "take", "pack4", "dot4", "bits", "clamp")
-"""Operations that are not of each number of a vector by itself."""
-
-
 def _changes_its_end(loop: For) -> bool:
     """Return whether a loop's body names or writes what its count or its step reads in every turn."""
     read = {
@@ -528,34 +489,3 @@ def _changes_its_end(loop: For) -> bool:
         written.add(getattr(statement, "name", getattr(statement, "array", None)))
         written |= {view.array for view in getattr(statement, "views", ())}
     return bool(read & written)
-
-
-def elementwise(loop: For) -> tuple[str, ...]:
-    """Return the arrays of a loop whose turn i names values, and reads and writes elements i; else nothing.
-
-    Two arrays of a kernel have no element in common.
-    """
-    index, inside, arrays = name(loop.name), set[str](), list[str]()
-    if (loop.start, loop.step, loop.until) != (const(0), const(1), None):
-        return ()
-    kinds = set()
-    for statement in loop.body:
-        if not isinstance(statement, Let | Store) or (isinstance(statement, Store) and statement.add):
-            return ()
-        all_parts = parts(statement.value)
-        loads = [part for part in all_parts if part.op == "load" and part.args == (index,)]
-        names = [part for part in all_parts if part.op == "name" and part != index]
-        others = {part.op for part in all_parts if part not in loads}
-        own = all(part.value in inside for part in names) and not others & {*MIXING, "load"}
-        if not own or sum(part == index for part in all_parts) != len(loads):
-            return ()
-        arrays += [part.value for part in loads]
-        kinds |= {part.type for part in loads}
-        if isinstance(statement, Let):
-            inside.add(statement.name)
-        elif statement.index != (index,):
-            return ()
-        else:
-            arrays.append(statement.array)
-            kinds.add(statement.value.type)
-    return tuple(dict.fromkeys(arrays)) if len(kinds) == 1 else ()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kernel.kernel import INT, Type
-from .field import FOLDED, Number, Span, blended, folded, hashed, leaf, part_of, repeated, stacked, wide
+from .field import Number, Span, blended, hashed, leaf, part_of, repeated, stacked, wide
 from .lanes import Mask, Place, Unread, Wrong, chosen, plus, times
 
 if TYPE_CHECKING:
@@ -94,10 +94,7 @@ class Memory:
             raise Unread(f"anything but numbers in {self.name}")
         if wide(value) not in (1, width):
             raise Wrong(f"{self.name} is given {wide(value)} numbers for {width}")
-        number = isinstance(value, Number)
-        if FOLDED and number:
-            value, mask = self._folded(value, mask), None
-        if number and width > 1 and mask is None and offset % width == 0 and self.unit in (0, width):
+        if width > 1 and mask is None and offset % width == 0 and self.unit in (0, width):
             self.unit = width
             self.vectors[offset] = value if wide(value) == width else repeated(value, width)
             return
@@ -125,15 +122,6 @@ class Memory:
             vector = self.vectors.pop(at, None)
             if vector is not None:
                 self.cells |= {at + k: (vector, k) for k in range(self.unit)}
-
-    @staticmethod
-    def _folded(value: Number, mask: Mask | None) -> Number:
-        """Return a number of all lanes as one; where some lanes only write it, others must not read it."""
-        if value.shape is not None and len(value.shape) > 1:
-            value = leaf(folded(value.shape)[None], value.kind, held=value.held)
-        if mask is None:
-            return value
-        return replace(value, held=mask if value.held is None else mask & value.held)
 
 
 class Image:
@@ -179,8 +167,7 @@ class Weights:
         if not isinstance(offset, int) or not 0 <= offset <= self.size - width:
             raise Wrong(f"the weights are read at {offset}: there are {self.size}")
         part = slice(offset, offset + width) if width > 1 else offset
-        weight = offset + width <= self.spectra.start or offset >= self.spectra.stop
-        return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=weight)
+        return Number(self.numbers.value[..., part], self.numbers.known[..., part], weight=True)
 
 
 class Result:
@@ -202,19 +189,13 @@ class Result:
         if not running.any():
             return
         values = offset.values if isinstance(offset, Place) else np.full(len(x), offset)
-        at, row = values - (y * width + x) * self.channels, 0
-        if self.claim.rows > 1:  # a row's columns are below the width, or written beyond the picture
-            rows, at = np.divmod(at, width * self.channels)
-            row = int(rows[running][0])
-            at = np.where(rows == row, at, -1)
-        found = set(at[running].tolist())
+        found = set((values - (y * width + x) * self.channels)[running].tolist())
         column, channel = divmod(found.pop(), self.channels)
         pixel = column // stride
-        if found or column % stride or not (0 <= pixel < self.claim.pixels and 0 <= row < self.claim.rows):
+        if found or column % stride or not 0 <= pixel < self.claim.pixels:
             raise Wrong("it writes a result that is not its own")
-        if ((x + column >= width) | (y + row >= height))[running].any():
+        if ((x + column >= width) | (y >= height))[running].any():
             raise Wrong("it writes a result beyond the picture")
-        pixel += row * self.claim.pixels
         self.hold(pixel, channel, value, running)
 
     def hold(self, pixel: int, channel: int, value: Any, running: Any) -> None:
@@ -233,6 +214,5 @@ class Result:
         lanes, stride = self.claim.lanes, self.claim.stride
         x, width, y, height = lanes.x, lanes.known[1], lanes.y, lanes.known[3]
         for pixel, written in enumerate(self.written):
-            row, column = divmod(pixel, self.claim.pixels)
-            if not written[:, (x + column * stride < width) & (y + row < height)].all():
+            if not written[:, (x + pixel * stride < width) & (y < height)].all():
                 raise Wrong("it leaves a pixel without a result")

@@ -7,8 +7,8 @@ the spectra that the certificate's checker has held against the weights [spectra
 1. `transform`: the algorithm of FOU-3. It is written here once more, for arrays of anything that has sums,
    differences and products [`Arithmetic`]: of floats, to be tested, and of the shapes of field.py.
 2. `sums`: rows and columns of pairs of channels, products by blocks of pairs, and both ways back (FOU-2, 4).
-3. `Tiles`: the pixels that a work item's tiles read in every lane, folded into one number each, and the
-   places of spectra and bias in the weights, as the certificate says (CER-7).
+3. `Tiles`: the pixels that a work item's tiles read in all lanes, folded into one number each [terms.py], and
+   the places of spectra and bias in the weights, as the certificate says (CER-7).
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import Words, expression, folded, hashed, leaf, literal
+from .field import Words, combined, expression, hashed, leaf, literal
 from .lanes import Lanes, Unread
+from .terms import Fold
 
 Complex = tuple[Any, Any]
 """Real and imaginary parts: two arrays of one shape."""
@@ -101,8 +102,13 @@ def along(of: Arithmetic, numbers: Complex, axis: int, sign: int, kept: int) -> 
     return real, imaginary
 
 
-def sums(of: Arithmetic, patch: Complex, table: NDArray[Any], out: int, block: int) -> NDArray[Any]:
+def sums(
+    of: Arithmetic, patch: Complex, table: NDArray[Any], out: int, block: int, once: bool = False
+) -> NDArray[Any]:
     """Return the sums (out, out, tiles, groups, neurons) of tiles.
+
+    `once`: frequencies in columns that are their own mirror images are computed for one half of the rows, and
+    one block is added up as several are.
 
     `patch` (N, N, tiles, pairs): the first and the second channel of each pair; `table` (N / 2 + 1, groups,
     N, pairs, 2, 2, neurons): columns, groups, rows, pairs, channels and parts of spectra, as CER-7 says.
@@ -113,14 +119,15 @@ def sums(of: Arithmetic, patch: Complex, table: NDArray[Any], out: int, block: i
     a, b = real[:, :half], imaginary[:, :half]
     c, d = (part[mirror][:, mirror[:half]] for part in (real, imaginary))
     images = (of.add(a, c), of.subtract(b, d)), (of.add(b, d), of.subtract(c, a))
-    first, second = _split(of, _products(of, images, table, block), lanes)
+    first, second = _split(of, _products(of, images, table, block, once), lanes)
     straight = of.subtract(first[0], second[1]), of.add(first[1], second[0])
     mirrored = of.add(first[0], second[1]), of.subtract(second[0], first[1])
-    back = along(of, (_whole(straight[0], mirrored[0]), _whole(straight[1], mirrored[1])), 0, 1, out)
+    real, imaginary = (_whole(*parts, once) for parts in zip(straight, mirrored, strict=True))
+    back = along(of, (real, imaginary), 0, 1, out)
     return np.concatenate(along(of, back, 1, 1, out), axis=-1)
 
 
-def _products(of: Arithmetic, images: Any, table: NDArray[Any], block: int) -> Complex:
+def _products(of: Arithmetic, images: Any, table: NDArray[Any], block: int, once: bool) -> Complex:
     """Return the spectra (N, N / 2 + 1, tiles, groups, neurons) of neurons, added up as FOU-4 says."""
     # Pairs, channels, parts of rows, columns, tiles, groups and neurons.
     weights = table.transpose(3, 4, 5, 2, 0, 1, 6)[:, :, :, :, :, None]
@@ -135,7 +142,8 @@ def _products(of: Arithmetic, images: Any, table: NDArray[Any], block: int) -> C
                 g, h = weights[pair, channel]
                 real = of.subtract(of.add(real, of.multiply(g, x)), of.multiply(h, y))
                 imaginary = of.add(of.add(imaginary, of.multiply(h, x)), of.multiply(g, y))
-        whole = of.plus(whole, (real, imaginary)) if block < len(weights) else (real, imaginary)
+        added = once or block < len(weights)
+        whole = of.plus(whole, (real, imaginary)) if added else (real, imaginary)
     return whole
 
 
@@ -145,23 +153,25 @@ def _split(of: Arithmetic, numbers: Complex, lanes: int) -> tuple[Complex, Compl
     return (a, c), (b, d)
 
 
-def _whole(straight: NDArray[Any], mirrored: NDArray[Any]) -> NDArray[Any]:
+def _whole(straight: NDArray[Any], mirrored: NDArray[Any], once: bool) -> NDArray[Any]:
     """Return all columns (N, N, ...) of what those from 0 to N / 2 have and what their mirror images have.
 
-    A column that is its own mirror image has rows 0 to N / 2 from the latter: both parts stay apart (FOU-4).
+    A column that is its own mirror image has rows 0 to N / 2 from the latter, or if these are computed `once`
+    the others and those that are their own mirror images: both parts stay apart (FOU-4).
     """
     n = len(straight)
     turned = mirrored[-np.arange(n) % n]
-    own = straight.copy()
-    own[: n // 2 + 1, :: n // 2] = turned[: n // 2 + 1, :: n // 2]
+    own, rows = straight.copy(), np.arange(n)
+    from_mirror = (rows == 0) | (rows >= n // 2) if once else rows <= n // 2
+    own[from_mirror, :: n // 2] = turned[from_mirror, :: n // 2]
     return np.concatenate([own, turned[:, n // 2 - 1 : 0 : -1]], axis=1)
 
 
 class Tiles:
     """What a certificate says of a work item's tiles: `held` is its `spectra`, `size` the window's."""
 
-    def __init__(self, held: Any, columns: int, rows: int, size: int) -> None:
-        self.held, self.points = held, int(held["points"])
+    def __init__(self, held: Any, columns: int, rows: int, size: int, once: bool = False) -> None:
+        self.held, self.points, self.once = held, int(held["points"]), once
         self.columns, self.rows, self.out = columns, rows, self.points - size + 1
         if rows != self.out or columns % self.out:
             raise Unread(f"tiles of other pixels than {self.out} x {self.out}")
@@ -186,22 +196,26 @@ class Tiles:
         return int(self.held["bias"]) + np.argsort(self.held["order"])
 
     def sums(self, channels: Iterator[Words]) -> Words:
-        """Return the sums' shapes (1, pixels * D_out), of channels' patches (N, N + tiles beside)."""
+        """Return the sums' shapes (1, slots * pixels * D_out) of channels' patches (slots, N, N + beside)."""
         n, order = self.points, np.array(self.held["order"])
         given = list(channels)
-        pairs = -(-len(given) // 2)
+        slots, pairs = len(given[0]), -(-len(given) // 2)
         nothing = np.broadcast_to(SHAPES.number(0.0), given[0].shape)
         given += [nothing] * (2 * pairs - len(given))
         tiles = np.stack(
             [np.stack(given)[..., at : at + n] for at in range(0, self.columns, self.out)], axis=-1
         )
-        patch = tiles.reshape(2, pairs, n, n, -1).transpose(0, 2, 3, 4, 1)
-        found = sums(SHAPES, (patch[0], patch[1]), hashed("weight", self.owned), self.out, self.held["block"])
-        places = found.transpose(0, 2, 1, 3, 4).reshape(self.rows * self.columns, -1)
+        patch = (
+            tiles.reshape(2, pairs, slots, n, n, -1).transpose(0, 3, 4, 2, 5, 1).reshape(2, n, n, -1, pairs)
+        )
+        table = hashed("weight", self.owned)
+        found = sums(SHAPES, (patch[0], patch[1]), table, self.out, self.held["block"], self.once)
+        places = found.reshape(self.out, self.out, slots, -1, *found.shape[3:]).transpose(2, 0, 3, 1, 4, 5)
+        places = places.reshape(slots * self.rows * self.columns, -1)
         return places[:, np.argsort(order)].reshape(1, -1)
 
-    def channels(self, lanes: Lanes, images: Any, centre: int, border: str) -> Iterator[Words]:
-        """Yield the numbers that the tiles read of each channel, one after the other, folded over lanes."""
+    def channels(self, lanes: Lanes, fold: Fold, images: Any, centre: int, border: str) -> Iterator[Words]:
+        """Yield the numbers (slots, N, N + beside) that the tiles read of each channel, folded over lanes."""
         width, height = lanes.known[1][:, None, None], lanes.known[3][:, None, None]
         across = np.arange(self.points + self.columns - self.out) - centre
         column = lanes.x[:, None, None] + across
@@ -214,6 +228,9 @@ class Tiles:
                 known = hashed(f"image {name}", pixel * int(count) + c)
                 if border == "zero":
                     known = np.where(outside, literal(0.0, "float32").known, known)
+                one = np.stack([fold.of(known.reshape(len(known), -1), slot) for slot in range(fold.slots)])
+                known = one.reshape(fold.slots, *known.shape[1:])
                 if middle := next(centres):
-                    known = expression("subtract", leaf(known), literal(middle, "float32")).known
-                yield folded(known)
+                    middles = literal(middle, "float32").known
+                    known = combined("subtract", ("float32", "float32"), [known, middles], False)
+                yield known

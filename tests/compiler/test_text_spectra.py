@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import spectra_classes
 from texts import NAME, changed, parts, unnoticed
 
 from wamnet.compiler import artifact, targets
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.glsl import GLSLCompute
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.proof import checker, spectra_checker
 from wamnet.compiler.proof.evidence import Refused
@@ -18,6 +20,7 @@ from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
 from wamnet.compiler.schedules import schedules
+from wamnet.compiler.schedules.passes import FourierPasses
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -36,12 +39,14 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
     tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
+    if target == "opengl":
+        tiny = FourierPasses("fftpasses:8", "small tiles", GLSLCompute(), points)
     whole = targets.DENOISERS[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedules, "COST", 0.0)
         patch.setitem(targets.DENOISERS, target, replace(whole, schedules=(*whole.schedules, tiny)))
-        made = compile_program(lower(model(**kwargs)), target, schedule="fft8")
-    assert made.manifest["schedule"]["name"] == "fft8"
+        made = compile_program(lower(model(**kwargs)), target, schedule=tiny.name)
+    assert made.manifest["schedule"]["name"] == tiny.name
     artifact.write(made, folder)
     return folder / NAME
 
@@ -248,3 +253,44 @@ def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
 def test_planted_faults_in_spectra_are_noticed(target, count, request):
     """TXT-8: what holds the reader."""
     assert unnoticed(request.getfixturevalue(target), count) == []
+
+
+# ---- wrong texts -----------------------------------------------------------------------------------------
+
+WRONG = [(w, target, old, new) for w, ts, old, new in spectra_classes.CLASSES for target in ts]
+
+
+@pytest.fixture(scope="module")
+def opengl(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("opengl"), "opengl"))
+
+
+def test_texts_of_passes_compute_what_is_certified(opengl):
+    """TXT-12: one tile, of all images' pixels at its border."""
+    assert run_text(*opengl)["sums"] == 3 * 36
+
+
+@pytest.mark.nightly(but=[f"opengl: {w}" for w, ts, *_ in spectra_classes.CLASSES[::5] if "opengl" in ts])
+@pytest.mark.parametrize(("what", "target", "old", "new"), WRONG, ids=[f"{t}: {w}" for w, t, *_ in WRONG])
+def test_wrong_texts_of_spectra_are_refused(what, target, old, new, request):
+    """TXT-8: a wrong sign, place, part, border, number of turns, or host."""
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(*changed(request.getfixturevalue(target), old, new))
+
+
+@pytest.mark.parametrize(("what", "of", "number", "key", "more"), spectra_classes.HOSTS)
+def test_hosts_of_other_launches_are_refused(what, of, number, key, more, opengl):
+    source, held, manifest, weights = opengl
+    launches = [dict(each) for each in manifest["schedule"][of]]
+    launches[number][key] += more
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], of: launches}}, weights)
+
+
+@pytest.mark.parametrize("array", ["rows", "columns", "products", "back", "sums"])
+def test_hosts_of_less_memory_are_refused(array, opengl):
+    source, held, manifest, weights = opengl
+    memory = {**manifest["schedule"]["memory"]}
+    memory[array] -= 2
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], "memory": memory}}, weights)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from wamnet.compiler.kernel.kernel import FLOAT, Block, For, Let, Store, apply, call, const, load, name
-from wamnet.compiler.reading import field
+from wamnet.compiler.reading.cells import Cells, Device, Race, Tile, Turns
 from wamnet.compiler.reading.groups import tile_lanes
-from wamnet.compiler.reading.machine import elementwise
+from wamnet.compiler.reading.lanes import Wrong
+from wamnet.compiler.reading.terms import Fold, Term
 
 
 def test_tiles_have_every_case_of_a_row():
     """TXT-10."""
-    lanes = tile_lanes((6, 4), 3, seed=1)
+    lanes = tile_lanes((6, 4), 3, seed=1, beyond=False)
     x, width, y, height = lanes.known
     far = (y > 5) & (height - y > 8)
     cases = {(a > 0, min(b, 11)) for a, b in zip(x[far], (width - x)[far], strict=True) if b > 0}
@@ -21,46 +21,121 @@ def test_tiles_have_every_case_of_a_row():
     assert not ((x >= width) | (y >= height)).any()
 
 
+def test_tiles_of_launches_are_below_the_picture_too():
+    """TXT-12: at each distance from its last row, and far."""
+    lanes = tile_lanes((6, 4), 3, seed=1, beyond=True)
+    _, _, y, height = lanes.known
+    assert {*range(8)} <= {*(y - height)[y >= height].tolist()}
+    assert (y - height).max() > 1000
+    assert (height > 0).all()
+
+
 def test_numbers_that_differ_in_a_lane_are_folded_to_others():
+    fold = Fold(np.array([True, True, True, False]), 2)
     known = np.arange(12, dtype=np.uint64).reshape(4, 3)
     other, beyond = known.copy(), known.copy()
     other[2, 1] += np.uint64(1)
     beyond[3, 1] += np.uint64(1)
-    try:
-        field.fold_lanes(np.array([True, True, True, False]))
-        found = field.folded(known)
-        assert (found == field.folded(other)).tolist() == [True, False, True]
-        assert (found == field.folded(beyond)).all()
-    finally:
-        field.add_up_lanes(None)
+    found = fold.of(known, 0)
+    assert (found == fold.of(other, 0)).tolist() == [True, False, True]
+    assert (found == fold.of(beyond, 0)).all()
+    assert (found != fold.of(known, 1)).all()
+    assert (fold.of(known, np.array([0, 1, 0])) == found).tolist() == [True, False, True]
 
 
-INDEX, N = name("i"), const(4)
+# ---- turns that are run at once ----------------------------------------------------------------------------
 
 
-def element(array, index=INDEX):
-    return load(array, index)
+def shape(*values):
+    return Term(np.array([values], dtype=np.uint64))
 
 
-@pytest.mark.parametrize(
-    ("body", "arrays"),
-    [
-        ([Let("a", element("x") * 2.0), Store("y", (INDEX,), name("a", FLOAT))], ("x", "y")),
-        ([Store("y", (INDEX,), apply("minimum", element("y"), element("x")))], ("y", "x")),
-        ([Store("y", (INDEX,), element("x", INDEX + 1))], ()),
-        ([Store("y", (INDEX,), element("x", const(0)))], ()),
-        ([Store("y", (INDEX,), apply("convert", INDEX, value="float32"))], ()),
-        ([Store("y", (INDEX,), element("x"), add=True)], ()),
-        ([Store("y", (INDEX,), call("f", [element("x")], FLOAT))], ()),
-        ([Store("y", (INDEX,), name("b", FLOAT))], ()),
-        ([Store("y", (INDEX,), load("x", INDEX, kind=FLOAT.of(4)).lane(0))], ()),
-        ([Let("a", element("x")), Block((Store("y", (INDEX,), name("a", FLOAT)),))], ()),
-    ],
-)
-def test_loops_of_which_each_turn_has_its_own_numbers_are_told(body, arrays):
-    assert elementwise(For("i", N, tuple(body))) == arrays
+def put(cells, turns, place, *values, active=None):
+    cells.store(np.array([place]), 1, shape(*values), turns, active, 0)
 
 
-@pytest.mark.parametrize("start", [const(1), name("first")])
-def test_loops_from_elsewhere_are_run_turn_by_turn(start):
-    assert elementwise(For("i", N, (Store("y", (INDEX,), element("x")),), start=start)) == ()
+def get(cells, turns, place, active=None):
+    return cells.load(np.array([place]), 1, turns, active, lambda lanes: lanes == 0).shape[0].tolist()
+
+
+def test_turns_use_elements_of_their_own():
+    cells, turns = Cells("x", 4, 1), Turns(3)
+    put(cells, turns, [0, 1, 2], 10, 11, 12)
+    assert get(cells, turns, [0, 1, 2]) == [10, 11, 12]
+    put(cells, turns, [2, 1, 3], 20, 21, 22, active=np.array([False, True, True]))
+    assert get(cells, turns, [0, 1, 3]) == [10, 21, 22]
+    with pytest.raises(Race, match="with each other"):
+        get(cells, turns, [1, 1, 2])
+    with pytest.raises(Wrong, match="has no number 4"):
+        get(cells, turns, [0, 1, 4])
+    with pytest.raises(Wrong, match="before it is written"):
+        get(Cells("x", 4, 1), turns, [0, 1, 2])
+
+
+def test_turns_that_write_what_others_read_race():
+    cells, turns = Cells("x", 4, 1), Turns(2)
+    put(cells, Turns(1), [3], 7)
+    assert get(cells, turns, [3, 3]) == [7, 7]
+    with pytest.raises(Race, match="with each other"):
+        put(cells, turns, [0, 3], 1, 2)
+    with pytest.raises(Race, match="with each other"):
+        put(Cells("x", 4, 1), turns, [1, 1], 1, 2)
+
+
+def test_the_last_turn_writes_last():
+    """Turns of a loop have an order, items of a launch have none."""
+    cells, turns = Cells("x", 2, 1), Turns(2)
+    put(cells, turns, [0, 1], 1, 2)
+    with pytest.raises(Race, match="with each other"):
+        put(cells, turns, [1, 0], 3, 4)
+    cells, turns = Cells("x", 2, 1), Turns(2)
+    turns.ordered = True
+    put(cells, turns, [0, 1], 1, 2)
+    put(cells, turns, [1, 0], 3, 4)
+    assert get(cells, Turns(1), [0]) + get(cells, Turns(1), [1]) == [4, 2]
+
+
+def test_turns_inside_turns_have_used_what_these_use():
+    cells, outer = Cells("x", 8, 1), Turns(2)
+    inner = Turns(4)
+    put(cells, inner, [0, 1, 2, 3], 1, 2, 3, 4)
+    inner.end(outer)
+    assert get(cells, outer, [1, 2]) == [2, 3]
+    with pytest.raises(Race, match="with each other"):
+        get(cells, outer, [2, 1])
+    put(cells, inner := Turns(4), [4, 5, 2, 7], 1, 2, 3, 4)
+    put(cells, outer, [6, 4], 1, 2)
+    with pytest.raises(Race, match="with each other"):
+        inner.end(outer)
+
+
+def test_what_raced_is_undone():
+    cells, turns = Cells("x", 2, 1), Turns(2)
+    put(cells, Turns(1), [0], 7)
+    turns.undoes = True
+    put(cells, turns, [0, 1], 1, 2)
+    turns.restore()
+    assert get(cells, Turns(1), [0]) == [7]
+    with pytest.raises(Wrong, match="before it is written"):
+        get(cells, Turns(1), [1])
+
+
+def test_arrays_of_turns_have_a_column_for_each():
+    cells, turns = Cells("x", 2, 2), Turns(4)
+    cells.store(0, 1, shape(5, 6), Turns(2), None, 0)
+    assert get(cells, turns, [0, 0, 0, 0]) == [5, 5, 6, 6]
+
+
+def test_nothing_is_compared_with_the_number_of_a_tile():
+    """What is true of the tiles that are computed is true of all."""
+    count, tile = Tile(np.array([[4004]])), Tile(np.array([[17, 1018]]))
+    index = Tile.operated("add", Tile.operated("multiply", 3, count, 4004, 4), tile, 4004, 4)
+    assert index.values.tolist() == [[12029, 13030]]
+    assert Tile.operated("divide", count, 4, 4004, 4).values.item() == 1001
+    for what, a, b in (("less", tile, 3), ("remainder", tile, 4), ("divide", tile, 4), ("maximum", 0, tile)):
+        with pytest.raises(Wrong, match="otherwise than in an index"):
+            Tile.operated(what, a, b, 4004, 4)
+    device = Device("rows", 2, 5, np.array([17, 1018]), 4004)
+    assert device.place(index, None).tolist() == [[12, 14]]
+    with pytest.raises(Wrong, match="another tile"):
+        device.place(Tile.operated("add", index, 1, 4004, 4), None)

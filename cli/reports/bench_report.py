@@ -309,7 +309,8 @@ def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
 
 
 TABLE_HEADS = (
-    "variant", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms", "spread",
+    "variant", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms",
+    "spread",
     "PSNR, dB", "PSNR loss, dB", "largest error", "bound, this frame", "bound, all frames",
 )  # fmt: skip
 """Columns of the table of speed against error."""

@@ -382,7 +382,9 @@ def moving(by: str, way: str, column: str, digits: int) -> Callable[[Records], s
 
     def made(records: Records) -> str:
         rows = [r["values"] for r in records["bench-pipeline"].records()]
-        (found,) = (r for r in rows if (r.get("backend"), r.get("method"), r.get("size")) == (by, way, "512x512"))
+        (found,) = (
+            r for r in rows if (r.get("backend"), r.get("method"), r.get("size")) == (by, way, "512x512")
+        )
         return f"{number(found[column]):.{digits}f}"
 
     return made

@@ -53,7 +53,9 @@ def test_the_first_page_names_every_certified_row():
     heads, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines())
     found = [dict(zip(heads, row, strict=True)) for row in rows]
     names = {name: key for key, name in speeds.SPEED_SHORT.items()}
-    assert len({row["backend"] for row in found}) == len(found), "the kernel that is in front is not shown twice"
+    assert len({row["backend"] for row in found}) == len(found), (
+        "the kernel that is in front is not shown twice"
+    )
     certified = [names[row["backend"]] for row in found if row["bound, all frames"].endswith("†")]
     assert sorted(certified) == sorted(CERTIFIED)
     assert all(row["schedule"] == names[row["backend"]][1] for row in found)

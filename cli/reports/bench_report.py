@@ -13,7 +13,6 @@ from ...compiler.schedules.names import split
 from ...refimpl.errors import InputError
 from ..files.outputs import replacing
 from . import plots
-from .plots import Point
 
 Data = Mapping[str, Any]
 
@@ -253,6 +252,9 @@ PANELS = (
 )
 """Part and number of each panel of the picture, its label, and whether it is a loss."""
 
+ERRORS = (("error", "max", "largest error against float64", False),)
+"""The panel of a network that was not trained."""
+
 
 def kind_of(row: Data, window: int) -> str:
     """Return what sets a row apart, by the names of plots.COLOURS; `window` is the full network's."""
@@ -274,10 +276,10 @@ def short_name(row: Data) -> str:
     return form or schedule or target
 
 
-def panels(data: Data) -> list[plots.Panel]:
+def panels(data: Data, of: Sequence[tuple[str, str, str, bool]] = PANELS) -> list[plots.Panel]:
     """Return the panels of the picture that have something to show."""
     found = []
-    for name, key, label, is_loss in PANELS:
+    for name, key, label, is_loss in of:
         marks = [
             plots.Mark(
                 short_name(row),
@@ -288,7 +290,7 @@ def panels(data: Data) -> list[plots.Panel]:
                 row["name"] in data["front"].get(name, ()),
             )
             for row in measured(data)
-            if not (is_loss and part(row, name, key) is None)
+            if name == "rounding" or part(row, name, key) is not None
         ]
         if any(mark.y is not None for mark in marks):
             found.append(plots.Panel(label, marks, is_loss))
@@ -376,24 +378,11 @@ def frames_text(data: Data) -> str:
 # ---- plots -------------------------------------------------------------------------------------------------
 
 
-def points(data: Data, name: str, key: str) -> list[Point]:
-    """Return the points of a plot: time against a number of a part of the rows."""
-    on_front = data["front"][name]
-    found = []
-    for row in measured(data):
-        y = part(row, name, key)
-        if y is not None:
-            ms = float(row["ms"]["median"])
-            kind = row["kind"] == "kernel"
-            found.append(Point(row["name"], ms, y, row.get("predicted_ms"), kind, row["name"] in on_front))
-    return found
-
-
 def draw(data: Data, theme: plots.Theme) -> dict[str, bytes]:
     """Return the plots as PNG by name: `error`, `trade-off` and `sizes`, where there is something to show."""
     drawn = {}
-    if shown := points(data, "error", "max"):
-        drawn["error"] = plots.speed_and_error(shown, "largest error against float64", theme)
+    if shown := panels(data, ERRORS):
+        drawn["error"] = plots.trade_off(shown, theme)
     if data["unseen_frames"] and (found := panels(data)):
         drawn["trade-off"] = plots.trade_off(found, theme)
     if columns := growth(data):

@@ -29,12 +29,9 @@ DARK = Theme(text="#cbd5e1", curve="#fbbf24")
 PAPER = Theme(text="#1f2430", curve="#b4530a", page="#ffffff")
 """For a file that is looked at by itself."""
 
-PLACES = tuple((x, sign * y) for y in (3, 12, 22, 32, 42, 52, 62) for x in (6, -6) for sign in (1, -1))
-"""Where a label may stand from its point, in points of print: the first place that is free; a negative first
-number puts its end there."""
-
-CLOSE = 12
-"""How many of these places a label may take that is left out where none is free: long lines cross others."""
+POSITIONS = tuple((x, sign * y) for y in (3, 12, 22) for x in (6, -6) for sign in (1, -1))
+"""Where a label may be, from its point, in typographic points: the first that is free, or none, as long lines
+cross others; a negative first number puts its end there."""
 
 NEAR = 12
 """Heights up to this one, in points of print, need no line from the point to its label."""
@@ -94,58 +91,6 @@ def training_curve(
     return _png(figure)
 
 
-@dataclass(frozen=True)
-class Point:
-    """A contender of a benchmark: measured and predicted time in ms, and its error or loss."""
-
-    name: str
-    ms: float
-    y: float
-    predicted_ms: float | None
-    is_kernel: bool
-    on_front: bool
-
-
-def speed_and_error(points: Sequence[Point], label: str, theme: Theme, logarithmic: bool = True) -> bytes:
-    """Draw errors over times: kernels round, peers square, predictions hollow, the Pareto front a line."""
-    figure, axis = _figure(theme, (8.0, 5.0))
-    axis.set_xscale("log")
-    if logarithmic:
-        axis.set_yscale("log")
-    front = sorted((point for point in points if point.on_front), key=lambda point: point.ms)
-    axis.plot(
-        [point.ms for point in front],
-        [point.y for point in front],
-        drawstyle="steps-post",
-        color=theme.curve,
-        linewidth=1.2,
-        alpha=0.7,
-        label="Pareto front",
-    )
-    for kernel, marker in ((True, "o"), (False, "s")):
-        shown = [point for point in points if point.is_kernel == kernel]
-        colour = theme.curve if kernel else theme.text
-        known = [point for point in shown if point.predicted_ms]
-        for point in known:
-            axis.plot(
-                [point.predicted_ms, point.ms], [point.y] * 2, color=colour, linewidth=0.8, linestyle=":"
-            )
-        hollow = [point.predicted_ms for point in known], [point.y for point in known]
-        axis.plot(*hollow, marker, markersize=5, markerfacecolor="none", markeredgecolor=colour)
-        solid = [point.ms for point in shown], [point.y for point in shown]
-        axis.plot(*solid, marker, markersize=6, color=colour, label="kernels" if kernel else "peers")
-    axis.plot([], [], "o", markerfacecolor="none", markeredgecolor=theme.text, label="predicted")
-    axis.margins(0.12, 0.15)
-    axis.set_xlabel("ms a frame")
-    axis.set_ylabel(label)
-    _dress(axis, theme)
-    legend = axis.legend(frameon=False, fontsize=8, loc="upper right")
-    for text in legend.get_texts():
-        text.set_color(theme.text)
-    _label(figure, axis, points, theme)
-    return _png(figure)
-
-
 def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> bytes:
     """Draw times (ms) over widths of square pictures, a line for each name."""
     from matplotlib import colormaps
@@ -162,21 +107,12 @@ def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> by
     axis.set_xticks(sizes, [str(size) for size in sizes])
     axis.minorticks_off()
     axis.set_xlabel("width and height, pixels")
-    axis.set_ylabel("ms a frame")
+    axis.set_ylabel("ms per frame")
     _dress(axis, theme)
     legend = figure.legend(frameon=False, fontsize=8, loc="outside right upper")
     for text in legend.get_texts():
         text.set_color(theme.text)
     return _png(figure)
-
-
-def _label(figure: Any, axis: Any, points: Sequence[Point], theme: Theme) -> None:
-    """Write the points' names where nothing else is, those on the front first."""
-    times = [(point.ms, point.y) for point in points]
-    times += [(point.predicted_ms, point.y) for point in points if point.predicted_ms]
-    taken = _taken(figure, axis, times)
-    for point in sorted(points, key=lambda point: (not point.on_front, point.ms)):
-        _place(axis, point.name, (point.ms, point.y), theme, point.on_front, taken, always=True)
 
 
 def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> list[Any]:
@@ -194,14 +130,13 @@ def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> lis
 
 
 def _place(
-    axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any], always: bool
+    axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any]
 ) -> None:
-    """Write a name beside a point in the first place that is free; without one in the last, if `always`."""
+    """Write a name beside a point in the first position that is free, if there is one."""
     from matplotlib.text import Text
 
     frame = axis.get_window_extent()
-    places = PLACES if always else PLACES[:CLOSE]
-    for x, y in places:
+    for x, y in POSITIONS:
         text = axis.annotate(
             name,
             at,
@@ -220,8 +155,7 @@ def _place(
         text.get_window_extent()
         box = Text.get_window_extent(text)
         inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
-        free = inside and not any(box.overlaps(other) for other in taken)
-        if free or (always and (x, y) == places[-1]):
+        if inside and not any(box.overlaps(other) for other in taken):
             taken.append(box)
             return
         text.remove()
@@ -296,7 +230,7 @@ def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
     for axis, panel in zip(axes, panels, strict=True):
         axis.set_facecolor("none")
         _panel(axis, panel, theme)
-    axes[-1].set_xlabel("ms a frame, median; the line spans all rounds")
+    axes[-1].set_xlabel("ms per frame, median; the line spans all rounds")
     _legend(figure, [mark for panel in panels for mark in panel.marks], theme)
     # Places of labels need the last size of the axes, which the legend takes room from.
     for axis, panel in zip(axes, panels, strict=True):
@@ -304,7 +238,7 @@ def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
         taken = _taken(figure, axis, [at for _, at in shown])
         taken += [text.get_window_extent() for text in axis.texts]
         for mark, at in sorted(shown, key=lambda pair: _rank(pair[0])):
-            _place(axis, mark.name, at, theme, mark.on_front, taken, always=False)
+            _place(axis, mark.name, at, theme, mark.on_front, taken)
     return figure
 
 

@@ -90,15 +90,14 @@ def test_every_key_is_documented(found) -> None:
 
 
 def test_predicted_stands_beside_measured(found) -> None:
-    """In the table and on the plot, where there is a prediction."""
     data, _ = found
-    heads, _ = bench_report.speed_table(data)
+    heads, rows = bench_report.speed_table(data)
     assert heads[1:4] == ("ms", "range", "predicted, ms")
-    (point,) = bench_report.points(data, "error", "max")
-    assert point.predicted_ms == data["contenders"][0]["predicted_ms"]
-    assert point.ms == data["contenders"][0]["ms"]["median"]
-    assert point.is_kernel
-    assert point.on_front
+    assert rows[0][3] == bench_report.number(data["contenders"][0]["predicted_ms"])
+    (panel,) = bench_report.panels(data, bench_report.ERRORS)
+    (mark,) = panel.marks
+    assert mark.ms[0] == data["contenders"][0]["ms"]["median"]
+    assert mark.on_front
 
 
 @pytest.mark.parametrize(

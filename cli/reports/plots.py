@@ -129,9 +129,7 @@ def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> lis
     return [*taken, legend.get_window_extent()] if legend else taken
 
 
-def _place(
-    axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any]
-) -> None:
+def _place(axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any]) -> None:
     """Write a name beside a point in the first position that is free, if there is one."""
     from matplotlib.text import Text
 

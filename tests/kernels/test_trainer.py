@@ -304,7 +304,7 @@ def numbers_in(buffer: Any) -> Any:
 # ---- runs ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant"}])
+@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant"}, {"rank": 4}, {"rank": 1}])
 def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
     """The float32 reference and the device round differently, and Adam makes much of little differences.
 
@@ -319,7 +319,8 @@ def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
     assert (found.recipe, found.digest, found.normalization) == (want.recipe, want.digest, want.normalization)
     apart = 0.0
     far = 0.0
-    for a, b, c in zip(_flat(want), _flat(exact), _flat(found), strict=True):
+    states = (state.parameters + state.siren.weights[:1] for state in (want, exact, found))
+    for a, b, c in zip(*states, strict=True):
         assert a.shape == c.shape
         assert c.dtype == np.float32
         apart, far = max(apart, np.abs(a - b).max()), max(far, np.abs(c - b).max())
@@ -331,11 +332,9 @@ def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
         )  # float32 adds 300 numbers of one sign: gamma(300) = 2e-5 / 2
 
 
-def _flat(state: TrainState) -> tuple[Any, ...]:
-    return state.siren.weights + state.siren.biases
-
-
-@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant", "batch": 700}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"n_windows": 50, "schedule": "constant", "batch": 700}, {"rank": 4}]
+)
 def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> None:
     recipe = replace(SMALL, **changes)
     whole, again = (train_on(opencl, recipe, PAIRS) for _ in range(2))
@@ -344,18 +343,20 @@ def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> N
     restored = train.state_from_arrays(*train.state_to_arrays(half))
     resumed = train_on(opencl, recipe, PAIRS, state=restored)
     assert tensors(whole) == tensors(again) == tensors(resumed)
-    assert resumed == replace(whole, siren=resumed.siren, moments=resumed.moments)
+    assert resumed == replace(whole, siren=resumed.siren, moments=resumed.moments, factors=resumed.factors)
     train.check_state(whole)
 
 
-def test_a_run_may_change_its_trainer(opencl: Any) -> None:
+@pytest.mark.parametrize("rank", [0, 4])
+def test_a_run_may_change_its_trainer(opencl: Any, rank: int) -> None:
     """Either continues from the other's state; both end near the run that did not change."""
-    whole = train.train(SMALL, PAIRS)
+    recipe = replace(SMALL, rank=rank)
+    whole = train.train(recipe, PAIRS)
     for first, second in ((train.train, device_train(opencl)), (device_train(opencl), train.train)):
-        half = first(SMALL, PAIRS, until=10)
-        end = second(SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
+        half = first(recipe, PAIRS, until=10)
+        end = second(recipe, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
         assert end.step == 20
-        moved = max(np.abs(a - b).max() for a, b in zip(_flat(end), _flat(whole), strict=True))
+        moved = max(np.abs(a - b).max() for a, b in zip(end.parameters, whole.parameters, strict=True))
         # Twenty steps of at most 1e-3 each; a second half from the start would be off by some of them.
         assert moved <= 1e-3
 
@@ -475,10 +476,10 @@ def test_waiting_again_changes_nothing(opencl: Any) -> None:
     assert [number for number, _ in run.state(5).history] == [0, 4]
 
 
-@pytest.mark.parametrize("log_every", [1, 4])
-def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state(opencl: Any, log_every: int) -> None:
+@pytest.mark.parametrize("changes", [{"log_every": 1}, {}, {"rank": 4}])
+def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state(opencl: Any, changes: Any) -> None:
     """As the reference's: the state kept is the one before the one whose loss is not finite."""
-    recipe = replace(SMALL, log_every=log_every)
+    recipe = replace(SMALL, **changes)
     good = train_on(opencl, recipe, PAIRS, until=10)
     steep = replace(good, recipe=replace(recipe, learning_rate=1e30))
     kept: list[TrainState] = []

@@ -1,4 +1,4 @@
-"""The compiled trainer with a first layer of low rank: both factors' derivatives, their product, and runs.
+"""The compiled trainer with a first layer of low rank: both factors' derivatives, and their product.
 
 Every test is of OpenCL, the executor that trains. An excess is the largest error over its bound.
 """
@@ -17,12 +17,12 @@ from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import StepKernel, compile_step
 from wamnet.kernels.run import trainer
 from wamnet.kernels.run.trainer import train_on
-from wamnet.refimpl.errors import InputError, TrainingError
+from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, factored, train
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.factored import Factors
-from wamnet.refimpl.network.train import Recipe, TrainState
+from wamnet.refimpl.network.train import Recipe
 
 SMALL = Recipe(
     features=("color",),
@@ -55,10 +55,6 @@ PAIRS = [(frame(1, 9, 13), frame(2, 9, 13)), (frame(3, 11, 8), frame(4, 11, 8))]
 @pytest.fixture(scope="module")
 def opencl(executor_named: Any) -> Any:
     return executor_named("opencl")
-
-
-def tensors(state: TrainState) -> list[bytes]:
-    return [array.tobytes() for array in train.state_to_arrays(state)[0].values()]
 
 
 def kernel_of(recipe: Recipe) -> StepKernel:
@@ -137,27 +133,6 @@ def test_the_preset_s_derivatives_are_within_the_bound(opencl: Any, rank: int) -
     assert max(excesses(opencl, recipe)) <= 1
 
 
-def distance_to_the_reference(opencl: Any, recipe: Recipe) -> float:
-    """Return how far a run ends from float64's, as a multiple of how far float32's reference does."""
-    want, exact = (train.train(recipe, PAIRS, dtype=dtype) for dtype in (np.float32, np.float64))
-    found = train_on(opencl, recipe, PAIRS)
-    apart = far = 0.0
-    states = (state.parameters + state.siren.weights[:1] for state in (want, exact, found))
-    for a, b, c in zip(*states, strict=True):
-        assert a.shape == c.shape
-        assert c.dtype == np.float32
-        apart, far = max(apart, np.abs(a - b).max()), max(far, np.abs(c - b).max())
-    assert [number for number, _ in found.history] == [number for number, _ in want.history]
-    assert apart > 0
-    return float(far / apart)
-
-
-@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant", "rank": 1}])
-def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
-    """As without a rank (test_trainer.py): float32's two ways to round end 8 times as far apart at most."""
-    assert 0 < distance_to_the_reference(opencl, replace(SMALL, **changes)) <= 8
-
-
 def test_a_cut_network_goes_on_as_the_references(opencl: Any) -> None:
     """Twenty steps from a network in full: the factors are those of its cut."""
     full = train.train(replace(SMALL, rank=0), PAIRS)
@@ -168,37 +143,6 @@ def test_a_cut_network_goes_on_as_the_references(opencl: Any) -> None:
     for a, b in zip(want.parameters, found.parameters, strict=True):
         # Twenty steps move a number by 0.011 at most; another cut would be off by as much at once.
         assert np.max(np.abs(a - b)) <= 1e-3
-
-
-def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any) -> None:
-    whole, again = (train_on(opencl, SMALL, PAIRS) for _ in range(2))
-    half = train_on(opencl, SMALL, PAIRS, until=7)
-    resumed = train_on(opencl, SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
-    assert tensors(whole) == tensors(again) == tensors(resumed)
-    train.check_state(whole)
-
-
-def test_a_run_may_change_its_trainer(opencl: Any) -> None:
-    """Either continues from the other's state; both end near the run that did not change."""
-    whole = train.train(SMALL, PAIRS)
-    on_device = lambda *a, **k: train_on(opencl, *a, **k)  # noqa: E731
-    for first, second in ((train.train, on_device), (on_device, train.train)):
-        half = first(SMALL, PAIRS, until=10)
-        end = second(SMALL, PAIRS, state=train.state_from_arrays(*train.state_to_arrays(half)))
-        assert end.step == 20
-        moved = max(np.abs(a - b).max() for a, b in zip(end.parameters, whole.parameters, strict=True))
-        # Twenty steps of at most 1e-3 each; a second half from the start would be off by some of them.
-        assert moved <= 1e-3
-
-
-def test_a_loss_that_is_not_finite_keeps_the_last_good_state(opencl: Any) -> None:
-    """Factors and product: the state before the one whose loss is not finite."""
-    good = train_on(opencl, SMALL, PAIRS, until=10)
-    steep = replace(good, recipe=replace(SMALL, learning_rate=1e30))
-    kept: list[TrainState] = []
-    with pytest.raises(TrainingError, match=r"loss at step 11 (inf|nan): must stay finite"):
-        train_on(opencl, steep.recipe, PAIRS, state=steep, on_checkpoint=kept.append)
-    assert [tensors(state) for state in kept] == [tensors(good)]
 
 
 def test_a_rank_that_no_layer_has_is_refused(opencl: Any) -> None:

@@ -30,9 +30,10 @@ from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import adam, dataset, denoise, train
+from wamnet.refimpl.network import adam, dataset, denoise, factored, train
 from wamnet.refimpl.network.activation import ACTIVATIONS
 from wamnet.refimpl.network.dataset import Dataset, Window
+from wamnet.refimpl.network.factored import Factors
 from wamnet.refimpl.network.train import Recipe, TrainState
 
 Arrays = Mapping[str, Any]
@@ -130,8 +131,18 @@ def gradient_excess(
     at = step.with_parameters(right, named)
     windows, targets = examples(recipe, data, 0)
     exact, bound = step.sums(at, windows, targets), step.sum_errors(at, windows, targets)
-    assert sorted(found) == sorted(exact)
     assert all(np.isfinite(error).all() and error.max() > 0 for error in bound.values())
+    if recipe.rank:
+        old, new = (doubled(each.factors) for each in (state, run.state(1)))
+        slopes, errors = (
+            factored.backward(old, exact["W0"]),
+            step.factor_errors(old, exact["W0"], bound["W0"]),
+        )
+        for name, part in zip(step.factor_names("W0"), ("vertical", "horizontal"), strict=True):
+            exact[name], bound[name] = getattr(slopes, part), getattr(errors, part)
+        exact["product"], bound["product"] = factored.expand(new), step.expansion_error(new)
+        found["product"] = run.state(1).siren.weights[0]
+    assert sorted(found) == sorted(exact)
     worst = [np.max(np.abs(found[n].reshape(exact[n].shape) - exact[n]) / bound[n]) for n in exact]
     # The loss is the sum of three squared errors, over 3 N: two more sums and a division.
     squares = exact[step.SQUARES].sum()
@@ -139,47 +150,37 @@ def gradient_excess(
     return float(max(*worst, abs(loss * 3 * recipe.batch - squares) / allowed))
 
 
+def doubled(factors: Factors | None) -> Factors:
+    assert factors is not None
+    return Factors(factors.vertical.astype(np.float64), factors.horizontal.astype(np.float64))
+
+
+CHANGES = {
+    "widths": st.lists(st.sampled_from([1, 3, 15, 16, 17, 40, 70]), max_size=3).map(tuple),
+    "batch": st.sampled_from([1, 7, 8, 64, 65, 200, 700]),
+    "features": st.sampled_from([("color",), ("color", "normal"), ("normal",)]),
+    "window": st.builds(Window, st.integers(1, 7), st.sampled_from(["clamp", "zero"])),
+    "omega_0_hidden": st.sampled_from([1.0, 10.0]),
+    "n_windows": st.sampled_from([0, 30]),
+    "activation": st.sampled_from(sorted(ACTIVATIONS)),
+    "seed": st.integers(0, 2**31),
+}
+"""Layers of parts of vectors and of several, tiles that are not full, borders, frames of two sizes."""
+
+
 @settings(max_examples=25)
-@given(
-    widths=st.lists(st.sampled_from([1, 3, 15, 16, 17, 40, 70]), max_size=3),
-    batch=st.sampled_from([1, 7, 8, 64, 65, 200, 700]),
-    features=st.sampled_from([("color",), ("color", "normal"), ("normal",)]),
-    window=st.builds(Window, st.integers(1, 7), st.sampled_from(["clamp", "zero"])),
-    omega_0_hidden=st.sampled_from([1.0, 10.0]),
-    n_windows=st.sampled_from([0, 30]),
-    activation=st.sampled_from(sorted(ACTIVATIONS)),
-    seed=st.integers(0, 2**31),
-)
-def test_first_derivatives_are_within_the_bound(
-    opencl: Any,
-    widths: list[int],
-    batch: int,
-    features: tuple[str, ...],
-    window: Window,
-    omega_0_hidden: float,
-    n_windows: int,
-    activation: str,
-    seed: int,
-) -> None:
-    """Layers of parts of vectors and of several, tiles that are not full, borders, frames of two sizes."""
-    recipe = replace(
-        SMALL,
-        widths=tuple(widths),
-        batch=batch,
-        features=features,
-        window=window,
-        omega_0_hidden=omega_0_hidden,
-        n_windows=n_windows,
-        activation=activation,
-        seed=seed,
-    )
-    assert gradient_excess(opencl, recipe) <= 1
+@given(changes=st.fixed_dictionaries(CHANGES), rank=st.sampled_from([0, 0, 1, 5, 16, 40]))
+def test_first_derivatives_are_within_the_bound(opencl: Any, changes: Any, rank: int) -> None:
+    recipe = replace(SMALL, **changes)
+    most = factored.largest_rank(recipe.window.size, *recipe.layer_widths[:2])
+    assert gradient_excess(opencl, replace(recipe, rank=min(rank, most))) <= 1
 
 
 @pytest.mark.nightly
-def test_presets_derivatives_are_within_the_bound(opencl: Any) -> None:
+@pytest.mark.parametrize("rank", [0, 12, 16])
+def test_presets_derivatives_are_within_the_bound(opencl: Any, rank: int) -> None:
     for preset in train.PRESETS.values():
-        recipe = replace(preset, features=("color", "normal"), batch=130, n_windows=0)
+        recipe = replace(preset, features=("color", "normal"), batch=130, n_windows=0, rank=rank)
         assert gradient_excess(opencl, recipe) <= 1
 
 
@@ -380,6 +381,15 @@ def test_minibatches_are_the_references(opencl: Any) -> None:
             assert np.array_equal(data.targets[target], targets)
 
 
+def test_a_cut_network_goes_on_as_the_references(opencl: Any) -> None:
+    """Twenty steps from a network in full: the factors are those of its cut."""
+    full, recipe = train.train(SMALL, PAIRS), replace(SMALL, seed=4, rank=4)
+    want, found = (fit(recipe, PAIRS, network=full.siren) for fit in (train.train, device_train(opencl)))
+    for a, b in zip(want.parameters, found.parameters, strict=True):
+        # Twenty steps move a number by 0.011 at most; another cut would be off by as much at once.
+        assert np.max(np.abs(a - b)) <= 1e-3
+
+
 def test_progress_and_checkpoints_come_when_promised(opencl: Any) -> None:
     seen: list[tuple[int, float]] = []
     kept: list[int] = []
@@ -518,6 +528,8 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
         train_on(opencl, SMALL, PAIRS, state=double)
     with pytest.raises(InputError, match=r"executor that trains 'numpy': has no compiled trainer \(use exec"):
         train_on(executor_named("numpy"), SMALL, PAIRS)
+    with pytest.raises(InputError, match=r"rank 16: a window of 5 rows, .* has ranks from 1 to 15"):
+        train_on(opencl, replace(SMALL, rank=16), PAIRS)
     with pytest.raises(InputError, match="changed parts of the recipe 'batch"):
         train_on(opencl, replace(SMALL, batch=5), PAIRS, state=train.train(SMALL, PAIRS, until=1))
     with monkeypatch.context() as patch:

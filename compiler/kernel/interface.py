@@ -75,21 +75,26 @@ INTEGERS: Mapping[str, tuple[str, ...]] = {
 BATCH = ("first_tile", "tile_count")
 """Integers of a kernel of several launches: the first tile that they compute, and how many of them."""
 
+ITEMS = 8
+"""Items of a group of one of several launches, as many as vectors of most processors have lanes."""
+
 READ_NUMBER, WRITTEN_NUMBER, FIRST_IMAGE = 1, 2, 3
 """Numbers of what is read, of what is written and of the first image; 0 are the integers."""
 
 
 def staged(source: str, number: int) -> str:
     """Return a source of GLSL, which has one entry point, for one of several launches."""
-    return re.sub(r"^#version .*$", rf"\g<0>\n#define STAGE {number}", source, count=1, flags=re.MULTILINE)
+    defined = rf"\g<0>\n#define STAGE {number}\n#define ITEMS {ITEMS}"
+    return re.sub(r"^#version .*$", defined, source, count=1, flags=re.MULTILINE)
 
 
 def launches(source: str, manifest: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     """Return the source and the manifest of each launch of a kernel that is several, as if it were one."""
     found, schedule = [], manifest.get("schedule", {})
-    for number, facts in enumerate(schedule.get("launches", ())):
-        own = {"entry_point": facts["entry"], "schedule": {**schedule, "launches": [facts]}}
-        text = source if str(number) in facts["entry"] else staged(source, number)
+    for number, entry in enumerate(schedule.get("entries", ())):
+        parts = {name: [schedule[name][number]] for name in ("launches", "entries", "arrays")}
+        own = {"entry_point": entry, "schedule": {**schedule, **parts}}
+        text = source if str(number) in entry else staged(source, number)
         found.append((text, {**manifest, **own}))
     return found
 

@@ -366,7 +366,9 @@ class GLSLCompute(GLSL):
         if not kernel.launches:
             return super().called(kernel)
         said, _, _ = self.said[DENOISE].partition("Dispatch")
-        return f"{said.rstrip()}\nstorage buffers 1 and on: the last arrays.\n{STAGED}"
+        return (
+            f"{said.rstrip()}\nstorage buffers 1 and on: the last arrays.\nDefine ITEMS as `items`. {STAGED}"
+        )
 
     def opened(self, kernel: Interface | None = None) -> list[str]:
         """Return the first lines of the function."""

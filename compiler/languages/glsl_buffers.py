@@ -15,6 +15,7 @@ from ..kernel.interface import (
     BLOCK,
     DENOISE,
     ENCODE,
+    ITEMS,
     PATH,
     READ,
     SCENE_NUMBERS,
@@ -124,7 +125,7 @@ class Vulkan(Declared):
     group_size: tuple[int | str, int | str] = GROUP
     grouped = {"group_size": ("GROUP_WIDTH", "GROUP_HEIGHT")}
     staged = True
-    launching = {"group_size": ("ITEMS", 1)}
+    launching = {"group_size": (ITEMS, 1)}
     shared_array = "shared {kind} {name}[{count}];"
     local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
     group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")

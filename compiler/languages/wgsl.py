@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, READ, UNSIGNED, Array, Interface
+from ..kernel.interface import BLOCK, ITEMS, READ, UNSIGNED, Array, Interface
 from .dialect import Dialect
 from .glsl_buffers import GROUP, SAID, Declared
 
@@ -37,7 +37,7 @@ class WGSL(Declared):
         "places": "@builtin(local_invocation_id) item_place: vec3<u32>, "
         "@builtin(workgroup_id) group_place: vec3<u32>",
     }
-    launching = {"group_size": "@compute @workgroup_size(ITEMS, 1)"}
+    launching = {"group_size": f"@compute @workgroup_size({ITEMS}, 1)"}
     shared_array = "var<workgroup> {name}: array<{kind}, {count}>;"
     local_place = ("item_place.x", "item_place.y")
     group_place = ("group_place.x", "group_place.y")

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..core.ir import Program
 from ..core.weights import Slot, weights
-from ..kernel.interface import RESULT
+from ..kernel.interface import ITEMS, RESULT
 from ..kernel.kernel import (
     BATCH,
     FLOAT,
@@ -58,7 +58,7 @@ from . import fourier
 from .common import HEIGHT, WIDTH, clamp, loop, weight
 from .fft import OUT, PAIRS, POINTS, PRODUCTS, TILE, line, sizes_of, spectra_stored
 from .inlined import LARGEST_WEIGHTS, Inlined
-from .schedules import Fourier
+from .schedules import PLAIN, Fourier
 from .straight import VECTOR, ZERO, variables
 from .tile import placed, readers_of_window
 
@@ -67,9 +67,6 @@ HALF = 16
 
 TILES, IMAGES = 4, 8
 """Tiles, and complex images of two neurons each, whose products an item computes: 32 sums of four numbers."""
-
-ITEMS = 8
-"""Items of a group, as many as vectors of most processors have lanes."""
 
 COMPLEX = FLOAT.of(2)
 """A complex number in memory of the device."""
@@ -128,7 +125,6 @@ class Passes(Inlined):
                 "FREQUENCIES", (POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"
             ),
             Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
-            Constant("ITEMS", const(ITEMS), "of a group"),
         ]
 
     def built(self) -> Kernel:
@@ -346,7 +342,7 @@ class FourierPasses(Fourier):
         "second channel, neurons; weights of the layers after it are constants of the source"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, points: int, instead: str) -> None:
+    def __init__(self, name: str, idea: str, dialect: Dialect, points: int, instead: str = PLAIN) -> None:
         super().__init__(name, idea, dialect, HALF, 1, points, 1)
         self.instead = instead
 
@@ -371,8 +367,13 @@ class FourierPasses(Fourier):
         """Return what is launched, the numbers of each array for a tile, and the items of a group."""
         kernel = self.kernel(program)
         launches = []
-        for number, each in enumerate(kernel.launches):
+        for each in kernel.launches:
             tiles, lines = (of_tile(kernel, count, TILES) for count in each.counts)
-            known = {"entry": self.dialect.launch_entry(number), "arrays": used(kernel, each)}
-            launches.append({"tiles": TILES // tiles, "lines": lines, **known})
-        return {"launches": launches, "memory": handed_on(kernel), "items": ITEMS}
+            launches.append({"tiles": TILES // tiles, "lines": lines})
+        return {
+            "launches": launches,
+            "entries": [self.dialect.launch_entry(number) for number in range(len(launches))],
+            "arrays": [used(kernel, each) for each in kernel.launches],
+            "memory": handed_on(kernel),
+            "items": ITEMS,
+        }

@@ -455,11 +455,10 @@ for (int first_tile = 0; first_tile < tiles; first_tile += tile_count) {{
 def _launches(kernel: Mapping[str, Any]) -> str:
     """Return the lines that call a denoiser of several launches."""
     picked = kernel["schedule"]
-    entries = [each["entry"] for each in picked["launches"]]
+    entries, every = picked["entries"], zip(picked["launches"], picked["arrays"], strict=True)
     launches = [
-        f"    start({number}, tile_count / {each['tiles']}, {each['lines']});"
-        f"   /* {', '.join(each['arrays'])} */"
-        for number, each in enumerate(picked["launches"])
+        f"    start({number}, tile_count / {each['tiles']}, {each['lines']});   /* {', '.join(arrays)} */"
+        for number, (each, arrays) in enumerate(every)
     ]
     said = f"Start {entries[0]} to {entries[-1]}, by their numbers"
     if len(set(entries)) == 1:

@@ -51,11 +51,11 @@ def declared(source: str) -> dict[int, str]:
 def bound(kernel: Kernel) -> dict[int, str]:
     """Return the kinds of the buffers that are bound: of one of several launches those of its own arrays."""
     kinds = declared(kernel.source)
-    launches = kernel.manifest.get("schedule", {}).get("launches")
-    if launches is None:
+    arrays = kernel.manifest.get("schedule", {}).get("arrays")
+    if arrays is None:
         return kinds
     numbers = kernel.interface.numbers()
-    return {number: kinds[number] for number in (0, *(numbers[name] for name in launches[0]["arrays"]))}
+    return {number: kinds[number] for number in (0, *(numbers[name] for name in arrays[0]))}
 
 
 class WgpuRunner(BufferRunner):

@@ -251,13 +251,14 @@ class Tile:
         """Return a sum, a difference or a product, or the tiles in groups of as many as are computed."""
         va, vb = (each.values if isinstance(each, Tile) else each for each in (a, b))
         if what in ("add", "subtract", "multiply") and not any(hasattr(each, "form") for each in (a, b)):
-            found = {"add": np.add, "subtract": np.subtract, "multiply": np.multiply}[what](va, vb)
+            function = {"add": np.add, "subtract": np.subtract, "multiply": np.multiply}[what]
+            found = function(va, vb)
+            if (np.abs(function(np.asarray(va, float), vb)) > 2.0**62).any():
+                raise Wrong("an index leaves 32 bits, whatever the number of tiles")
         elif what == "divide" and type(b) is int and b == slots and va.size == 1 and va.item() == count:
             found = va // b
         else:
             raise Wrong("it uses the number of a tile otherwise than in an index")
-        if (np.abs(found) >= 2**31).any():
-            raise Wrong("an index leaves 32 bits")
         return cls(found)
 
 

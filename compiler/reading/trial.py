@@ -86,7 +86,7 @@ class Trial(Runner):
         self.written = np.zeros((slots, pixels, channels, lanes.count), bool)
         self.evaluators = self._evaluators()
         self.keys = np.array(sorted(claim.first), dtype=np.uint64)
-        of = 1001 + secrets.randbelow(2000)
+        of = 2**36 + secrets.randbelow(2**36)
         self.tile_count = of * self.fold.slots
         self.tiles = secrets.randbelow(of) + of * np.arange(self.fold.slots)
         if kernel.launches:
@@ -314,7 +314,7 @@ class Trial(Runner):
         if not isinstance(size, Expr) or size.op != "multiply" or size.args[0] != name(BATCH[1]):
             raise Unread(f"{statement.name} of a size that is not so many elements for each tile")
         count = integer(self.kernel, size.args[1])
-        if not 0 < count * self.tile_count < 2**31:
+        if not 0 < count < MOST:
             raise Wrong(f"{statement.name} has {count} elements for each tile")
         lanes = statement.type.lanes
         self.memory[statement.name] = Device(statement.name, lanes, count, self.tiles, self.tile_count)

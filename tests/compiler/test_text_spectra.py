@@ -40,7 +40,7 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     dialect = OpenCL() if target == "opencl" else C()
     tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
     if target == "opengl":
-        tiny = FourierPasses("fftpasses:8", "small tiles", GLSLCompute(), points)
+        tiny = FourierPasses("fftpasses:8", "small tiles", GLSLCompute(), points, "plain")
     whole = targets.DENOISERS[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedules, "COST", 0.0)
@@ -294,3 +294,24 @@ def test_hosts_of_less_memory_are_refused(array, opengl):
     memory[array] -= 2
     with pytest.raises((Refused, Unread), match=r"\S"):
         run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], "memory": memory}}, weights)
+
+
+@pytest.mark.parametrize(
+    ("number", "key", "value"),
+    [
+        (1, "entry", "main_1"),
+        (1, "arrays", ["columns"]),
+        (1, "arrays", ["back", "columns"]),
+        (None, "items", 16),
+    ],
+)
+def test_hosts_of_other_facts_are_refused(number, key, value, opengl):
+    source, held, manifest, weights = opengl
+    schedule = {**manifest["schedule"]}
+    if number is None:
+        schedule[key] = value
+    else:
+        schedule["launches"] = [dict(each) for each in schedule["launches"]]
+        schedule["launches"][number][key] = value
+    with pytest.raises(Refused, match="than its manifest says"):
+        run_text(source, held, {**manifest, "schedule": schedule}, weights)

@@ -1,7 +1,7 @@
 """How good a picture is: all numbers of one picture against its reference, in both spaces.
 
 1. Display-encoded colour in [0, 1] is what a viewer sees: MSE, the same on 0 .. 255, PSNR in decibels, the
-   paper's figure, SSIM, and FLIP [`score`].
+   paper's figure, SSIM, FLIP, and the error after a blur on 0 .. 255 [`score`].
 2. Linear radiance: relMSE and SMAPE [`refimpl/metrics.py`]. A picture that is only display-encoded is
    decoded.
 3. FLIP is that of the package `flip-evaluator`, for pictures of display range, at its usual 67 pixels per
@@ -34,7 +34,7 @@ from wamnet.refimpl.encoding import LEVELS, from_display, to_8bit, to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats
 
-LOWER_IS_BETTER = ("mse", "mse255", "wrapped", "flip", "relmse", "smape")
+LOWER_IS_BETTER = ("mse", "mse255", "wrapped", "flip", "blurred", "relmse", "smape")
 """The scores that fall as a picture gets better."""
 
 
@@ -54,6 +54,7 @@ def score(picture: Floats, reference: Floats, linear: Floats | None = None) -> d
         "paper": paper_figure(error * LEVELS**2),
         "ssim": metrics.ssim(picture, target),
         "flip": flip(picture, target),
+        "blurred": LEVELS * metrics.blurred(picture, target),
         "relmse": metrics.relmse(radiance, reference),
         "smape": metrics.smape(radiance, reference),
     }

@@ -481,8 +481,8 @@ def planted_faults(records: Records) -> str:
 
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
-    "course", "gpu-pipeline", "moving-quality", "savings", "sines-speed", "specialisation", "text-faults",
-    "whole",
+    "course", "gpu-pipeline", "moving-quality", "savings", "shadows", "sines-speed", "specialisation",
+    "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
 SHOWN_BY_MODULE = ("gpu", "house3")

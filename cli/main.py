@@ -127,7 +127,9 @@ def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: 
         " ".join(part.split()) for part in (getattr(module, function).__doc__ or "").split("\n\n")
     )
     group, _, name = path.rpartition(" ")
-    how: dict[str, Any] = {"help": shown, "epilog": getattr(module, examples) if examples else None}
+    # And each example as a paragraph.
+    epilog = getattr(module, examples).replace("\n", "\n\n") if examples else None
+    how: dict[str, Any] = {"help": shown, "epilog": epilog}
     if path in GROUPS:
         groups[path] = typer.Typer(invoke_without_command=True, **GROUPS[path])
         groups[path].callback(**how)(command)

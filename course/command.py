@@ -19,23 +19,17 @@ if TYPE_CHECKING:
     from .sandbox import Limits
 
 START_EXAMPLES = """Examples:
-
 wamnet course start mycourse"""
 """Shown below the help of `wamnet course start`."""
 
 CHECK_EXAMPLES = """Examples:
-
 wamnet course check 1
-
 wamnet course check sampling mycourse --every
-
 wamnet course check all mycourse"""
 """Shown below the help of `wamnet course check`."""
 
 GRADE_EXAMPLES = """Examples:
-
 wamnet course grade students -o grades
-
 wamnet course grade students -o grades --lab 3 --lab 4 --seconds 20"""
 """Shown below the help of `wamnet course grade`."""
 

@@ -45,17 +45,11 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet animate model.safetensors -o turning.mp4
-
 wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
-
 wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
-
 wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
-
 wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
-
 wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
 """Shown below the help of `wamnet animate`."""
 

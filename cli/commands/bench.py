@@ -31,15 +31,10 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet bench -o speed
-
 wamnet bench --train-variants --size 512 -o speed
-
 wamnet bench model.safetensors --dataset cubes -o speed
-
 wamnet bench --quick --only 'opencl:*,torch.compile' -o speed
-
 wamnet bench --synthetic --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed"""
 """Shown below the help of `wamnet bench`."""
 

@@ -12,11 +12,8 @@ from ...refimpl.reading import read_file
 from ..common.terminal import progress, say, table
 
 EXAMPLES = """Examples:
-
 wamnet certify kernel-opencl/denoise.certificate.json
-
 wamnet certify kernel-opencl
-
 wamnet certify kernel-c --source denoise-mine.h"""
 """Shown below the help of `wamnet certify`."""
 

@@ -14,13 +14,9 @@ from ..common.options import ExecutorName
 from ..common.terminal import table, tell
 
 EXAMPLES = """Examples:
-
 wamnet compare denoised.png reference.png
-
 wamnet compare noisy.exr reference.exr --json
-
 wamnet compare --paths minicubes
-
 wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3"""
 """Shown below the help of `wamnet compare`."""
 

@@ -31,21 +31,13 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet compile model.safetensors --target glsl -o kernel-glsl
-
 wamnet compile model:minicubes --target opencl -o kernel-minicubes
-
 wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
-
 wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
-
 wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
-
 wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
-
 wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
-
 wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 """Shown below the help of `wamnet compile`."""
 

@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from ...spec.conformance.run import Verdict
 
 EXAMPLES = """Examples:
-
 wamnet conformance --executor numpy -k random -k camera
-
 wamnet conformance --program "./mine --fast" --junit report.xml
-
 wamnet conformance --program ./mine --track mine.json"""
 """Shown below the help of `wamnet conformance`."""
 

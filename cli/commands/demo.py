@@ -50,11 +50,8 @@ if TYPE_CHECKING:
     Pair = tuple[Frame, Frame]
 
 EXAMPLES = """Examples:
-
 wamnet demo
-
 wamnet demo --size 384 -o out/large
-
 wamnet demo --scene mine.json -o out/mine"""
 """Shown below the help of `wamnet demo`."""
 

@@ -36,28 +36,18 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
 DENOISE_EXAMPLES = """Examples:
-
 wamnet denoise model.safetensors noisy.exr -o denoised.png
-
 wamnet denoise minicubes noisy.exr -o denoised.png
-
 wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
-
 wamnet denoise model.safetensors 'shot.%04d.exr' --executor opencl -o denoised
-
 wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.png
-
 wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
-
 wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
-
 wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
-
 wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
 """Shown below the help of `wamnet denoise`."""
 
 EXECUTORS_EXAMPLES = """Example:
-
 wamnet executors"""
 """Shown below the help of `wamnet executors`."""
 

@@ -23,23 +23,14 @@ if TYPE_CHECKING:
     from ...refimpl.light.scene import Scene
 
 EXAMPLES = """Examples:
-
 wamnet export model.safetensors --target wgsl -o for-webgpu
-
 wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
-
 wamnet export model.safetensors --scene minicubes --host c -o program
-
 wamnet export model.safetensors --target c --weights inline --check -o header
-
 wamnet export model.safetensors --target opencl --measure -o timed
-
 wamnet export model.safetensors --target cuda --schedule plain -o to-read
-
 wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
-
 wamnet export model.safetensors --scene minicubes --moving time,camera --target c -o turning
-
 wamnet export model.safetensors --scene minicubes --target html -o page"""
 """Shown below the help of `wamnet export`."""
 

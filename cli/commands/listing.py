@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from ...compiler.core.listing import Line
 
 EXAMPLES = """Examples:
-
 wamnet listing model.safetensors --target glsl
-
 wamnet listing minicubes --target opencl --profile native -o minicubes.txt"""
 """Shown below the help of `wamnet listing`."""
 

@@ -18,30 +18,19 @@ from ..common.terminal import progress, say
 from ..files.outputs import check_output, write_text
 
 RENDER_EXAMPLES = """Examples:
-
 wamnet render minicubes
-
 wamnet render minicubes --feature-spp 4 -o noisy.exr
-
 wamnet render glossy --seen -o mirrors.exr
-
 wamnet render minicubes --feature-spp 4 --shadow-rays 4 -o shadows.exr
-
 wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
-
 wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
-
 wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
-
 wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
 """Shown below the help of `wamnet render`."""
 
 SCENE_EXAMPLES = """Examples:
-
 wamnet scene minicubes
-
 wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
-
 wamnet render mine.json"""
 """Shown below the help of `wamnet scene`."""
 

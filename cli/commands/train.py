@@ -28,19 +28,12 @@ if TYPE_CHECKING:
     from ...refimpl.network.train import Recipe, TrainState
 
 EXAMPLES = """Examples:
-
 wamnet train -i noisy.exr -t reference.exr -o model.safetensors
-
 wamnet train --dataset cubes --steps 20000 --executor opencl
-
 wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
-
 wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
-
 wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
-
 wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
-
 wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors"""
 """Shown below the help of `wamnet train`."""
 

@@ -39,11 +39,8 @@ if TYPE_CHECKING:
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet triage model.safetensors noisy.exr
-
 wamnet triage model.safetensors noisy.exr --schedules all
-
 wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
 """Shown below the help of `wamnet triage`."""
 

@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from ...kernels.run.tune import Table
 
 EXAMPLES = """Examples:
-
 wamnet tune
-
 wamnet tune model.safetensors --executor opengl --size 512 --force"""
 """Shown below the help of `wamnet tune`."""
 

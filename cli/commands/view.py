@@ -27,11 +27,8 @@ from ..files.outputs import check_output, write_text
 from ..reports.webpage import page_of
 
 EXAMPLES = """Examples:
-
 wamnet view model.safetensors
-
 wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
-
 wamnet view model.safetensors -o page.html"""
 """Shown below the help of `wamnet view`."""
 

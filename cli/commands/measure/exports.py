@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet bench exports
-
 wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places"""
 """Shown below the help of `wamnet bench exports`."""
 

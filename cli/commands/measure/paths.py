@@ -19,16 +19,12 @@ if TYPE_CHECKING:
     from ....kernels.measure import Entry
 
 RENDER_EXAMPLES = """Examples:
-
 wamnet bench render --size 512 --spp 2 --repeats 5
-
 wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba,embree --workers 2 --spp 16"""
 """Shown below the help of `wamnet bench render`."""
 
 PRIMITIVES_EXAMPLES = """Examples:
-
 wamnet bench primitives
-
 wamnet bench primitives --executors opencl,mitsuba,embree --kinds spheres --counts 30,3000"""
 """Shown below the help of `wamnet bench primitives`."""
 

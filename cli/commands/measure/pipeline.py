@@ -28,11 +28,8 @@ if TYPE_CHECKING:
     from ....refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
-
 wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
-
 wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
-
 wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
 """Shown below the help of `wamnet bench pipeline`."""
 

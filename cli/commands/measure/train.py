@@ -13,9 +13,7 @@ from ...reports import machine
 from .shared import Repeats, Square, check_counts, extent, head, names_of, row, say_facts
 
 EXAMPLES = """Examples:
-
 wamnet bench train --presets paper,short --repeats 5
-
 wamnet bench train --trainers numpy,opencl,torch --presets paper"""
 """Shown below the help of `wamnet bench train`."""
 

@@ -17,13 +17,9 @@ if TYPE_CHECKING:
     from ....models.importing.network import Found
 
 EXAMPLES = """Examples:
-
 wamnet import network.onnx -o network.safetensors
-
 wamnet import coordinates.onnx --range -1:1
-
 wamnet import guided.onnx --range 0:1 --range normal=-1:1
-
 wamnet import filter.onnx --border zero"""
 """Shown below the help of `wamnet import`."""
 

@@ -20,13 +20,9 @@ if TYPE_CHECKING:
     from .renderers import Renderer
 
 EXAMPLES = """Examples:
-
 wamnet verify-renderer --renderer wamnet -k direct
-
 wamnet verify-renderer --renderer mitsuba --json mitsuba.json --markdown mitsuba.md
-
 wamnet verify-renderer --format mitsuba --command "my_renderer {scene} {output}" --profile clamps
-
 wamnet verify-renderer --format blender --write scenes"""
 """Shown below the help of `wamnet verify-renderer`."""
 

@@ -29,7 +29,6 @@ from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path, trained_scene, unlike_training
-from ..common.options import ExecutorChoice
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
 from ..files.alone import working_in
@@ -72,14 +71,6 @@ SceneToShow = Annotated[
         show_default="the model's training scene",
     ),
 ]
-TracedBy = Annotated[
-    ExecutorChoice,
-    typer.Option(
-        "--renderer",
-        envvar=options.EXECUTOR_VARIABLE,
-        help="Backend that traces the paths: [bold]auto[/] is the fastest available.",
-    ),
-]
 Rays = Annotated[
     int | None,
     typer.Option(
@@ -114,8 +105,8 @@ def animate(
     pitch: options.Pitch = 0.0,
     distance: options.Distance = 1.0,
     light: options.Lights = None,
-    executor: options.Executor = ExecutorChoice.auto,
-    renderer: TracedBy = ExecutorChoice.auto,
+    executor: options.Executor = "auto",
+    renderer: options.Renderer = "auto",
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
 ) -> None:

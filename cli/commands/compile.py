@@ -44,7 +44,7 @@ wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 """What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
 
-EXECUTOR_OF = {Target.opencl: "opencl", Target.glsl: "opengl", Target.c: "c"}
+EXECUTOR_OF = {"opencl": "opencl", "glsl": "opengl", "c": "c"}
 """The compiler names a target by the executor that runs it; people know the language."""
 
 
@@ -70,7 +70,7 @@ class OfScene:
     def options(self) -> dict[str, object]:
         """Return the options by name."""
         given = {"--time": self.time, "--set": self.parameters, "--lanes": self.lanes}
-        return {**given, "--max-depth": self.max_depth, "--sampler": self.sampler and self.sampler.value}
+        return {**given, "--max-depth": self.max_depth, "--sampler": self.sampler}
 
     def compiled(self, name: str, target: str, profile: str) -> PathArtifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
@@ -83,7 +83,7 @@ class OfScene:
             say(line)
         settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
         if self.sampler is not None:
-            settings = replace(settings, sampler=self.sampler.value)
+            settings = replace(settings, sampler=self.sampler)
         programs = lower_scene(scene, settings, forms_of(target))
         return compile_path(programs, target, profile, 1 if self.lanes is None else self.lanes)
 
@@ -115,7 +115,7 @@ def compile_model(
     limits (--max-error, --max-ms, --max-loss-db): they choose the variant from a speed-error curve that
     is measured once per device.
     """
-    folder, name = output or Path(target.value), EXECUTOR_OF[target]
+    folder, name = output or Path(target), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
         of_models = {"--schedule": network.schedule, "--variant": network.variant, "--here": here or None}

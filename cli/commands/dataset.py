@@ -24,7 +24,6 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
-from ..common.options import ExecutorChoice, Sampler
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
@@ -179,9 +178,9 @@ def dataset(
     seed: options.Seed = 0,
     parameters: options.Parameters = None,
     max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
-    executor: options.Renderer = ExecutorChoice.auto,
+    executor: options.Renderer = "auto",
     context: options.OpenGLContext = None,
-    sampler: options.SamplerName = Sampler.pcg4d,
+    sampler: options.SamplerName = "pcg4d",
     workers: Workers = None,
     scheduler: Scheduler = None,
     from_blender: FromBlender = None,
@@ -207,7 +206,7 @@ def dataset(
         return
     named = scene or _missing_scene(), options.parse_parameters(parameters or [])
     numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
-    ways = (executor.value, sampler.value, feature_spp, test_spp, outside, arc)
+    ways = (executor, sampler, feature_spp, test_spp, outside, arc)
     limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
     request = _request(command, named, (*numbers, *ways), limits, (seen, power, before, shadow_rays))
     _check_workers(workers, scheduler)

@@ -23,7 +23,7 @@ from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
-from ..common.options import ExecutorChoice, ExecutorName
+from ..common.options import ExecutorName
 from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
@@ -142,7 +142,7 @@ def denoise(
         ),
     ],
     output: Output = Path("denoised.png"),
-    executor: options.Executor = ExecutorChoice.auto,
+    executor: options.Executor = "auto",
     *,
     kernel: KernelRequest,
     rank: options.CutRank = 0,

@@ -11,7 +11,6 @@ import typer
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene
-from ..common.options import Sampler
 from ..common.request import KernelRequest
 from ..common.terminal import say
 from ..files.outputs import check_new_folder, making_folder
@@ -108,7 +107,7 @@ class Shown:
     time: options.Time = None
     parameters: options.Parameters = None
     max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = DEPTH
-    sampler: options.SamplerName = Sampler.pcg4d
+    sampler: options.SamplerName = "pcg4d"
     moving: Annotated[
         str | None,
         typer.Option(
@@ -131,10 +130,10 @@ class Shown:
     def check(self) -> None:
         """Refuse options that mean nothing without others."""
         if self.scene is None:
-            turned = None if self.sampler is Sampler.pcg4d else self.sampler.value
+            turned = None if self.sampler == "pcg4d" else self.sampler
             depth = None if self.max_depth == DEPTH else self.max_depth
-            given = {"--time": self.time, "--set": self.parameters, "--sampler": turned, "--max-depth": depth}
-            given["--moving"] = self.moving
+            given: dict[str, Any] = {"--time": self.time, "--set": self.parameters, "--sampler": turned}
+            given |= {"--max-depth": depth, "--moving": self.moving}
             _refuse(given, "there is no scene", "name one with --scene, or leave it out")
         if self.moving is None:
             _refuse(self._table, "nothing moves", "add --moving time, or leave it out")
@@ -255,7 +254,7 @@ def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, m
 
     if measured:
         check_measured(target)
-    settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler.value)
+    settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
     motion = shown.motion()
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
     how = (kernel.profile, kernel.weights or "", kernel.variant or FULL, settings, kernel.schedule or "")

@@ -13,7 +13,7 @@ from ..common import options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_scene
-from ..common.options import ExecutorChoice, FloatType, Sampler
+from ..common.options import FloatType
 from ..common.terminal import progress, say
 from ..files.outputs import check_output, write_text
 
@@ -61,11 +61,11 @@ def render(
     distance: options.Distance = 1.0,
     light: options.Lights = None,
     max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
-    sampler: options.SamplerName = Sampler.pcg4d,
+    sampler: options.SamplerName = "pcg4d",
     dtype: Annotated[
         FloatType, typer.Option(help="Floating-point type of the computation; files store float32.")
-    ] = FloatType.float32,
-    executor: options.Renderer = ExecutorChoice.auto,
+    ] = "float32",
+    executor: options.Renderer = "auto",
     context: options.OpenGLContext = None,
     workers: Annotated[
         int | None, typer.Option(help="Number of worker processes (NumPy only).", show_default="one per core")
@@ -84,8 +84,8 @@ def render(
     loaded = load_scene(scene, time, parameters or [], options.View(yaw, pitch, distance, tuple(light or ())))
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
-    settings = Settings(max_depth=max_depth, sampler=sampler.value)
-    job = Job(width, height, spp, seed, settings, dtype.value, 0, feature_spp, seen, shadow_rays=shadow_rays)
+    settings = Settings(max_depth=max_depth, sampler=sampler)
+    job = Job(width, height, spp, seed, settings, dtype, 0, feature_spp, seen, shadow_rays=shadow_rays)
     tracer = _tracer(executor, workers, dtype)
     for line in said_of_rendering(loaded, job.samples, width * height, tracer, workers):
         say(line)
@@ -97,11 +97,11 @@ def render(
     say(f"{path}: {width}x{height} pixels, {spp} spp, {taken}")
 
 
-def _tracer(executor: ExecutorChoice, workers: int | None, dtype: FloatType) -> str:
+def _tracer(executor: str, workers: int | None, dtype: FloatType) -> str:
     """Return the executor that traces the paths; reject one that shares the work by itself."""
     from ...kernels.run.render_frame import renderer
 
-    because = "kernels compute in float32" if dtype is FloatType.float64 else ""
+    because = "kernels compute in float32" if dtype == "float64" else ""
     name = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
     if workers is not None and renderer(name).shares_work:
         rule = f"{name} shares the work by itself"

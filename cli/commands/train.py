@@ -16,7 +16,7 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK
-from ..common.options import Preset, TrainerName
+from ..common.options import Preset
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files.alone import alone_at
 from ..files.outputs import check_output
@@ -141,7 +141,7 @@ def train(
     ] = None,
     resume: Resume = False,
     restart: Restart = False,
-    executor: options.Trainer = TrainerName.auto,
+    executor: options.Trainer = "auto",
 ) -> None:
     """Train a network on noisy frames and their references, or on a data set.
 
@@ -187,7 +187,7 @@ def _wanted(
 
     names = None if features is None else options.parse_names(features)
     choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
-    recipe = choose_recipe((preset or Preset.best).value, state, choices)
+    recipe = choose_recipe(preset or "best", state, choices)
     if activation is not None:
         recipe = with_activation(recipe, activation)
     check_recipe(recipe)
@@ -322,7 +322,7 @@ def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool)
         raise InputError("--resume and --restart", NO_VALUE, "exclude each other", "choose one of them")
     if resume and preset is not None:
         rule = "cannot be combined with --resume, which uses the checkpoint's recipe"
-        raise InputError("--preset", preset.value, rule, "leave it out, or start again with --restart")
+        raise InputError("--preset", preset, rule, "leave it out, or start again with --restart")
     if saved.exists() and not (resume or restart):
         rule = "belongs to an earlier run, which would be lost"
         raise InputError(

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from enum import Enum
-
 from .terminal import say
 
 AUTO = "auto"
 """The name that leaves the choice to the rule [kernels/devices/registry.py: fastest]."""
 
 
-def chosen(executor: Enum, *, because: str = "", trains: bool = False, work: str = "executor") -> str:
+def chosen(executor: str, *, because: str = "", trains: bool = False, work: str = "executor") -> str:
     """Return the name of an executor; of `auto` the fastest one, which is printed with the reason.
 
     `because`: why NumPy must do the work, if it must. `trains`: the executor has to train.
     """
-    name = str(executor.value)
-    return fastest(because=because, trains=trains, work=work) if name == AUTO else name
+    return fastest(because=because, trains=trains, work=work) if executor == AUTO else executor
 
 
 def fastest(*, because: str = "", trains: bool = False, work: str = "executor") -> str:

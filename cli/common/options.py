@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -45,7 +45,7 @@ def _context(command: typer.Context, value: ContextName | None) -> ContextName |
     if value is None:
         return None
     before = os.environ.get(CONTEXT_VARIABLE)
-    os.environ[CONTEXT_VARIABLE] = value.value
+    os.environ[CONTEXT_VARIABLE] = value
 
     def restore() -> None:
         """Leave the environment as it was."""
@@ -75,63 +75,26 @@ class ExecutorName(str, Enum):
     c = "c"
 
 
-class ContextName(str, Enum):
-    """How OpenGL [kernels/devices/opengl_executor.py] gets a context: with no display, or in main memory."""
+ContextName = Literal["egl", "osmesa"]
+"""How OpenGL [kernels/devices/opengl_executor.py] gets a context: with no display, or in main memory."""
 
-    egl = "egl"
-    osmesa = "osmesa"
+ExecutorChoice = Literal["auto", "numpy", "opencl", "opengl", "c"]
+"""An executor, or the fastest that is available."""
 
+TrainerName = Literal["auto", "numpy", "opencl"]
+"""What trains: the reference, its steps compiled, or the faster one of those available."""
 
-class ExecutorChoice(str, Enum):
-    """An executor, or the fastest that is available."""
+Target = Literal["opencl", "glsl", "c"]
+"""Languages that a model is compiled to."""
 
-    auto = "auto"
-    numpy = "numpy"
-    opencl = "opencl"
-    opengl = "opengl"
-    c = "c"
+FloatType = Literal["float32", "float64"]
+"""Element types of the reference's arithmetic."""
 
+Sampler = Literal["pcg4d", "sobol"]
+"""Sources of random numbers by name; equal to the registry in refimpl."""
 
-class TrainerName(str, Enum):
-    """What trains: the reference, its steps compiled, or the faster one of those available."""
-
-    auto = "auto"
-    numpy = "numpy"
-    opencl = "opencl"
-
-
-class Target(str, Enum):
-    """Languages that a model is compiled to."""
-
-    opencl = "opencl"
-    glsl = "glsl"
-    c = "c"
-
-
-class FloatType(str, Enum):
-    """Element types of the reference's arithmetic."""
-
-    float32 = "float32"
-    float64 = "float64"
-
-
-class Sampler(str, Enum):
-    """Sources of random numbers by name; equal to the registry in refimpl."""
-
-    pcg4d = "pcg4d"
-    sobol = "sobol"
-
-
-class Preset(str, Enum):
-    """Training protocols by name; equal to the registry in refimpl."""
-
-    best = "best"
-    mirrors = "mirrors"
-    shadows = "shadows"
-    paper = "paper"
-    short = "short"
-    sky = "sky"
-
+Preset = Literal["best", "mirrors", "shadows", "paper", "short", "sky"]
+"""Training protocols by name; equal to the registry in refimpl."""
 
 EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
 """Environment variable that names the executor where the caller does not, for results that must not depend on
@@ -149,7 +112,6 @@ Executor = Annotated[
 Renderer = Annotated[
     ExecutorChoice,
     typer.Option(
-        "--executor",
         envvar=EXECUTOR_VARIABLE,
         help="Backend that traces the paths: [bold]auto[/] is the fastest available.",
     ),

@@ -19,7 +19,7 @@ def test_auto_is_the_default(command) -> None:
     """Of each option that names an executor."""
     parameters = inspect.signature(command).parameters
     for name in {"executor", "renderer"} & set(parameters):
-        assert parameters[name].default.value == "auto"
+        assert parameters[name].default == "auto"
 
 
 SMALL = ("--size", 8, "--spp", 1, "--frames", 1, "--test", 0)

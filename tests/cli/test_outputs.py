@@ -135,13 +135,12 @@ def test_a_full_disk_while_a_kernel_is_written(
     """The folder is named."""
     from wamnet.cli.commands.choose import Request
     from wamnet.cli.commands.compile import OfScene, compile_model
-    from wamnet.cli.common.options import Target
     from wamnet.cli.common.request import KernelRequest
 
     monkeypatch.setattr(Path, "write_bytes", full)
     given = {"of_scene": OfScene(), "network": KernelRequest(), "limits": Request()}
     with pytest.raises(InputError, match=r"output folder '.*kernel': cannot be written: No space left"):
-        compile_model(str(samples / "model.safetensors"), Target.glsl, tmp_path / "kernel", **given)
+        compile_model(str(samples / "model.safetensors"), "glsl", tmp_path / "kernel", **given)
 
 
 @settings(max_examples=60, deadline=None)

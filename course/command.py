@@ -65,8 +65,7 @@ def course(context: typer.Context) -> None:
 
 def start(
     folder: Annotated[
-        Path,
-        typer.Argument(metavar="DIR", help="Folder to make: a new one, or an empty one.", show_default=False),
+        Path, typer.Argument(metavar="DIR", help="Folder to make: a new one, or an empty one.")
     ],
 ) -> None:
     """Write the skeletons of all labs, a Makefile and a README to a new folder."""
@@ -84,10 +83,7 @@ def start(
 
 def check(
     lab: Annotated[
-        str,
-        typer.Argument(
-            metavar="LAB", help="1 to 12, a lab's name, extra1 to extra3, or all.", show_default=False
-        ),
+        str, typer.Argument(metavar="LAB", help="1 to 12, a lab's name, extra1 to extra3, or all.")
     ],
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of your answers.")] = Path(),
     every: Annotated[bool, typer.Option("--every", help="Show all findings, not only the first.")] = False,
@@ -137,17 +133,10 @@ def _show(result: Result, every: bool) -> None:
 
 
 def grade(
-    folder: Annotated[
-        Path,
-        typer.Argument(metavar="FOLDER", help="Folder with a folder for each student.", show_default=False),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="OUT", help="New folder for the tables.", show_default=False),
-    ],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with a folder for each student.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="New folder for the tables.")],
     lab: Annotated[
-        list[str] | None,
-        typer.Option("--lab", metavar="LAB", help="Only this lab; repeat for more.", show_default=False),
+        list[str] | None, typer.Option("--lab", metavar="LAB", help="Only this lab; repeat for more.")
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Labs that are graded at a time.", show_default="one a core")

@@ -42,9 +42,7 @@ def certify(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE",
-            help="Certificate (denoise.certificate.json), or the kernel's folder.",
-            show_default=False,
+            metavar="FILE", help="Certificate (denoise.certificate.json), or the kernel's folder."
         ),
     ],
     source: Source = None,

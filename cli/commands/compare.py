@@ -36,12 +36,9 @@ OF_PICTURES = ("image", "reference", "exposure")
 def compare(
     context: typer.Context,
     image: Annotated[
-        Path | None,
-        typer.Argument(metavar="IMAGE", help="Image to compare (.exr or .png).", show_default=False),
+        Path | None, typer.Argument(metavar="IMAGE", help="Image to compare (.exr or .png).")
     ] = None,
-    reference: Annotated[
-        Path | None, typer.Argument(metavar="REFERENCE", help="Reference image.", show_default=False)
-    ] = None,
+    reference: Annotated[Path | None, typer.Argument(metavar="REFERENCE", help="Reference image.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     exposure: options.Exposure = 0.0,
     paths: Annotated[
@@ -49,7 +46,6 @@ def compare(
         typer.Option(
             metavar="SCENE",
             help="Compare a kernel's paths in this scene with the reference's, instead of two images.",
-            show_default=False,
             rich_help_panel=PANEL,
         ),
     ] = None,

@@ -94,10 +94,9 @@ def compile_model(
         typer.Argument(
             metavar="MODEL",
             help="Trained model (.safetensors), model:NAME, canonical scene or scene file (.json).",
-            show_default=False,
         ),
     ],
-    target: Annotated[Target, typer.Option(help="Target language (export has more).", show_default=False)],
+    target: Annotated[Target, typer.Option(help="Target language (export has more).")],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.", show_default="TARGET"),

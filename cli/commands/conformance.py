@@ -37,10 +37,7 @@ REFERENCE = "reference"
 
 
 Program = Annotated[
-    str | None,
-    typer.Option(
-        "--program", metavar="CMD", help="Command that runs the program under test.", show_default=False
-    ),
+    str | None, typer.Option("--program", metavar="CMD", help="Command that runs the program under test.")
 ]
 Executor = Annotated[
     str | None,
@@ -48,7 +45,6 @@ Executor = Annotated[
         "--executor",
         metavar="NAME",
         help="Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
-        show_default=False,
     ),
 ]
 Words = Annotated[
@@ -57,7 +53,6 @@ Words = Annotated[
         "-k",
         metavar="WORD",
         help="Run only cases whose ID contains this word, or that have this clause or flag. Repeatable.",
-        show_default=False,
     ),
 ]
 Vectors = Annotated[
@@ -73,26 +68,14 @@ Track = Annotated[
         metavar="FILE",
         help="Store the verdicts in this file, show the differences from the last run, and fail "
         "only on regressions.",
-        show_default=False,
     ),
 ]
 Timeout = Annotated[float, typer.Option("--timeout", help="Timeout per answer, in seconds.")]
-Json = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write a JSON report.", show_default=False),
-]
-Junit = Annotated[
-    Path | None,
-    typer.Option("--junit", metavar="FILE", help="Write a JUnit report.", show_default=False),
-]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write a JSON report.")]
+Junit = Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write a JUnit report.")]
 Write = Annotated[
     Path | None,
-    typer.Option(
-        "--write",
-        metavar="DIR",
-        help="Regenerate the vectors from the reference and exit.",
-        show_default=False,
-    ),
+    typer.Option("--write", metavar="DIR", help="Regenerate the vectors from the reference and exit."),
 ]
 
 

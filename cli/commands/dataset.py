@@ -53,9 +53,7 @@ LEAST_SAMPLES = 1 << 20
 SceneOrNone = Annotated[
     str | None,
     typer.Argument(
-        metavar="SCENE",
-        help=f"Canonical scene ({options.SCENES}) or scene file (.json); --check needs none.",
-        show_default=False,
+        metavar="SCENE", help=f"Canonical scene ({options.SCENES}) or scene file (.json); --check needs none."
     ),
 ]
 
@@ -110,12 +108,7 @@ OnlyCheck = Annotated[
     bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
 ]
 FromBlender = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Render frames of this Blender file instead of a scene.",
-        show_default=False,
-    ),
+    Path | None, typer.Option(metavar="FILE", help="Render frames of this Blender file instead of a scene.")
 ]
 NoisySpp = Annotated[int, typer.Option(help="Paths per pixel of a noisy Blender frame.")]
 Percent = Annotated[int, typer.Option(help="Percentage of the Blender file's render resolution.")]

@@ -138,7 +138,6 @@ def denoise(
             metavar="FRAME...",
             help="Noisy frames with the layers that the model reads (.exr); shot.*.exr and "
             "shot.%04d.exr are sequences.",
-            show_default=False,
         ),
     ],
     output: Output = Path("denoised.png"),

@@ -27,12 +27,10 @@ def listing(
     model: Annotated[
         str,
         typer.Argument(
-            metavar="MODEL",
-            help="Trained model (.safetensors), canonical scene or scene file (.json).",
-            show_default=False,
+            metavar="MODEL", help="Trained model (.safetensors), canonical scene or scene file (.json)."
         ),
     ],
-    target: Annotated[Target, typer.Option(help="Target language.", show_default=False)],
+    target: Annotated[Target, typer.Option(help="Target language.")],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="Output file.", show_default="the terminal"),

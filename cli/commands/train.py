@@ -45,24 +45,16 @@ CHECKPOINT_INTERVAL_S = 30.0
 
 
 Inputs = Annotated[
-    list[Path] | None,
-    typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr). Repeatable.", show_default=False),
+    list[Path] | None, typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr). Repeatable.")
 ]
 Targets = Annotated[
     list[Path] | None,
     typer.Option(
-        "-t",
-        "--target",
-        metavar="FILE",
-        help="Reference of each noisy frame, in the same order. Repeatable.",
-        show_default=False,
+        "-t", "--target", metavar="FILE", help="Reference of each noisy frame, in the same order. Repeatable."
     ),
 ]
 DataSet = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FOLDER", help="Data set to train on, instead of single frames.", show_default=False
-    ),
+    Path | None, typer.Option(metavar="FOLDER", help="Data set to train on, instead of single frames.")
 ]
 Rank = Annotated[
     int | None,
@@ -77,7 +69,6 @@ Begin = Annotated[
         "--from",
         metavar="MODEL",
         help="Start from this model's weights, reduced to --rank or --variant, instead of random ones.",
-        show_default=False,
     ),
 ]
 Cut = Annotated[
@@ -88,7 +79,6 @@ Cut = Annotated[
         help="Fine-tune this variant of the model given by --from, for example window8+rank16. "
         "whole8 and whole10 round the weights to integers at the end; with --from and without "
         "--steps they only round.",
-        show_default=False,
     ),
 ]
 Resume = Annotated[

@@ -75,7 +75,6 @@ KeptKernel = Annotated[
         "--kernel",
         metavar="FOLDER",
         help="Run this kernel's files instead of compiling for its target and schedule.",
-        show_default=False,
     ),
 ]
 
@@ -83,10 +82,7 @@ KeptKernel = Annotated[
 def triage(
     model: options.ModelFile,
     frame: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FRAME", help="Frame with the layers that the model reads (.exr).", show_default=False
-        ),
+        Path, typer.Argument(metavar="FRAME", help="Frame with the layers that the model reads (.exr).")
     ],
     executor: Executors = None,
     profile: options.Profile = "ieee",

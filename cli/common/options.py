@@ -130,12 +130,7 @@ Exposure = Annotated[
     typer.Option("--exposure", callback=_stops, help="Exposure in stops; +1 doubles the brightness."),
 ]
 ModelFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MODEL",
-        help=f"Trained model (.safetensors), or bundled model ({MODELS}).",
-        show_default=False,
-    ),
+    Path, typer.Argument(metavar="MODEL", help=f"Trained model (.safetensors), or bundled model ({MODELS}).")
 ]
 Profile = Annotated[
     str,
@@ -223,12 +218,7 @@ CurveFile = Annotated[
 ]
 CurveFrames = Annotated[
     Path | None,
-    typer.Option(
-        "--frames",
-        metavar="FOLDER",
-        help="Data set; errors are measured on its test frames.",
-        show_default=False,
-    ),
+    typer.Option("--frames", metavar="FOLDER", help="Data set; errors are measured on its test frames."),
 ]
 CurveSize = Annotated[
     int | None,
@@ -246,7 +236,6 @@ Schedule = Annotated[
         "--schedule",
         metavar="NAME",
         help="Kernel schedule: [bold]plain[/] is human-readable, the others are faster.",
-        show_default=False,
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
@@ -260,7 +249,6 @@ Parameters = Annotated[
         "--set",
         metavar="NAME=VALUE",
         help="Parameter of a canonical scene: one number, or three separated by commas. Repeatable.",
-        show_default=False,
     ),
 ]
 SamplerName = Annotated[
@@ -321,12 +309,7 @@ Lights = Annotated[
     ),
 ]
 SceneName = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENE",
-        help=f"Canonical scene ({SCENES}) or scene file (.json).",
-        show_default=False,
-    ),
+    str, typer.Argument(metavar="SCENE", help=f"Canonical scene ({SCENES}) or scene file (.json).")
 ]
 
 

@@ -28,10 +28,7 @@ SUFFIX = ".safetensors"
 
 
 def import_model(
-    network: Annotated[
-        Path,
-        typer.Argument(metavar="NETWORK", help="ONNX network (.onnx).", show_default=False),
-    ],
+    network: Annotated[Path, typer.Argument(metavar="NETWORK", help="ONNX network (.onnx).")],
     output: Annotated[
         Path | None,
         typer.Option(

@@ -39,7 +39,6 @@ Name = Annotated[
         metavar="NAME",
         help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, cycles-gltf, "
         "luxcore or povray.",
-        show_default=False,
     ),
 ]
 Command = Annotated[
@@ -49,7 +48,6 @@ Command = Annotated[
         metavar="CMD",
         help="In its place any program: a command with {scene}, {output} or {outputs}; no shell reads it. "
         "Further {seed}, {width}, {height}, {samples}, {depth}.",
-        show_default=False,
     ),
 ]
 Form = Annotated[
@@ -58,7 +56,6 @@ Form = Annotated[
         "--format",
         metavar="NAME",
         help="Form of the scene files: wamnet, mitsuba, blender, povray, luxcore, gltf or three.",
-        show_default=False,
     ),
 ]
 Words = Annotated[
@@ -83,21 +80,14 @@ Pictures = Annotated[
     int, typer.Option("--pictures", metavar="N", help="Pictures of each case, by other seeds.")
 ]
 Timeout = Annotated[float, typer.Option("--timeout", help="Longest time for a command, in seconds.")]
-Json = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write a report as JSON.", show_default=False),
-]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write a report as JSON.")]
 Markdown = Annotated[
-    Path | None,
-    typer.Option("--markdown", metavar="FILE", help="Write a report as Markdown.", show_default=False),
+    Path | None, typer.Option("--markdown", metavar="FILE", help="Write a report as Markdown.")
 ]
 Write = Annotated[
     Path | None,
     typer.Option(
-        "--write",
-        metavar="FOLDER",
-        help="Write the scene files of a format with their answers, and end.",
-        show_default=False,
+        "--write", metavar="FOLDER", help="Write the scene files of a format with their answers, and end."
     ),
 ]
 

@@ -79,12 +79,7 @@ Rays = Annotated[
         show_default="equivalent to those in training",
     ),
 ]
-Output = Annotated[
-    Path,
-    typer.Option(
-        "-o", "--output", metavar="PATH", help="Output: animation (.mp4, .gif) or folder of images."
-    ),
-]
+Output = Annotated[Path, options.output("PATH", "Output: animation (.mp4, .gif) or folder of images.")]
 
 
 def animate(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...refimpl.errors import NO_VALUE, InputError
-from ..common import packages
+from ..common import options, packages
 from ..common.effort import said_of_measuring
 from ..common.executors import fastest
 from ..common.inputs import load_model, trained_scene
@@ -73,9 +73,7 @@ class Wanted:
             show_default=SHIPPED,
         ),
     ] = None
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.")] = Path(
-        "wamnet-bench"
-    )
+    output: Annotated[Path, options.output("FOLDER", "Output folder.")] = Path("wamnet-bench")
     dataset: Annotated[
         Path | None,
         typer.Option(
@@ -89,19 +87,9 @@ class Wanted:
         typer.Option(help="Width and height of the image, in pixels.", show_default="1024; quick: 256"),
     ] = None
     sizes: Annotated[
-        str,
-        typer.Option(
-            metavar="N,N,...", help="Further image sizes, to show how the cost scales.", show_default="none"
-        ),
+        str, options.names("Further image sizes, to show how the cost scales.", "none", metavar="N,N,...")
     ] = ""
-    only: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...",
-            help="Run only these; * matches any characters.",
-            show_default="all available",
-        ),
-    ] = ""
+    only: Annotated[str, options.names("Run only these; * matches any characters.", "all available")] = ""
     executor: Annotated[
         list[ExecutorName] | None,
         typer.Option(
@@ -110,10 +98,8 @@ class Wanted:
     ] = None
     features: Annotated[
         str,
-        typer.Option(
-            metavar="NAME,...",
-            help="Input features of the untrained network of --synthetic.",
-            show_default="color,normal, as in the paper",
+        options.names(
+            "Input features of the untrained network of --synthetic.", "color,normal, as in the paper"
         ),
     ] = ""
     repeats: Annotated[

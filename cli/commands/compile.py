@@ -97,10 +97,7 @@ def compile_model(
         ),
     ],
     target: Annotated[Target, typer.Option(help="Target language (export has more).")],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FOLDER", help="Output folder.", show_default="TARGET"),
-    ] = None,
+    output: Annotated[Path | None, options.output("FOLDER", "Output folder.", "TARGET")] = None,
     *,
     of_scene: OfScene,
     network: KernelRequest,

@@ -103,7 +103,7 @@ Scheduler = Annotated[
     typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler; its workers are used."),
 ]
 
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="Data set folder.")]
+Output = Annotated[Path, options.output("FOLDER", "Data set folder.")]
 OnlyCheck = Annotated[
     bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
 ]

@@ -99,14 +99,7 @@ def demo(
         str, typer.Option(help=f"Canonical scene ({options.SCENES}) or scene file (.json).")
     ] = Plan.scene,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FOLDER",
-            help="Output folder.",
-            show_default=f"{FOLDER}, or {QUICK_FOLDER} with --quick",
-        ),
+        Path | None, options.output("FOLDER", "Output folder.", f"{FOLDER}, or {QUICK_FOLDER} with --quick")
     ] = None,
     size: Annotated[
         int | None,

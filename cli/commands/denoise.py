@@ -65,11 +65,9 @@ ViewLayer = Annotated[
 ]
 Output = Annotated[
     Path,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
+    options.output(
+        "FILE",
+        "Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
         "folder or a pattern with %04d for the frame number.",
     ),
 ]

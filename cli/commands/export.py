@@ -182,12 +182,7 @@ def export(
             metavar="NAME", help=f"Complete host program to generate: {HOSTS}.", show_default="none"
         ),
     ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="FOLDER", help="New output folder.", show_default="HOST or TARGET"
-        ),
-    ] = None,
+    output: Annotated[Path | None, options.output("FOLDER", "New output folder.", "HOST or TARGET")] = None,
     *,
     shown: Shown,
     kernel: Kernel,

@@ -31,10 +31,7 @@ def listing(
         ),
     ],
     target: Annotated[Target, typer.Option(help="Target language.")],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Output file.", show_default="the terminal"),
-    ] = None,
+    output: Annotated[Path | None, options.output("FILE", "Output file.", "the terminal")] = None,
     profile: options.Profile = "ieee",
 ) -> None:
     """Print a kernel interleaved with the lines of the reference that it came from.

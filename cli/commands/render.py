@@ -39,12 +39,8 @@ def render(
     scene: options.SceneName,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Output: frame with all layers (.exr), or its colour only (.png).",
-            show_default="SCENE.exr",
+        options.output(
+            "FILE", "Output: frame with all layers (.exr), or its colour only (.png).", "SCENE.exr"
         ),
     ] = None,
     width: Annotated[int, typer.Option(help="Width in pixels.")] = 256,
@@ -122,10 +118,7 @@ def write_picture(path: Path, frame: Any, exposure: float) -> None:
 
 def scene(
     name: options.SceneName,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Output file.", show_default="the terminal"),
-    ] = None,
+    output: Annotated[Path | None, options.output("FILE", "Output file.", "the terminal")] = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
     yaw: options.Yaw = 0.0,

@@ -107,9 +107,9 @@ def train(
     inputs: Inputs = None,
     targets: Targets = None,
     dataset: DataSet = None,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Model to write (.safetensors).")
-    ] = Path("model.safetensors"),
+    output: Annotated[Path, options.output("FILE", "Model to write (.safetensors).")] = Path(
+        "model.safetensors"
+    ),
     preset: PresetName = None,
     features: Annotated[
         str | None,

@@ -89,10 +89,7 @@ def triage(
     schedules: Schedules = "picked",
     kernel: KeptKernel = None,
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="FOLDER", help="Output folder for the reproducer, if a kernel deviates."
-        ),
+        Path, options.output("FOLDER", "Output folder for the reproducer, if a kernel deviates.")
     ] = Path("triage"),
 ) -> None:
     """Run a model on every backend, and find the one that exceeds its error bound.

@@ -71,14 +71,7 @@ def view(
     port: Annotated[int, typer.Option(help="Port to serve the page on; 0 picks a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Write the page (.html) instead of serving it.",
-            show_default="serve the page",
-        ),
+        Path | None, options.output("FILE", "Write the page (.html) instead of serving it.", "serve the page")
     ] = None,
 ) -> None:
     """Show a model in the browser: the scene, path-traced live, its normals, and the denoised image.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -95,6 +95,17 @@ Sampler = Literal["pcg4d", "sobol"]
 
 Preset = Literal["best", "mirrors", "shadows", "paper", "short", "sky"]
 """Training protocols by name; equal to the registry in refimpl."""
+
+
+def output(metavar: str, what: str, default: str | bool = True) -> Any:
+    """Return the option of what a command writes; `default` is shown in place of the parameter's."""
+    return typer.Option("-o", "--output", metavar=metavar, help=what, show_default=default)
+
+
+def names(what: str, default: str | bool = True, metavar: str = "NAME,...") -> Any:
+    """Return an option whose text is names with commas [`parse_names`], called as its parameter."""
+    return typer.Option(metavar=metavar, help=what, show_default=default)
+
 
 EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
 """Environment variable that names the executor where the caller does not, for results that must not depend on

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
+from ...common import options
 from ...common.inputs import load_model
 from .shared import SceneShown, head, names_of, row
 
@@ -38,10 +39,7 @@ def exports(
         ),
     ] = None,
     scene: SceneShown = "minicubes",
-    targets: Annotated[
-        str | None,
-        typer.Option(metavar="NAME,...", help="Export targets to measure.", show_default="all"),
-    ] = None,
+    targets: Annotated[str | None, options.names("Export targets to measure.", "all")] = None,
     places: Annotated[
         bool, typer.Option("--places", help="Export every weight storage, without the path tracer.")
     ] = False,

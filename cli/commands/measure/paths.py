@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ...common import options
 from ...common.options import SCENES, parse_names
 from ...common.terminal import progress, say
 from .shared import NUMPY, Repeats, Square, check_counts, counts_of, extent, head, names_of, row, say_facts
@@ -33,7 +34,7 @@ Spp = Annotated[int, typer.Option(help="Samples per pixel.")]
 
 def render(
     scenes: Annotated[
-        str, typer.Option(metavar="NAME,...", help=f"Canonical scenes ({SCENES}) or scene files.")
+        str, options.names(f"Canonical scenes ({SCENES}) or scene files.")
     ] = "minicubes,cornell",
     by: Annotated[
         str,
@@ -46,9 +47,7 @@ def render(
     ] = "numpy",
     workers: Annotated[
         str | None,
-        typer.Option(
-            metavar="N,...", help="Processes for the NumPy reference.", show_default="1, and one per core"
-        ),
+        options.names("Processes for the NumPy reference.", "1, and one per core", metavar="N,..."),
     ] = None,
     size: Square = 512,
     spp: Spp = 2,
@@ -107,18 +106,12 @@ def _agreement(entries: Sequence[Entry]) -> Iterator[str]:
 
 def primitives(
     executors: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...", help="Path tracers to measure: opencl, opengl, c, mitsuba, embree, numba."
-        ),
+        str, options.names("Path tracers to measure: opencl, opengl, c, mitsuba, embree, numba.")
     ] = "opencl,opengl",
     kinds: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...", help="Kinds of primitives: shared, turned, spheres, quads, mixture."
-        ),
+        str, options.names("Kinds of primitives: shared, turned, spheres, quads, mixture.")
     ] = "mixture",
-    counts: Annotated[str, typer.Option(metavar="N,...", help="Number of primitives.")] = "10,30,100,300",
+    counts: Annotated[str, options.names("Number of primitives.", metavar="N,...")] = "10,30,100,300",
     size: Square = 128,
     spp: Spp = 4,
     repeats: Repeats = 5,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
+from ...common import options
 from ...common.terminal import say
 from .shared import (
     NUMPY,
@@ -37,15 +38,13 @@ wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32
 def pipeline(
     scene: SceneShown = "minicubes",
     executors: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Backends to measure: numpy, opencl, opengl, c.")
+        str, options.names("Backends to measure: numpy, opencl, opengl, c.")
     ] = "opencl,opengl",
     sizes: Annotated[
-        str, typer.Option(metavar="N,...", help="Image sizes (width and height), in pixels.")
+        str, options.names("Image sizes (width and height), in pixels.", metavar="N,...")
     ] = "256,512",
-    features: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Input features of the network.")
-    ] = "color,normal",
-    hidden: Annotated[str, typer.Option(metavar="N,...", help="Width of each hidden layer, in neurons.")] = (
+    features: Annotated[str, options.names("Input features of the network.")] = "color,normal",
+    hidden: Annotated[str, options.names("Width of each hidden layer, in neurons.", metavar="N,...")] = (
         "32,32,32,32"
     ),
     window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
@@ -56,12 +55,7 @@ def pipeline(
         ),
     ] = 0,
     repeats: Repeats = 5,
-    peers: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,...", help="Other renderers to include: mitsuba, cycles.", show_default="none"
-        ),
-    ] = "",
+    peers: Annotated[str, options.names("Other renderers to include: mitsuba, cycles.", "none")] = "",
 ) -> None:
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ....refimpl.errors import InputError
+from ...common import options
 from ...common.terminal import progress, say
 from ...reports import machine
 from .shared import Repeats, Square, check_counts, extent, head, names_of, row, say_facts
@@ -23,15 +24,10 @@ LONGEST_S = 600.0
 
 def train(
     presets: Annotated[
-        str, typer.Option(metavar="NAME,...", help="Training presets: best, mirrors, paper, short, sky.")
+        str, options.names("Training presets: best, mirrors, paper, short, sky.")
     ] = "paper,short",
     trainers: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Trainers to measure: numpy, opencl, torch.",
-            show_default="all that are installed",
-        ),
+        str | None, options.names("Trainers to measure: numpy, opencl, torch.", "all that are installed")
     ] = None,
     size: Square = 256,
     frames: Annotated[int, typer.Option(help="Number of noise frames to train on.")] = 4,

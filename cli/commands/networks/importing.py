@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ....refimpl.errors import InputError
+from ...common import options
 from ...common.inputs import check_input
 from ...common.terminal import say
 from ...files.outputs import check_output
@@ -30,14 +31,7 @@ SUFFIX = ".safetensors"
 def import_model(
     network: Annotated[Path, typer.Argument(metavar="NETWORK", help="ONNX network (.onnx).")],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Model to write (.safetensors).",
-            show_default="the network's name",
-        ),
+        Path | None, options.output("FILE", "Model to write (.safetensors).", "the network's name")
     ] = None,
     ranges: Annotated[
         list[str] | None,

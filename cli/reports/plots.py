@@ -59,9 +59,7 @@ def error_maps(maps: Sequence[tuple[str, Any]], theme: Theme) -> list[bytes]:
         axis.set_title(title, color=theme.text, fontsize=10)
         axis.set_axis_off()
         bar = figure.colorbar(picture, ax=axis, shrink=0.85, label="absolute error, display-encoded")
-        bar.ax.yaxis.label.set_color(theme.text)
-        bar.ax.tick_params(colors=theme.text)
-        bar.outline.set_edgecolor(theme.text)
+        _dress(bar.ax, theme)
         drawn.append(_png(figure))
     return drawn
 
@@ -75,19 +73,13 @@ def training_curve(
     axis.set_yscale("log")
     axis.set_xlabel("step")
     axis.set_ylabel("loss of one minibatch (MSE)")
-    axis.grid(visible=True, which="both", color=theme.text, alpha=0.15, linewidth=0.6)
-    parts = [axis]
+    _dress(axis, theme, grid="both")
     if seconds_per_step is not None:
         scale = seconds_per_step
         ways = (lambda step: step * scale, lambda second: second / scale)
-        parts.append(axis.secondary_xaxis("top", functions=ways))
-        parts[1].set_xlabel("seconds")
-    for part in parts:
-        part.tick_params(which="both", colors=theme.text)
-        part.xaxis.label.set_color(theme.text)
-        part.yaxis.label.set_color(theme.text)
-        for spine in part.spines.values():
-            spine.set_color(theme.text)
+        above = axis.secondary_xaxis("top", functions=ways)
+        above.set_xlabel("seconds")
+        _dress(above, theme)
     return _png(figure)
 
 
@@ -108,10 +100,8 @@ def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> by
     axis.minorticks_off()
     axis.set_xlabel("width and height, pixels")
     axis.set_ylabel("ms per frame")
-    _dress(axis, theme)
-    legend = figure.legend(frameon=False, fontsize=8, loc="outside right upper")
-    for text in legend.get_texts():
-        text.set_color(theme.text)
+    _dress(axis, theme, grid="major")
+    figure.legend(frameon=False, fontsize=8, labelcolor=theme.text, loc="outside right upper")
     return _png(figure)
 
 
@@ -215,18 +205,9 @@ def trade_off(panels: Sequence[Panel], theme: Theme) -> bytes:
 
 def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
     """Return the figure of these panels, with one axis of time and one legend."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(
-        figsize=(9.0, 1.2 + 4.4 * len(panels)),
-        dpi=DOTS_PER_INCH,
-        layout="constrained",
-        facecolor=theme.page,
-    )
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    figure, *axes = _figure(theme, (9.0, 1.2 + 4.4 * len(panels)), len(panels))
     axes[0].set_xscale("log")
     for axis, panel in zip(axes, panels, strict=True):
-        axis.set_facecolor("none")
         _panel(axis, panel, theme)
     axes[-1].set_xlabel("ms per frame, median; the line spans all rounds")
     _legend(figure, [mark for panel in panels for mark in panel.marks], theme)
@@ -291,7 +272,7 @@ def _panel(axis: Any, panel: Panel, theme: Theme) -> None:
     axis.plot(*line, drawstyle="steps-post", color=theme.text, linewidth=1.1, alpha=0.7, zorder=1)
     axis.margins(0.1, 0.12)
     axis.set_ylabel(panel.label)
-    _dress(axis, theme)
+    _dress(axis, theme, grid="major")
 
 
 def _legend(figure: Any, marks: Sequence[Mark], theme: Theme) -> None:
@@ -311,14 +292,14 @@ def _legend(figure: Any, marks: Sequence[Mark], theme: Theme) -> None:
         if key in here[1]
     ]
     shown.append(Line2D([], [], color=theme.text, linewidth=1.1, alpha=0.7, label="Pareto front"))
-    legend = figure.legend(handles=shown, frameon=False, fontsize=8, ncols=5, loc="outside lower center")
-    for text in legend.get_texts():
-        text.set_color(theme.text)
+    form = {"frameon": False, "fontsize": 8, "labelcolor": theme.text}
+    figure.legend(handles=shown, ncols=5, loc="outside lower center", **form)
 
 
-def _dress(axis: Any, theme: Theme) -> None:
-    """Give an axis the theme's colours and a grid."""
-    axis.grid(visible=True, which="major", color=theme.text, alpha=0.15, linewidth=0.6)
+def _dress(axis: Any, theme: Theme, grid: str = "") -> None:
+    """Give an axis the theme's colours, and a grid at some of its ticks."""
+    if grid:
+        axis.grid(visible=True, which=grid, color=theme.text, alpha=0.15, linewidth=0.6)
     axis.tick_params(which="both", colors=theme.text)
     axis.xaxis.label.set_color(theme.text)
     axis.yaxis.label.set_color(theme.text)
@@ -326,14 +307,13 @@ def _dress(axis: Any, theme: Theme) -> None:
         spine.set_color(theme.text)
 
 
-def _figure(theme: Theme, inches: tuple[float, float]) -> tuple[Any, Any]:
-    """Return a transparent figure and its axes."""
+def _figure(theme: Theme, inches: tuple[float, float], panels: int = 1) -> tuple[Any, ...]:
+    """Return a figure and its transparent axes, one above the other."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=inches, dpi=DOTS_PER_INCH, layout="constrained", facecolor=theme.page)
-    axis = figure.add_subplot(facecolor="none")
-    axis.title.set_color(theme.text)
-    return figure, axis
+    form = {"facecolor": "none"}
+    return figure, *figure.subplots(panels, sharex=True, squeeze=False, subplot_kw=form)[:, 0]
 
 
 def _png(figure: Any) -> bytes:

@@ -320,14 +320,14 @@ def _render(
 ) -> None:
     """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
     from ...kernels.run.before import carry_out
-    from ...kernels.run.render_frame import renderer
+    from ...kernels.run.render_frame import shares_work
     from ...models.data.frame_plan import KINDS
     from ...refimpl.frame import Frame
 
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
-        alone = total < LEAST_SAMPLES or renderer(request.executor).shares_work
+        alone = total < LEAST_SAMPLES or shares_work(request.executor)
         workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return

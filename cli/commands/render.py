@@ -95,11 +95,11 @@ def render(
 
 def _tracer(executor: str, workers: int | None, dtype: FloatType) -> str:
     """Return the executor that traces the paths; reject one that shares the work by itself."""
-    from ...kernels.run.render_frame import renderer
+    from ...kernels.run.render_frame import shares_work
 
     because = "kernels compute in float32" if dtype == "float64" else ""
     name = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
-    if workers is not None and renderer(name).shares_work:
+    if workers is not None and shares_work(name):
         rule = f"{name} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
     return name

@@ -21,14 +21,11 @@ from ...refimpl.light.history import History
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from .follow_on import follow_on
-from .render_frame import Progress, device_of, render_frame
+from .render_frame import REFERENCE, Progress, device_of, render_frame
 from .render_on import Frames
 
 PER_S = 24.0
 """Pictures per second before a frame of a data set."""
-
-REFERENCE = "numpy"
-"""The executor whose histories are those of the definition itself."""
 
 
 def wants(features: Collection[str]) -> bool:

@@ -45,7 +45,7 @@ from wamnet.kernels.devices.executor import Executor, Part
 from wamnet.kernels.export.check import digest_of
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.kernels.run.follow_on import follow_on
-from wamnet.kernels.run.render_on import compile_scene, render_on
+from wamnet.kernels.run.render_on import frames_of, render_on
 from wamnet.kernels.run.trainer import train_on
 from wamnet.models.model_file import load_model
 from wamnet.refimpl.frame import Frame
@@ -128,7 +128,7 @@ def denoised(device: Executor, name: str, variant: str, schedule: str) -> Array:
 def traced(device: Executor, scene: str) -> Array:
     """Return the sums over two paths per pixel of a scene."""
     job = Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=3))
-    kernel = compile_scene(device, canonical(scene, time=TIME), job)
+    kernel = frames_of(canonical(scene, time=TIME)).of(device, canonical(scene, time=TIME), job).kernel
     return device.trace(kernel, Part(WIDTH, HEIGHT, 0, HEIGHT, 0, 2, SEED))
 
 
@@ -261,7 +261,7 @@ def timed(devices: Callable[[str], Executor]) -> Iterator[tuple[str, Callable[[]
         inputs = images_of(vary(parse(variant), model).model, frame)
         yield f"{backend} {schedule} {variant}", lambda d=device, k=kernel, g=inputs: one(d.run(k, g))
     device = devices("opencl")
-    kernel, part = compile_scene(device, scene, job), Part(SIZE, SIZE, 0, SIZE, 0, 1, SEED)
+    kernel, part = frames_of(scene).of(device, scene, job).kernel, Part(SIZE, SIZE, 0, SIZE, 0, 1, SEED)
     yield f"opencl path, {device.lanes} lanes", lambda: one(device.trace(kernel, part))
     pairs = [(frame, frame)]
     yield "opencl training step", lambda: train_on(device, TRAINED, pairs).step

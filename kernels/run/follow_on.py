@@ -31,7 +31,7 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
 from ..devices.executor import Executor
 from ..devices.planes import followed
-from .render_on import Frames, sums_of
+from .render_on import Frames, frames_of, sums_of
 
 END = ("last_surface", "last_point", "last_normal", "last_direction")
 """Groups of planes of a path's end, which is its first surface where nothing scatters."""
@@ -71,7 +71,7 @@ def first_hits_on(executor: Executor, scene: Scene, job: Job, frames: Frames | N
     unscattered = replace(job.settings, max_depth=0)
     plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False)
     plain = replace(plain, shadow_rays=0, settings=unscattered)
-    moment = (frames or Frames([scene])).of(executor, scene, plain, groups=END)
+    moment = (frames or frames_of(scene)).of(executor, scene, plain, groups=END)
     sums = sums_of(executor, moment, plain)
     found = dict(zip(planes(END), sums, strict=True))
     point, normal, direction = (

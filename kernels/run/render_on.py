@@ -1,7 +1,7 @@
 """Render a scene on an executor: trace, compile, follow the paths part by part, and add up.
 
-1. The scene's programs become a kernel for the executor's schedule [`compile_scene`]; scenes that are known
-   to come share one, if they differ only in numbers [`Frames`].
+1. The scene's programs become a kernel for the executor's schedule; scenes that are known to come share one,
+   if they differ only in numbers [`Frames`].
 2. A kernel adds up at most [`SAMPLES_AT_ONCE`] samples in float32; parts hold about [`PATHS_AT_ONCE`] paths,
    so that progress is seen and no driver takes a kernel for hanging.
 3. Sums of parts are added in float64, squared deviations by the formula of Chan, Golub and LeVeque,
@@ -37,7 +37,6 @@ from ...refimpl.light.render import (
     with_own_features,
 )
 from ...refimpl.light.scene import Scene
-from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor
 from ..devices.kernel import Part
 from ..memory import keep_freed_memory
@@ -52,28 +51,6 @@ PATHS_AT_ONCE = 1 << 20
 
 KEPT_SCENES = 8
 """Compiled scenes that a process keeps: bands of one picture, and noisy picture and target, share theirs."""
-
-
-def compile_scene(executor: Executor, scene: Scene, job: Job, profile: str = "ieee") -> PathArtifact:
-    """Return the kernel that renders a scene on an executor."""
-    chosen = executor.name, profile, executor.lanes, groups_of(job), job.shadow_rays
-    return _compiled(scene, job.settings, *chosen)
-
-
-@lru_cache(KEPT_SCENES)
-def _compiled(
-    scene: Scene,
-    settings: Settings,
-    target: str,
-    profile: str,
-    lanes: int,
-    groups: tuple[str, ...],
-    shadow_rays: int,
-) -> PathArtifact:
-    """Return the kernel; it depends on nothing else."""
-    seen = not set(groups).isdisjoint(SEEN)
-    programs = lower_scene(scene, settings, forms_of(target), seen=seen, shadow_rays=shadow_rays)
-    return compile_path(programs, target, profile, lanes, groups)
 
 
 def groups_of(job: Job) -> tuple[str, ...]:
@@ -111,6 +88,12 @@ class Frames:
         return self._paths[key].of(scene)
 
 
+@lru_cache(KEPT_SCENES)
+def frames_of(scene: Scene) -> Frames:
+    """Return the kernels of a scene's frames, which a process keeps."""
+    return Frames([scene])
+
+
 def render_on(
     executor: Executor,
     scene: Scene,
@@ -138,38 +121,35 @@ def render_on(
         color = again(replace(job, seen=False, shadow_rays=0), on_progress=on_progress)
         return joined(scene, job, color, again(replace(job, color=False)))
     first, last = checked_rows(job, rows)
-    if moment is None and frames is not None:
-        moment = frames.of(executor, scene, job, profile)
-    kernel = compile_scene(executor, scene, job, profile) if moment is None else moment.kernel
-    if kernel.programs.rays:
+    moment = moment or (frames or frames_of(scene)).of(executor, scene, job, profile)
+    if moment.kernel.programs.rays:
         rule = "has separate feature rays, and a render's kernel sums features over the samples"
         raise InputError("kernel", NO_VALUE, rule, "render with frames=, or without either")
-    numbers = None if moment is None else moment.numbers
-    totals = _totals(executor, kernel, numbers, job, (first, last), on_progress)
-    return _render(kernel, totals, job.layers, render_info(scene, job))
+    totals = _totals(executor, moment, job, (first, last), on_progress)
+    return _render(moment.kernel, totals, job.layers, render_info(scene, job))
 
 
 def sums_of(executor: Executor, moment: Moment, job: Job) -> NDArray[np.float64]:
     """Return the sums (planes, H, W) of a scene's kernel over a job's samples, in its order of planes."""
-    return _totals(executor, moment.kernel, moment.numbers, job, (0, job.height), None).planes
+    return _totals(executor, moment, job, (0, job.height), None).planes
 
 
 def _totals(
     executor: Executor,
-    kernel: PathArtifact,
-    numbers: NDArray[np.float32] | None,
+    moment: Moment,
     job: Job,
     band: tuple[int, int],
     on_progress: Callable[[int], None] | None,
 ) -> Totals:
-    """Return the sums of a kernel over a job's samples, in a band of rows."""
+    """Return the sums of a scene's kernel over a job's samples, in a band of rows."""
+    kernel = moment.kernel
     executor.build(kernel)
     keep_freed_memory()
     totals = Totals(0, np.zeros((len(kernel.planes), band[1] - band[0], job.width)))
     for parts in sample_ranges(job, band):
         sums = []
         for part in parts:
-            sums.append(executor.trace(kernel, part, numbers))
+            sums.append(executor.trace(kernel, part, moment.numbers))
             if on_progress is not None:
                 on_progress(part.rows * part.width * part.samples)
         joined_sums = np.concatenate(sums, axis=1, dtype=np.float64)

@@ -13,7 +13,7 @@ from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import target_named
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.run.render_on import compile_scene, render_on
+from wamnet.kernels.run.render_on import frames_of, render_on
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.light import render as R
@@ -110,7 +110,9 @@ WIDER = (r"defined(__AVX512F__)", r"defined(__AVX2__)", r"defined(__SSE2__) || d
 def test_c_has_the_same_bits_in_vectors_of_any_width(executor_named, name):
     """PTK-9: 16, 8, 4 paths at once, or one, in the middle of an image and at the end of a row."""
     executor, part = executor_named("c"), Part(21, 9, 1, 7, 0, 2, 3)
-    kernel = compile_scene(executor, scene(name), R.Job(21, 9, 2, 3, Settings(max_depth=3)))
+    kernel = (
+        frames_of(scene(name)).of(executor, scene(name), R.Job(21, 9, 2, 3, Settings(max_depth=3))).kernel
+    )
     found, source = [executor.trace(kernel, part)], kernel.source
     for count, feature in enumerate(WIDER):
         assert feature in source
@@ -175,7 +177,7 @@ def test_kernel_in_another_language_is_refused(executor):
 @pytest.mark.parametrize("name", DEVICES)
 def test_source_that_does_not_compile_is_told_with_the_log(executor_named, name):
     executor = executor_named(name)
-    kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
+    kernel = frames_of(scene("empty")).of(executor, scene("empty"), R.Job(1, 1)).kernel
     source = kernel.source.replace("int n = 0", "int n = nonsense", 1)
     broken = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "broken"})
     with pytest.raises(CompileError, match=r"(?s)cannot build the kernel: .*nonsense"):
@@ -184,7 +186,7 @@ def test_source_that_does_not_compile_is_told_with_the_log(executor_named, name)
 
 def test_too_wide_an_image_is_refused(executor_named):
     executor = executor_named("opengl-egl")
-    kernel = compile_scene(executor, scene("empty"), R.Job(1, 1))
+    kernel = frames_of(scene("empty")).of(executor, scene("empty"), R.Job(1, 1)).kernel
     with pytest.raises(InputError, match="texture for 'sums' '100000 x 1 with 4 channels': this OpenGL"):
         executor.trace(kernel, Part(100000, 1, 0, 1, 0, 1, 0))
 

@@ -17,7 +17,7 @@ from wamnet.compiler.scenes.forms import list_cost, row_cost
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.run.render_on import compile_scene, render_on
+from wamnet.kernels.run.render_on import frames_of, render_on
 from wamnet.refimpl import vectors
 from wamnet.refimpl.light import intersection
 from wamnet.refimpl.light import render as R
@@ -110,7 +110,7 @@ def shown(executor, scene, trips):
     in test_paths.py.
     """
     job = R.Job(24, 16, 1, 3, SETTINGS)
-    kernel = compile_scene(executor, scene, job)
+    kernel = frames_of(scene).of(executor, scene, job).kernel
     if executor.name == "numpy":
         # Two numbers are carried to the next surface, one by shadow rays.
         found = [int(n) for n in re.findall(r"trips=(\d+)}", kernel.source)]

@@ -29,6 +29,7 @@ from ..kernel.instructions import (
     WGSL_GROUP,
     gnu_vectors,
 )
+from ..kernel.interface import ITEMS
 
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
 """What becomes a blank."""
@@ -146,7 +147,7 @@ result = vec4(0.0, 0.0, 0.0, 1.0);
 """
 """A fragment shader behind its first lines."""
 
-ITEMS = (
+PLACES = (
     ("int(gl_GlobalInvocationID.x)", "int(gl_GlobalInvocationID.y)"),
     ("int(gl_LocalInvocationID.x)", "int(gl_LocalInvocationID.y)"),
     ("int(gl_WorkGroupID.x)", "int(gl_WorkGroupID.y)"),
@@ -159,18 +160,23 @@ SIZE = "int width = textureSize(@first@, 0).x;\nint height = textureSize(@same_f
 EXTENSION = "\n".join(VULKAN_EXTENSION)
 """Products of bytes in Vulkan GLSL."""
 
-LAUNCH = re.compile(
-    r"""#(?:if|elif) STAGE == (?P<number>\d+)
+STAGE = r"""#(?:if|elif) STAGE == (?P<number>\d+)
 void main\(\)
-\{
-int width = imageSize\(result\)\.x;
-int height = imageSize\(result\)\.y;
-int (?P<column>tile) = int\(gl_GlobalInvocationID\.x\);
-int (?P<row>line) = int\(gl_WorkGroupID\.y\);
-(?P<body>(?:[^#\n][^\n]*\n)*?)\}
+\{{
+{}int (?P<column>tile) = int\(gl_GlobalInvocationID\.x\);
+int (?P<row>line) = int\({}\.y\);
+(?P<body>(?:[^#\n][^\n]*\n)*?)\}}
 (?=#|\Z)"""
-)
-"""A launch of passes, each a program that is compiled by its number."""
+"""A launch of passes, each a program that is compiled by its number: the image's size, and an item's row."""
+
+SIZES = r"int width = imageSize\(result\)\.x;" "\n" r"int height = imageSize\(result\)\.y;" "\n"
+"""The image's size in launches whose images are textures."""
+
+LAUNCHES = {
+    True: re.compile(STAGE.format(SIZES, "gl_WorkGroupID")),
+    False: re.compile(STAGE.format("", "gl_GlobalInvocationID")),
+}
+"""The launches of languages whose images are textures, and of others."""
 
 FRAMES: dict[str, str] = {
     "c": f"""
@@ -355,7 +361,7 @@ layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
 shared @shared@ tile[TILE_NUMBERS];
 void main()
 {{
-{begun(*ITEMS, SIZE)}
+{begun(*PLACES, SIZE)}
 @body@
 }}
 @|@@bounded@
@@ -383,7 +389,7 @@ precision highp sampler2D;
 {FRAGMENT}
 """,
     "glsl-vulkan": f"""
-#version 450
+@<@#version 450
 #define PRECISE precise
 @(@{EXTENSION}
 @)@
@@ -405,9 +411,28 @@ layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
 @)@
 void main()
 {{
-{begun(*ITEMS)}
+{begun(*PLACES)}
 @body@
 }}
+@|@
+#version 450
+#define PRECISE precise
+@constants@
+@functions@
+layout(local_size_x = {ITEMS}, local_size_y = 1) in;
+layout(std140, binding = 0) uniform Size {{
+int width;
+int height;
+int first_tile;
+int tile_count;
+}};
+layout(std430, binding = 1) restrict readonly buffer Weights {{ @vector@ w[]; }};
+layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
+@each layout(std430, binding = NUMBER) restrict readonly buffer BLOCK {{ float IMAGE[]; }};@
+@memory@
+@launches@
+#endif
+@>@
 """,
     "wgsl": f"""
 @(@requires packed_4x8_integer_dot_product;

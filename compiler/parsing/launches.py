@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from ..kernel.kernel import BATCH, FLOAT, INT, Array, Expr, Launch, Statement, const, name
-from .frames import LAUNCH
+from .frames import LAUNCHES
 from .grammar import NAME
 from .reader import Passes, Unread
 
@@ -18,11 +18,13 @@ def launches(parser: Any) -> list[Statement]:
         return found
     programs_of, memory = parser.passes
     keys = re.findall(r"vec2 (\w+)\[\]", parser.parts["memory"])
-    lines = (
-        f"layout(std430, binding = {number + 1}) restrict buffer {key}_buffer {{ vec2 {key}[]; }};\n"
-        for number, key in enumerate(keys)
-    )
-    programs = list(LAUNCH.finditer(text))
+    textures = parser.language.texels
+    first = 1 if textures else 3 + len(parser.parts["images"].splitlines())
+    lines = []
+    for number, key in enumerate(keys, first):
+        block = f"{key}_buffer" if textures else key.capitalize()
+        lines.append(f"layout(std430, binding = {number}) restrict buffer {block} {{ vec2 {key}[]; }};\n")
+    programs = list(LAUNCHES[textures].finditer(text))
     numbers = [int(each["number"]) for each in programs]
     named = keys == sorted(memory) and "".join(lines) == parser.parts["memory"]
     if not named or "".join(each[0] for each in programs) != text:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import read_file
-from ..kernel.interface import IMAGE, RESULT, WEIGHTS
-from ..kernel.kernel import Array, Kernel, Store, name, parts, values, walk
+from ..kernel.interface import IMAGE, ITEMS, RESULT, WEIGHTS
+from ..kernel.kernel import Array, Kernel, Store, parts, values, walk
 from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
@@ -39,7 +39,8 @@ KEYS = {
     "output": "name channels encoding",
     "bound": "output against",
     "profile": "name text",
-    "schedule": "name idea pixels rows group shared_bytes weights_a_texel asked reason launches memory items",
+    "schedule": "name idea pixels rows group shared_bytes weights_a_texel asked reason "
+    "launches memory items entries arrays",
     "weights": "count layout order folder",
 }
 """All that a manifest, and each of its parts, may state."""
@@ -125,8 +126,8 @@ def passes_of(schedule: Any) -> Passes | None:
     launches = [(each["tiles"], each["lines"]) for each in schedule["launches"]]
     memory = dict(schedule["memory"])
     counts = [n for pair in launches for n in pair] + [*memory.values()]
-    known = all({*each} == {"tiles", "lines", "entry", "arrays"} for each in schedule["launches"])
-    if not all(type(n) is int and n > 0 for n in (*counts, schedule["items"])) or not known:
+    known = all({*each} == {"tiles", "lines"} for each in schedule["launches"])
+    if not known or not all(type(n) is int and n > 0 for n in counts):
         raise Wrong("its manifest has launches, or memory, of no size")
     if {of for of, _ in launches} - {1, max(of for of, _ in launches)}:
         raise Wrong("its manifest has launches of several numbers of tiles")
@@ -145,13 +146,14 @@ def check_manifest(manifest: Any, program: str, tiles: bool) -> None:
     items = [schedule.get("pixels", 1), schedule.get("rows", 1), *schedule.get("group", (1, 1))]
     if own != found or len(items) != 4 or not all(type(n) is int and n > 0 for n in items):
         raise Wrong("its manifest has other images, another window or other work items than its program")
-    name, (family, _, pixels) = schedule["name"], schedule["name"].partition(":")
+    target, name = manifest["target"], schedule["name"]
+    family, _, pixels = name.partition(":")
     right = (name == "plain") <= (items == [1] * 4) and name.startswith("group") == ("group" in schedule)
-    in_passes = {key in schedule for key in ("launches", "memory", "items")}
+    in_passes = {key in schedule for key in ("launches", "memory", "items", "entries", "arrays")}
     right = right and in_passes == {name.startswith("fftpasses")}
     if not right or (family == "group" and str(items[0]) != pixels):
         raise Wrong(f"its manifest has other work items than schedule {name}")
-    title = "GLSL 4.30" if "launches" in schedule else TITLES[manifest["target"]]
+    title = "GLSL 4.30" if "launches" in schedule and target == "opengl" else TITLES[target]
     if not manifest["language"].startswith(title):
         raise Wrong(f"its manifest has language {manifest['language']!r} for target {manifest['target']}")
     if items[1] != 1 and not tiles:
@@ -249,14 +251,15 @@ def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
     group, size = schedule.get("group"), kernel.group
     if (group and tuple(group)) != size:
         raise Wrong(f"its groups are not of {' x '.join(map(str, group or ['no']))} items")
-    for launch, facts in zip(kernel.launches, schedule.get("launches", ()), strict=True):
+    stated = [schedule.get(key, ()) for key in ("arrays", "entries")]
+    for launch, arrays, entry in zip(kernel.launches, *stated, strict=True):
         every = walk(launch.body)
         used = {s.array for s in every if isinstance(s, Store)}
         used |= {e.value for s in every for v in values(s) for e in parts(v) if e.op == "load"}
         used -= {s.name for s in every if isinstance(s, Array)}
-        if used != {*facts["arrays"]} or facts["entry"] != manifest["entry_point"]:
+        if used != {*arrays} or entry != manifest["entry_point"]:
             raise Wrong("its launches have other arrays, or entry points, than its manifest says")
-    if kernel.launches and integer(kernel, name("ITEMS")) != schedule["items"]:
+    if kernel.launches and schedule["items"] != ITEMS:
         raise Wrong("its launches have groups of another size than its manifest says")
     steps = tuple(integer(kernel, each) for each in kernel.step)
     if steps != (claim.pixels, claim.rows):

@@ -16,6 +16,7 @@ GROUPS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group",))
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
     **GROUPS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "opengl": ("fftpasses",),
+    "glsl-vulkan": ("group", "fftpasses"),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 

@@ -13,6 +13,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.glsl import GLSLCompute
+from wamnet.compiler.languages.glsl_buffers import Vulkan
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.proof import checker, spectra_checker
 from wamnet.compiler.proof.evidence import Refused
@@ -39,12 +40,14 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
     tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
-    if target == "opengl":
-        tiny = FourierPasses("fftpasses:8", "small tiles", GLSLCompute(), points, "plain")
-    whole = targets.DENOISERS[target]
+    if target in ("opengl", "glsl-vulkan"):
+        words = GLSLCompute() if target == "opengl" else Vulkan()
+        tiny = FourierPasses("fftpasses:8", "small tiles", words, points, "plain")
+    where = targets.DENOISERS if target in targets.DENOISERS else targets.EXPORTED
+    whole = where[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedules, "COST", 0.0)
-        patch.setitem(targets.DENOISERS, target, replace(whole, schedules=(*whole.schedules, tiny)))
+        patch.setitem(where, target, replace(whole, schedules=(*whole.schedules, tiny)))
         made = compile_program(lower(model(**kwargs)), target, schedule=tiny.name)
     assert made.manifest["schedule"]["name"] == tiny.name
     artifact.write(made, folder)
@@ -265,9 +268,14 @@ def opengl(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("opengl"), "opengl"))
 
 
-def test_texts_of_passes_compute_what_is_certified(opengl):
+def test_texts_of_passes_compute_what_is_certified(opengl, tmp_path):
     """TXT-12: one tile, of all images' pixels at its border."""
     assert run_text(*opengl)["sums"] == 3 * 36
+    vulkan = parts(kernel(tmp_path, "glsl-vulkan", border="clamp", neurons=18))
+    assert run_text(*vulkan)["sums"] == 3 * 36
+    for old, new in (("+ line - WINDOW_CENTRE", "+ line"), ("* 3 + 1] = ", "* 3 + 2] = ")):
+        with pytest.raises(Refused, match=r"not the program's|without a result"):
+            run_text(*changed(vulkan, old, new))
 
 
 @pytest.mark.nightly(but=[f"opengl: {w}" for w, ts, *_ in spectra_classes.CLASSES[::5] if "opengl" in ts])
@@ -297,21 +305,12 @@ def test_hosts_of_less_memory_are_refused(array, opengl):
 
 
 @pytest.mark.parametrize(
-    ("number", "key", "value"),
-    [
-        (1, "entry", "main_1"),
-        (1, "arrays", ["columns"]),
-        (1, "arrays", ["back", "columns"]),
-        (None, "items", 16),
-    ],
+    ("key", "value"),
+    [("entries", "main_1"), ("arrays", ["columns"]), ("arrays", ["back", "columns"]), ("items", 16)],
 )
-def test_hosts_of_other_facts_are_refused(number, key, value, opengl):
+def test_hosts_of_other_facts_are_refused(key, value, opengl):
     source, held, manifest, weights = opengl
-    schedule = {**manifest["schedule"]}
-    if number is None:
-        schedule[key] = value
-    else:
-        schedule["launches"] = [dict(each) for each in schedule["launches"]]
-        schedule["launches"][number][key] = value
+    stated = manifest["schedule"][key]
+    changed = value if key == "items" else [stated[0], value, *stated[2:]]
     with pytest.raises(Refused, match="than its manifest says"):
-        run_text(source, held, {**manifest, "schedule": schedule}, weights)
+        run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], key: changed}}, weights)

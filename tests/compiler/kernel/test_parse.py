@@ -106,9 +106,9 @@ SCHEDULES = [
     for target in (*DENOISERS.values(), *EXPORTED.values())
     if target.name in GRAMMARS
     for schedule in target.schedules
-    if schedule.name != "fftpasses:32" or target.name == "opengl"
+    if target.name in ("opengl", "glsl-vulkan", "glsl-compute") or schedule.name != "fftpasses:32"
 ]
-"""All schedules of all languages that are read: of several launches those of OpenGL's textures."""
+"""All schedules of all languages that are read: of launches those of GLSL."""
 
 
 def emitted(target, schedule, border="clamp"):

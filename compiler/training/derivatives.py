@@ -71,10 +71,8 @@ ZERO = splat(const(0.0), LANES)
 RUNNING = load("failed", 0, kind=INT) < 0
 """Whether all losses so far were finite."""
 
-GROUPS, GROUP, E, J, K, N, DY = map(name, ("groups", "group", "e", "j", "k", "n", "dy"))
-BATCH, BEGIN, FIRST, LAST, COUNT, OWN, SUM = map(
-    name, ("BATCH", "begin", "first", "last", "count", "own", "sum")
-)
+BATCH, GROUPS, GROUP, E, J, K, N, DY = map(name, ("BATCH", "groups", "group", "e", "j", "k", "n", "dy"))
+BEGIN, FIRST, LAST, COUNT, OWN, SUM = map(name, ("begin", "first", "last", "count", "own", "sum"))
 
 
 class _Rows(NamedTuple):
@@ -94,9 +92,7 @@ class Derivatives(Nest):
         super().__init__(step.program, {}, LANES)
         self.step, self.size, self.vectors = step, size, 0
         self.outputs = dict(self.program.outputs)
-        (self.gathered,) = (
-            i for i, n in enumerate(self.program.nodes) if n.op == "input" and n["name"] == WINDOW
-        )
+        self.gathered = next(i for i, n in enumerate(self.program.nodes) if n.get("name") == WINDOW)
         self.arrays: dict[int, int] = {}
         for index, node in enumerate(self.program.nodes):
             vector = OPS[node.op].elementwise and node.type.shape
@@ -192,8 +188,7 @@ class Derivatives(Nest):
                 lines += [let, *self.kept(each, E, J, name(let.name, let.value.type))]
             lines = [self.span(group), loop("e", name("filled"), loop("j", self.width(index), *lines))]
         elif node["name"] == TARGET:
-            (count,) = node.type.shape
-            i = name("i")
+            (count,), i = node.type.shape, name("i")
             target = load("target", E, kind=INT) * count + apply("minimum", i, const(count - 1))
             value = apply("select", i < count, load("targets", target), const(0.0))
             copy = Store("scratch", (self.place(index, E, 0) * LANES + i,), value)

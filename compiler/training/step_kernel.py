@@ -51,10 +51,8 @@ def compile_step(
 
     With a `rank` the factors of the first layer are what is trained.
     """
-    step = lower_step(widths, *omegas, batch, activation)
-    if rank:
-        step = replace(step, split=Split(FIRST, size, rank))
-    return compile_lowered(step, size)
+    split = Split(FIRST, size, rank) if rank else None
+    return compile_lowered(replace(lower_step(widths, *omegas, batch, activation), split=split), size)
 
 
 def compile_lowered(step: Step, size: int) -> StepKernel:
@@ -75,8 +73,7 @@ def step_kernel(step: Step, size: int) -> Kernel:
     copies = max((slot.end for slot in transposed_slots(step).values()), default=1)
     count, end = slots(step)[SQUARES].offset, slots(step)[SQUARES].end
     integers = {"BATCH": step.batch, "COUNT": count, "SUMS": end, "SCRATCH": first.vectors}
-    slopes, expand = factors(step)[:2], factors(step)[2:]
-    launches = first.launch(), *slopes, loss(step), update(step), *expand
+    launches = first.launch(), *factors(step)[:2], loss(step), update(step), *factors(step)[2:]
     arrays = (
         Array("values", READ, ("values",)),
         Array("targets", READ, ("targets",)),

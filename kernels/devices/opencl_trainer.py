@@ -62,10 +62,9 @@ class OpenCLTrainer:
         for array in shared:
             count = math.prod(self._groups if n == "groups" else int(n) for n in array.shape)
             sizes[array.name] = 4 * array.lanes * count
-        state = sizes.pop("moved")
-        self._states = [self._empty(state) for _ in range(2)]
+        self._states = [self._empty(sizes["moved"]) for _ in range(2)]
         self._arrays = {"values": self._upload(values), "targets": self._upload(targets)}
-        self._arrays |= {name: self._empty(size) for name, size in sizes.items()}
+        self._arrays |= {name: self._empty(size) for name, size in sizes.items() if name != "moved"}
         self._launches = [self._launch(program, kernel.kernel, each) for each in kernel.kernel.launches]
         # The block in the queue: its first step, its losses, the minibatches of the steps put there so far.
         self._block: tuple[int, Any, list[Any]] = (0, self._empty(4), [])

@@ -392,7 +392,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
             kernel = compile_plan(plan)
             device.build(kernel, size)
             ways |= _ways(device, model, kernel, frame, row)
-        found = in_turns({name: _done(way) for name, way in ways.items()}, rounds)
+        found = in_turns(ways, rounds)
     values = {name: list(times.seconds) for name, times in found.items()}
     kept.put("times", 0, {"device": device.device, "schedule": plan.asked, "seconds": values})
 
@@ -404,15 +404,6 @@ def _ways(device: Executor, model: Model, kernel: Artifact, frame: Frame, row: s
         row: lambda: device.run(kernel, images_on(device, model, frame)),
         f"{row}, encoded features given": lambda: device.run(kernel, images),
     }
-
-
-def _done(way: Callable[[], Any]) -> Callable[[], None]:
-    """Return a way that returns nothing: what it returned would be taken for a time."""
-
-    def run() -> None:
-        way()
-
-    return run
 
 
 SPLITS = {TEST: "inside the training range", OUTSIDE: "outside it"}

@@ -21,8 +21,8 @@ PAUSE_S = 0.3
 """Seconds before a measurement: threads of OpenMP and OpenBLAS spin for a while after their last work."""
 
 Clock = Callable[[], float]
-Round = Callable[[int], float | None]
-"""The work of a round by its number, 0 for one that is not measured; a number is the seconds by itself."""
+Round = Callable[[int], Any]
+"""The work of a round by its number, 0 for one that is not measured; a float is the seconds by itself."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Entry:
         assert self.round is not None
         start = clock()
         own = self.round(number)
-        self.seconds.append(clock() - start if own is None else own)
+        self.seconds.append(own if isinstance(own, float) else clock() - start)
 
 
 @contextmanager
@@ -121,13 +121,13 @@ def take_turns(
 
 
 def in_turns(
-    ways: Mapping[str, Callable[[], float | None]],
+    ways: Mapping[str, Callable[[], Any]],
     repeats: int,
     warm: int = 1,
     pause_s: float = PAUSE_S,
     clock: Clock = time.perf_counter,
 ) -> dict[str, Times]:
-    """Return the times of each way; a way that returns a number has measured itself, in seconds."""
+    """Return the times of each way; a way that returns a float has measured itself, in seconds."""
     for _ in range(warm):
         for way in ways.values():
             way()

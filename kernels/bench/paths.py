@@ -160,7 +160,7 @@ def forms(executor: Executor | None, name: str, scene: Scene, part: Part) -> lis
             "build_s": time.perf_counter() - traced,
         }
         entry = Entry(form, facts={**facts, "chosen": artifact.source == chosen})
-        entry.round = partial(_follow, partial(executor.trace, artifact, part))
+        entry.round = lambda _number, artifact=artifact: executor.trace(artifact, part)
         found.setdefault(artifact.source, entry)
     return [*found.values()]
 
@@ -177,12 +177,7 @@ def _peer_s(name: str, scene: Scene, part: Part) -> Entry:
         "build_s": time.perf_counter() - traced,
         "chosen": False,
     }
-    return Entry(ABOUT[name], facts=facts, round=partial(_follow, follow))
-
-
-def _follow(work: Callable[[], Any], _number: int) -> None:
-    """Follow the paths of a picture, which is dropped."""
-    work()
+    return Entry(ABOUT[name], facts=facts, round=lambda _number: follow())
 
 
 def _compiled(executor: Executor, scene: Scene, forms: Forms) -> PathArtifact:

@@ -8,7 +8,7 @@
 4. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
    [`first_pictures`]; a process that finds empty caches compiles everything [fresh.py].
 
-The network has random weights: speed does not depend on them [`random_model`].
+The network has random weights: speed does not depend on them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
 from ..run.tune import choose
-from .workload import paper_model
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -53,7 +52,8 @@ MOVING = "one pipeline, moving"
 PEERS = ("mitsuba", "cycles")
 """Other makers of whole pictures [`peers.Table.makers`]."""
 
-Ways = Mapping[str, Callable[[], float | None]]
+Ways = Mapping[str, Callable[[], Any]]
+"""What is measured, by name; a float that is returned is the seconds."""
 
 
 class Maker(Protocol):
@@ -78,22 +78,9 @@ def moments(name: str) -> list[Scene]:
     return [source.at(STEP_S * (moment + 0.5)) for moment in range(MOMENTS)]
 
 
-def random_model(features: Sequence[str], size: int, hidden: Sequence[int]) -> Model:
-    """Return a model with random weights for these features, windows of `size` pixels and hidden layers."""
-    return paper_model(features, size, hidden, depth_scale=20.0, position_scale=10.0)
-
-
-def entries(by: str, ways: Mapping[str, Callable[[], Any]]) -> list[Entry]:
-    """Return what is measured of a maker of pictures; a number that is returned is seconds."""
-
-    def opened(way: Callable[[], Any]) -> Callable[[int], float | None]:
-        def work(_number: int) -> float | None:
-            own = way()
-            return own if isinstance(own, float) else None
-
-        return work
-
-    return [Entry(name, partial(opened, way), by) for name, way in ways.items()]
+def entries(by: str, ways: Ways) -> list[Entry]:
+    """Return what is measured of a maker of pictures."""
+    return [Entry(name, lambda way=way: lambda _number: way(), by) for name, way in ways.items()]  # type: ignore[misc]
 
 
 def ways_of(

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -24,15 +23,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.core.ir import Gather, Image, Program, Type
 from ...compiler.core.trace import trace
 from ...refimpl import rng
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor
-from ..devices.images import Images
 from ..measure import Round, Times, in_turns
+from ..run.tune import noise
 from .cost import FLOAT_BYTES, Rates, products_of, sines_of
 
 MATRIX = 4096
@@ -144,24 +142,20 @@ def probes() -> Mapping[str, Program]:
     return {"small": _probe(2, 0), "window": _probe(6, 0), "sines": _probe(2, PROBE_SINES)}
 
 
-def probe_images(size: int) -> Images:
-    """Return the two images (size, size, 3) that the small programs read."""
-    ramp = np.linspace(0.0, 1.0, size * size * 3, dtype=np.float32).reshape(size, size, 3)
-    return {"a": ramp, "b": ramp[::-1].copy()}
-
-
 def probed(
     executor: Executor, schedule: str, pause_s: float, profile: str = "ieee"
 ) -> tuple[dict[str, Times], int]:
     """Return the times of the small programs by name, and the size of the picture on which they ran."""
     made = {name: compile_program(p, executor.name, profile, schedule) for name, p in probes().items()}
     for size in PROBE_PX:
-        images = probe_images(size)
+        images = noise(probes()["small"], (size, size))
         for artifact in made.values():
             executor.build(artifact, (size, size))
-        ways = {name: partial(_alone, executor, artifact, images) for name, artifact in made.items()}
-        least = min(ways["small"](), ways["small"]())
-        if least >= PROBE_S or size == PROBE_PX[-1]:
+        # Without copies, where the executor can tell.
+        alone = getattr(executor, "kernel_seconds", executor.run)
+        ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
+        small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
+        if min(small.seconds) >= PROBE_S or size == PROBE_PX[-1]:
             break
     return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
 
@@ -176,16 +170,6 @@ def rates_of(times: Mapping[str, Times], pixels: int, bytes_per_s: float) -> Rat
     sines = sines_of(programs["sines"]) / waited if waited > 0.0 else math.inf
     rest = per_pixel["small"] - products_of(programs["small"]) / products
     return Rates(products, sines, bytes_per_s, max(0.0, rest))
-
-
-def _alone(executor: Executor, artifact: Artifact, images: Images) -> float:
-    """Return the seconds of a built kernel: without copies, where the executor can tell."""
-    alone = getattr(executor, "kernel_seconds", None)
-    if alone:
-        return float(alone(artifact, images))
-    start = time.perf_counter()
-    executor.run(artifact, images)
-    return time.perf_counter() - start
 
 
 def _rate(count: float, seconds: float) -> float:

@@ -63,22 +63,6 @@ def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
         return Outcome(failure=_line(f"{type(error).__name__}: {error}"))
 
 
-class Inside:
-    """An executor in this process, as a runner."""
-
-    def __init__(self, way: str, executor: Executor) -> None:
-        self.way, self.target, self.device = way, executor.name, executor.device
-        self._executor = executor
-
-    def picked(self, size: tuple[int, int]) -> str:
-        """Return the name of the schedule that the executor picks for a size (height, width)."""
-        return self._executor.schedule_for(size)
-
-    def run(self, artifact: Artifact, images: Images) -> Outcome:
-        """Run a kernel on images (H, W, C)."""
-        return attempt(self._executor, artifact, images)
-
-
 class Apart:
     """An executor in a process of its own, as a runner; raises ExecutorUnavailable where it is missing."""
 

@@ -27,12 +27,11 @@ from ...refimpl.errors import CompileError, InputError
 from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
-from ...refimpl.rng import counter, random_block, uniform_floats
 from ..devices.executor import Executor
-from ..devices.images import Images
 from ..measure import in_turns
 from .curve import Curve, Point
 from .denoise_on import images_of
+from .tune import noise
 
 NAMES = (
     *("full", "sine9", "sine7", "sine5", "window10", "window8", "window6", "rank24", "rank16", "rank12"),
@@ -51,9 +50,6 @@ REPEATS = 5
 
 PAUSE_S = 0.05
 """Seconds before each run: no other library runs here whose threads would still spin."""
-
-NOISE_TAG = 0x4E4F4953
-"""Counter `block` of the words that become noise ("NOIS" in ASCII)."""
 
 Pairs = Sequence[tuple[Frame, Frame]]
 Done = Callable[[float], None]
@@ -90,9 +86,9 @@ def measure(
     """
     pictures = [denoise(model, noisy, np.float64) for noisy, _ in pairs]
     chosen = tuple(schedules) or promising(executor, model, profile)
-    numbers = noise(model, size)
+    numbers = noise(plan_model(model, executor.name, profile).analysed, size)
     points: dict[str, Point] = {}
-    ways: dict[str, Callable[[], None]] = {}
+    ways: dict[str, Callable[[], object]] = {}
     for name in names:
         varied = variants.vary(variants.parse(name), model)
         given = {feature: numbers[feature] for feature in varied.features}
@@ -102,38 +98,24 @@ def measure(
                 continue
             key = f"{name} {schedule}"
             points[key] = _untimed(executor, artifact, pairs, pictures)
-            ways[key] = partial(_run, executor, artifact, given)
+            ways[key] = partial(executor.run, artifact, given)
         on_done(1 / (len(names) + 1))
     times = in_turns(ways, repeats, pause_s=PAUSE_S)
     on_done(1 / (len(names) + 1))
-    timed = (_timed(points[key], 1e3 * found.median) for key, found in times.items())
+    timed = (replace(points[key], milliseconds=1e3 * found.median) for key, found in times.items())
     return Curve(variants.digest_of(model), executor.device, size, profile, tuple(timed))
 
 
 def promising(executor: Executor, model: Model, profile: str) -> tuple[str, ...]:
     """Return the schedules under which the full network is fastest on a small picture, the best first."""
-    images = noise(model, (TRIAL_PX, TRIAL_PX))
-    ways = {}
-    plan = plan_model(model, executor.name, profile)
+    ways, plan = {}, plan_model(model, executor.name, profile)
+    images = noise(plan.analysed, (TRIAL_PX, TRIAL_PX))
     for schedule in plan.target.schedules:
         artifact = _compiled(plan.scheduled(schedule.name))
         if artifact is not None:
-            ways[schedule.name] = partial(_run, executor, artifact, images)
+            ways[schedule.name] = partial(executor.run, artifact, images)
     times = in_turns(ways, repeats=3, pause_s=PAUSE_S)
     return tuple(sorted(times, key=lambda name: times[name].median)[:MOST_SCHEDULES])
-
-
-def noise(model: Model, size: tuple[int, int]) -> Images:
-    """Return images (H, W, C) of random numbers in the ranges of the model's features, by name."""
-    found = {}
-    for number, feature in enumerate(dataset.FEATURES[name] for name in model.features):
-        count = size[0] * size[1] * feature.channels
-        blocks = counter(np.arange((count + 3) // 4))
-        words = random_block(counter(1), blocks, counter(number), counter(NOISE_TAG))
-        drawn = uniform_floats(np.stack(words, axis=-1).reshape(-1)[:count], np.float32)
-        drawn = drawn.reshape(*size, feature.channels)
-        found[feature.name] = np.float32(feature.low) + np.float32(feature.high - feature.low) * drawn
-    return found
 
 
 def quality(
@@ -166,11 +148,6 @@ def _compiled(plan: Plan) -> Artifact | None:
     return artifact if artifact.manifest["schedule"]["name"] == plan.asked else None
 
 
-def _run(executor: Executor, artifact: Artifact, images: Images) -> None:
-    """Run a kernel once."""
-    executor.run(artifact, images)
-
-
 def _untimed(
     executor: Executor, artifact: Artifact, pairs: Pairs, full: Sequence[NDArray[np.floating]]
 ) -> Point:
@@ -182,8 +159,3 @@ def _untimed(
     found, bound = quality(pictures, full, targets), variants.bound_of(plan)
     most = math.nan if bound is None else float(bound.max())
     return Point(plan.varied.variant.name, plan.asked, executor.name, math.nan, *found, most)
-
-
-def _timed(point: Point, milliseconds: float) -> Point:
-    """Return a point with its time."""
-    return replace(point, milliseconds=milliseconds)

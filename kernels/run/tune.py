@@ -20,6 +20,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,7 +164,7 @@ def tune(
         del ready[name]
         note = f"about {trials[name] / least:.0f} times as slow in a trial"
         rows[name] = Row(name, None, rows[name].first_s, rows[name].again_s, note)
-    ways = {name: _way(executor, artifact, images) for name, artifact in ready.items()}
+    ways = {name: partial(executor.run, artifact, images) for name, artifact in ready.items()}
     for name, times in measure.in_turns(ways, repeats or REPEATS).items():
         rows[name] = Row(name, 1e3 * times.median, rows[name].first_s, rows[name].again_s)
     day = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
@@ -174,15 +175,6 @@ def tune(
 
 class WrongResult(Exception):
     """A kernel whose result on this device is not within its bound."""
-
-
-def _way(executor: Executor, artifact: Artifact, images: Images) -> Callable[[], None]:
-    """Return what runs an artifact once."""
-
-    def run() -> None:
-        executor.run(artifact, images)
-
-    return run
 
 
 def _built(executor: Executor, plan: Plan, size: tuple[int, int]) -> tuple[Row, Artifact]:
@@ -214,7 +206,7 @@ def _checked(executor: Executor, artifact: Artifact, crop: Images) -> None:
 
 def _trial(executor: Executor, artifact: Artifact, program: Program, size: tuple[int, int]) -> float:
     """Return the least seconds of a picture that is no larger than the whole."""
-    run = _way(executor, artifact, noise(program, (min(TRIAL, size[0]), min(TRIAL, size[1]))))
+    run = partial(executor.run, artifact, noise(program, (min(TRIAL, size[0]), min(TRIAL, size[1]))))
     return min(measure.in_turns({"trial": run}, 2, pause_s=0.0)["trial"].seconds)
 
 
@@ -225,9 +217,11 @@ def noise(program: Program, size: tuple[int, int]) -> Images:
     assert gather is not None, "lower gives a program with a window"
     for number, image in enumerate(gather.images):
         low, high = np.float32(image.low), np.float32(image.high)
-        place = rng.counter(np.arange(size[0] * size[1] * image.channels))
-        drawn = rng.uniforms(rng.counter(1), place, rng.counter(number), rng.counter(0))[0]
-        images[image.name] = np.minimum(low + (high - low) * drawn, high).reshape(*size, image.channels)
+        count = size[0] * size[1] * image.channels
+        blocks = rng.counter(np.arange(-(-count // 4)))
+        words = rng.uniforms(rng.counter(1), blocks, rng.counter(number), rng.counter(0))
+        drawn = np.concatenate(words)[:count].reshape(*size, image.channels)
+        images[image.name] = np.minimum(low + (high - low) * drawn, high)
     return images
 
 

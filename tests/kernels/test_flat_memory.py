@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.kernels.bench.pipelines import moments, random_model
+from wamnet.kernels.bench.pipelines import moments
+from wamnet.kernels.bench.workload import paper_model
 from wamnet.kernels.run.pipeline import Pipeline
 
 pytestmark = pytest.mark.apart
@@ -42,7 +43,7 @@ def test_memory_is_flat_over_a_thousand_pictures(executor_named, name) -> None:
     if not STATUS.exists():
         pytest.skip("the system does not say what is in memory as Linux does")
     executor, shots = executor_named(name), moments("minicubes")
-    model = random_model(("color", "normal"), 3, (4,))
+    model = paper_model(("color", "normal"), 3, (4,))
     stretch = (PICTURES - WARM) // STRETCHES
     held = []
     with Pipeline(executor, shots[0], model, (SIZE, SIZE), moving=shots) as pipeline:

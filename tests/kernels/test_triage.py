@@ -14,7 +14,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
 from wamnet.kernels.judge import apart, triage
-from wamnet.kernels.judge.apart import Apart, Inside, Outcome
+from wamnet.kernels.judge.apart import Apart, Outcome, attempt
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -42,6 +42,22 @@ def model(kit):
 def images():
     random = np.random.default_rng(3)
     return {name: random.uniform(0, 1, (*SHAPE, 3)).astype(np.float32) for name in ("color", "normal")}
+
+
+class Inside:
+    """An executor in this process, as a runner."""
+
+    def __init__(self, way, executor):
+        self.way, self.target, self.device = way, executor.name, executor.device
+        self._executor = executor
+
+    def picked(self, size: tuple[int, int]) -> str:
+        """Return the name of the schedule that the executor picks for a size (height, width)."""
+        return self._executor.schedule_for(size)
+
+    def run(self, artifact, images) -> Outcome:
+        """Run a kernel on images (H, W, C)."""
+        return attempt(self._executor, artifact, images)
 
 
 def runners(executor_named, *ways):

@@ -67,6 +67,7 @@ def pipeline(
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import pipelines
+    from ....kernels.bench.workload import paper_model
     from ....models.data.scene_source import scene_source
     from ....refimpl.light.transport import Settings
     from ....refimpl.network.dataset import FEATURES
@@ -76,7 +77,7 @@ def pipeline(
     others = names_of("--peers", peers, pipelines.PEERS) if peers else ()
     check_counts(widths, window=(window, 12), repeats=(repeats, 5))
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
-    model = pipelines.random_model(seen, window, layers)
+    model = paper_model(seen, window, layers, depth_scale=20.0, position_scale=10.0)
     rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
     network = f"network {'-'.join(map(str, model.siren.widths))}"
     say_facts(NUMPY, f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)

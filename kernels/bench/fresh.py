@@ -4,27 +4,23 @@
    folders, and tells whether caches on disk save compiling [`first_runs`].
 2. A scene: a process compiles a pipeline and reads its first picture [`first_picture`].
 
-Each measures from the moment when packages are imported, and for a denoiser the device is open. Run as a
-module it is that process [`main`].
+Each measures from the moment when packages are imported, and for a denoiser the device is open.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...models.data.scene_source import scene_source
-from ...models.model_file import load_model, save_model
 from ...refimpl.network.denoise import Model
 from ..cache import FOLDER_VARIABLE
 from ..devices.registry import open_executor
 from ..measure import environment
+from ..orphans import Worker, WorkerEnded
 from ..run.pipeline import Pipeline
 from .contenders import Tools, chosen, of_machine
 from .workload import given, noise
@@ -44,18 +40,19 @@ def first_runs(name: str, model: Model, size: int) -> tuple[float | None, float 
 
     `size`: the width of the benchmark's pictures, by which names are given. None: it fails.
     """
-    never, later = _in_processes(2, model, CACHES, "denoiser", name, size)
-    return never, later
+    with empty_caches():
+        return _in_process(_denoiser, name, model, size), _in_process(_denoiser, name, model, size)
 
 
 def first_picture(executor: str, model: Model, scene: str, size: int) -> float | None:
     """Return the seconds to the first picture (size, size) of a scene; None where that fails."""
-    return _in_processes(1, model, (*CACHES, FOLDER_VARIABLE), "pipeline", executor, size, scene)[0]
+    with empty_caches((*CACHES, FOLDER_VARIABLE)):
+        return _in_process(_pipeline, executor, model, scene, size)
 
 
 @contextmanager
-def empty_caches(names: Sequence[str] = CACHES) -> Iterator[Path]:
-    """Let compilers find nothing that they have compiled before; yield a folder for more.
+def empty_caches(names: Sequence[str] = CACHES) -> Iterator[None]:
+    """Let compilers find nothing that they have compiled before.
 
     A process must not launch its first OpenCL kernel within and another afterwards: pyopencl opens a cache in
     the home folder at the first one, and keeps it open.
@@ -65,48 +62,34 @@ def empty_caches(names: Sequence[str] = CACHES) -> Iterator[Path]:
         for place in places.values():
             Path(place).mkdir()
         with environment(places):
-            yield Path(folder)
+            yield
 
 
-def _in_processes(count: int, model: Model, caches: Sequence[str], *arguments: object) -> list[float | None]:
-    """Return the seconds that this module prints as a process, one after another with the same caches."""
-    with empty_caches(caches) as folder:
-        path = folder / "model.safetensors"
-        save_model(path, model)
-        return [_in_process([str(path), *map(str, arguments)]) for _ in range(count)]
-
-
-def _in_process(arguments: Sequence[str]) -> float | None:
-    """Return the seconds that a process prints; None where it fails."""
-    command = [sys.executable, "-m", __name__, *arguments]
+def _in_process(work: Callable[..., float], *arguments: object) -> float | None:
+    """Return the seconds that a function returns in a process of its own; None where it fails."""
+    worker = Worker()
     try:
-        done = subprocess.run(
-            command, capture_output=True, timeout=SECONDS_AT_MOST, stdin=subprocess.DEVNULL, check=True
-        )
-        return float(json.loads(done.stdout.splitlines()[-1])["seconds"])
-    except (subprocess.SubprocessError, ValueError, KeyError, IndexError):
+        return float(worker.call(SECONDS_AT_MOST, work, *arguments))
+    except WorkerEnded:
         return None
+    finally:
+        worker.close()
 
 
-def main(path: str, kind: str, name: str, size: str, scene: str = "") -> None:
-    """Make a frame by the contender or the executor NAME and the model in PATH; print the seconds as JSON."""
-    model, pixels = load_model(Path(path)), int(size)
-    start = time.perf_counter()
-    if kind == "pipeline":
-        shown, shape = scene_source(scene).at(), (pixels, pixels)
-        with open_executor(name) as executor, Pipeline(executor, shown, model, shape) as pipeline:
-            pipeline.run()
-            seconds = time.perf_counter() - start
-    else:
-        frame = given(model, noise(FRAME_PX))
-        with Tools() as tools:
-            (contender,) = chosen(of_machine(tools, pixels), [name], [])
-            contender.prepare(tools)
-            start = time.perf_counter()
-            contender.open(tools, model, FRAME_PX).run(frame)
-            seconds = time.perf_counter() - start
-    sys.stdout.write(json.dumps({"seconds": seconds}) + "\n")
+def _denoiser(name: str, model: Model, size: int) -> float:
+    """Return the seconds in which a contender opens and makes a small frame."""
+    frame = given(model, noise(FRAME_PX))
+    with Tools() as tools:
+        (contender,) = chosen(of_machine(tools, size), [name], [])
+        contender.prepare(tools)
+        start = time.perf_counter()
+        contender.open(tools, model, FRAME_PX).run(frame)
+        return time.perf_counter() - start
 
 
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+def _pipeline(executor: str, model: Model, scene: str, size: int) -> float:
+    """Return the seconds in which a pipeline is compiled and its first picture read."""
+    start, shown = time.perf_counter(), scene_source(scene).at()
+    with open_executor(executor) as device, Pipeline(device, shown, model, (size, size)) as pipeline:
+        pipeline.run()
+        return time.perf_counter() - start

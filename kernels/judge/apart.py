@@ -1,6 +1,6 @@
 """An executor in a process of its own: a kernel that ends the process, or never ends, is a result too.
 
-1. The process opens the executor and waits for kernels [`_serve`]; what it is sent and sends back is pickled.
+1. The process opens the executor and waits for kernels [orphans.py: `Worker`].
 2. A run has an [`Outcome`]: the picture, or why the executor refuses the kernel, or how it failed
    [`attempt`].
 3. A process that ends on its own, or does not answer in time, has failed; the next run starts another one
@@ -9,11 +9,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from operator import attrgetter, methodcaller
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +23,7 @@ from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ..devices.executor import Executor
 from ..devices.images import Images
 from ..devices.registry import WAYS, open_executor
-from ..orphans import end_with_parent
+from ..orphans import Worker, WorkerEnded
 
 LIMIT_S = 300.0
 """Seconds after which a kernel, its compilation included, counts as one that never ends."""
@@ -66,75 +65,42 @@ def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
 class Apart:
     """An executor in a process of its own, as a runner; raises ExecutorUnavailable where it is missing."""
 
-    def __init__(self, way: str, limit_s: float = LIMIT_S) -> None:
-        self.way, self.limit_s = way, limit_s
-        self.target, self._options = WAYS[way]
-        self._process: Any = None
-        self._start()
-
-    def _start(self) -> None:
-        """Start the process and wait for its device."""
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(
-            target=_serve, args=(other, self.target, dict(self._options)), daemon=True
-        )
-        self._process.start()
-        other.close()
-        opened = self._answer()
+    def __init__(self, way: str) -> None:
+        self.way, self.limit_s = way, LIMIT_S
+        self.target, _ = WAYS[way]
+        self._worker: Worker | None = None
+        opened = self._asked(attrgetter("device"))
         if isinstance(opened, Outcome):
             self.close()
-            raise ExecutorUnavailable(f"{self.way}: {opened.refusal or opened.failure}")
+            raise ExecutorUnavailable(f"{way}: {opened.failure}")
         self.device = str(opened)
 
     def picked(self, size: tuple[int, int]) -> str:
         """Return the name of the schedule that the executor picks for a size (height, width)."""
-        found = self._asked(size)
+        found = self._asked(methodcaller("schedule_for", size))
         return found if isinstance(found, str) else "plain"
 
     def run(self, artifact: Artifact, images: Images) -> Outcome:
         """Run a kernel on images (H, W, C)."""
-        found = self._asked((artifact, dict(images)))
+        found = self._asked(attempt, artifact, dict(images))
         assert isinstance(found, Outcome)
         return found
 
-    def _asked(self, request: Any) -> Any:
-        """Return the answer to a request, of a process that is started if the last one has ended."""
+    def _asked(self, function: Callable[..., Any], *arguments: object) -> Any:
+        """Return a function of the executor, in a process that starts if the last one has ended."""
+        if self._worker is None:
+            self._worker = Worker()
         try:
-            if self._process is None:
-                self._start()
-            self._pipe.send(request)
-        except ExecutorUnavailable as error:
+            return self._worker.call(self.limit_s, _of_executor, self.way, function, *arguments)
+        except WorkerEnded as error:
+            self._worker = None
             return Outcome(failure=str(error))
-        except OSError:
-            return self._ended()
-        return self._answer()
-
-    def _answer(self) -> Any:
-        """Return what the process sends, or how it ended."""
-        try:
-            if self._pipe.poll(self.limit_s):
-                return self._pipe.recv()
-        except (EOFError, OSError):
-            return self._ended()
-        self.close()
-        return Outcome(failure=f"no answer in {self.limit_s:g} s")
-
-    def _ended(self) -> Outcome:
-        """Return how the process ended."""
-        self._process.join()
-        code = self._process.exitcode
-        self.close()
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
-        return Outcome(failure=f"its process ended with {how}")
 
     def close(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._pipe.close()
-            self._process = None
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
 
     def __enter__(self) -> Apart:
         return self
@@ -143,27 +109,20 @@ class Apart:
         self.close()
 
 
-def _serve(pipe: Any, name: str, options: Mapping[str, str]) -> None:
-    """Open an executor, say its device, and answer requests until the other end is closed."""
-    end_with_parent()
-    # Ctrl-C reaches all processes of a terminal: the parent ends this one.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@lru_cache(1)
+def _opened(way: str) -> Executor:
+    """Return the executor of a process."""
+    name, options = WAYS[way]
+    return open_executor(name, **options)
+
+
+def _of_executor(way: str, function: Callable[..., Any], *arguments: object) -> Any:
+    """Return what a function returns of a process's executor, or why that is missing."""
     try:
-        executor = open_executor(name, **options)
+        executor = _opened(way)
     except Exception as error:  # noqa: BLE001 - whatever it is, the executor is missing
-        pipe.send(Outcome(refusal=_line(str(error))))
-        return
-    pipe.send(executor.device)
-    while True:
-        try:
-            request = pipe.recv()
-        except EOFError:
-            # Drivers' own clean-up at the end of a process has nothing to say any more.
-            os._exit(0)
-        if isinstance(request[0], Artifact):
-            pipe.send(attempt(executor, *request))
-        else:
-            pipe.send(executor.schedule_for(request))
+        return Outcome(failure=_line(str(error)))
+    return function(executor, *arguments)
 
 
 def _line(text: str) -> str:

@@ -283,36 +283,25 @@ def of_machine(
             suits = target.schedules[0].name
         schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
         found += [kernel(name, schedule) for schedule in schedules]
-        if name in TARGETS and name != "numpy":
-            found += _varied(name, suits, [*(VARIANTS[:1] if quick else VARIANTS), *forms])
-        if name != "numpy" and not quick:
-            found += _of_integers(name, suits)
+        varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
+        if name != "numpy":
+            found += _varied(name, suits, [*varied, *([] if quick else [INTEGERS])])
     return [*found, *(peer for peer in peers.contenders() if not quick or peer.name in QUICK)]
 
 
-def _of_integers(executor: str, suits: str) -> list[Contender]:
-    """Return the kernels of a network of integers: in bytes where a language has such, and in floats."""
-    direct = _of_two_passes(executor, suits)
-    bytewise = [s.name for s in DENOISERS[executor].schedules if isinstance(s, Dot)]
-    return [kernel(executor, each, INTEGERS) for each in dict.fromkeys([*bytewise, direct])]
-
-
-def _varied(executor: str, suits: str, variants: Sequence[Variant]) -> list[Contender]:
+def _varied(executor: str, suits: str, forms: Sequence[Variant]) -> list[Contender]:
     """Return the kernels of variants: with the schedule that suits, and the direct one where that is another.
 
-    A first layer in two passes has the direct one only.
+    A first layer in two passes has the direct one only, integers instead those in bytes where a language has
+    such. Spectra name what takes their place in two passes.
     """
-    direct, found = _of_two_passes(executor, suits), []
-    for variant in variants:
-        both = [] if variant.rank else [suits]
-        found += [kernel(executor, each, variant) for each in dict.fromkeys([*both, direct])]
+    target, schedule = DENOISERS[executor], schedule_named(executor, suits)
+    direct = schedule.name if schedule.instead == PLAIN else schedule.instead
+    bytewise, found = [each.name for each in target.schedules if isinstance(each, Dot)], []
+    for form in forms:
+        others = bytewise if form is INTEGERS else [] if form.rank else [suits]
+        found += [kernel(executor, each, form) for each in dict.fromkeys([*others, direct])]
     return found
-
-
-def _of_two_passes(target: str, suits: str) -> str:
-    """Return the schedule of a first layer in two passes: spectra name what takes their place."""
-    schedule = schedule_named(target, suits)
-    return schedule.name if schedule.instead == PLAIN else schedule.instead
 
 
 def chosen(contenders: Sequence[Contender], only: Sequence[str], executors: Sequence[str]) -> list[Contender]:

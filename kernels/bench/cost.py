@@ -73,9 +73,8 @@ def sines_of(program: Program) -> int:
 
 def fused(artifact: Artifact, sines: int) -> tuple[Stage, ...]:
     """Return the stages of compiled kernels: each reads its images and writes one; the last has the sines."""
-    stages = []
-    for kernel in artifact.kernels:
-        channels = kernel_gather(kernel.program).channels + output_channels(kernel.program)
-        of_kernel = sines if kernel is artifact else 0
-        stages.append(Stage(products_of(kernel.program), of_kernel, FLOAT_BYTES * channels))
-    return tuple(stages)
+    channels = [kernel_gather(k.program).channels + output_channels(k.program) for k in artifact.kernels]
+    return tuple(
+        Stage(products_of(kernel.program), sines if kernel is artifact else 0, FLOAT_BYTES * count)
+        for kernel, count in zip(artifact.kernels, channels, strict=True)
+    )

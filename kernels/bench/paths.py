@@ -53,6 +53,9 @@ BY = ("numpy", *BUILT)
 VARIANT = "llvm_ad_rgb"
 """Mitsuba's variant: compiled, on vectors and all cores."""
 
+Frames = Callable[[int], Any]
+"""Makes the frame of a seed."""
+
 FORMS = {"unrolled": STATEMENTS, "looped": LISTS, "tree": TREES}
 """What primitives become, by the name of the form; a tree is there where it seems to pay."""
 
@@ -72,26 +75,26 @@ ABOUT = {"mitsuba": VARIANT, **dict.fromkeys(BY_HAND, "by hand")}
 
 def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> list[Entry]:
     """Return what renders a scene, in the order of `by`; the fact `means` has each round's mean colour."""
-    scene, found = scene_source(name).at(), []
-
-    def add(text: str, begin: Callable[[], Callable[[int], Any]]) -> None:
-        means: list[float] = []
-        found.append(Entry(name, lambda: _noting(begin(), means), text, {"means": means}))
-
+    scene, ways = scene_source(name).at(), dict[str, Callable[[], Frames]]()
     for kind in by:
         if kind == "numpy":
-            for count in dict.fromkeys(workers):
-                add(
-                    f"numpy, {count} process{'es' if count > 1 else ''}",
-                    partial(_reference, scene, job, count),
-                )
+            for count in workers:
+                text = f"numpy, {count} process{'es' if count > 1 else ''}"
+                ways[text] = partial(_reference, scene, job, count)
+        elif kind in PEERS:
+            ways[f"{kind}, {ABOUT[kind]}"] = partial(_peer, kind, scene, job)
         else:
-            about = f", {ABOUT[kind]}" if kind in PEERS else ""
-            add(f"{kind}{about}", partial(_peer if kind in PEERS else _kernel, kind, scene, job))
-    return found
+            ways[kind] = partial(_kernel, kind, scene, job)
+    return [_entry(name, text, way) for text, way in ways.items()]
 
 
-def _noting(frames: Callable[[int], Any], means: list[float]) -> Round:
+def _entry(scene: str, text: str, begin: Callable[[], Frames]) -> Entry:
+    """Return what makes frames of a scene, whose mean colours are noted."""
+    means: list[float] = []
+    return Entry(scene, lambda: _noting(begin(), means), text, {"means": means})
+
+
+def _noting(frames: Frames, means: list[float]) -> Round:
     """Return a round: a frame of its seed, whose mean colour is noted."""
 
     def work(seed: int) -> float:
@@ -105,18 +108,18 @@ def _noting(frames: Callable[[int], Any], means: list[float]) -> Round:
     return work
 
 
-def _reference(scene: Scene, job: Job, workers: int) -> Callable[[int], Any]:
+def _reference(scene: Scene, job: Job, workers: int) -> Frames:
     """Return how the reference makes frames; start-up of processes counts in each."""
     return lambda seed: render_parallel(scene, replace(job, seed=seed), workers=workers).frame["color"]
 
 
-def _kernel(name: str, scene: Scene, job: Job) -> Callable[[int], Any]:
+def _kernel(name: str, scene: Scene, job: Job) -> Frames:
     """Return how a kernel makes frames."""
     executor = open_executor(name)
     return lambda seed: render_on(executor, scene, replace(job, seed=seed)).frame["color"]
 
 
-def _peer(kind: str, scene: Scene, job: Job) -> Callable[[int], Any]:
+def _peer(kind: str, scene: Scene, job: Job) -> Frames:
     """Return how another renderer makes frames."""
     render = peers.table().renderers[kind](scene, job.width, job.height, job.settings)
     return lambda seed: render(job.spp, seed)

@@ -87,8 +87,8 @@ def shrink(
     before = None
     while before != box and left[0] > 0:
         before = box
-        for axis in ("rows", "columns"):
-            box = _shrink_along(axis, box, still)
+        for side in (("top", "height"), ("left", "width")):
+            box = _shrink_along(side, box, still)
     return box
 
 
@@ -100,32 +100,20 @@ def _around(whole: Box, at: tuple[int, int], distance: int) -> Box:
     return Box(top, left, bottom - top, right - left)
 
 
-def _shrink_along(axis: str, box: Box, still: Callable[[Box], bool]) -> Box:
-    """Cut off the end, or the start, along one axis: halves, then quarters, ... then single ones."""
-    step = _extent(axis, box) // 2
+def _shrink_along(side: tuple[str, str], box: Box, still: Callable[[Box], bool]) -> Box:
+    """Cut off the end, or the start, along one side: halves, then quarters, ... then single ones."""
+    start, extent = side
+    step = getattr(box, extent) // 2
     while step:
-        for part in _shorter(axis, box, step):
+        end = replace(box, **{extent: getattr(box, extent) - step})
+        for part in (end, replace(end, **{start: getattr(box, start) + step})):
             if still(part):
                 box = part
                 break
         else:
             step //= 2
-        step = min(step, _extent(axis, box) - 1)
+        step = min(step, getattr(box, extent) - 1)
     return box
-
-
-def _extent(axis: str, box: Box) -> int:
-    """Return the number of rows or columns."""
-    return box.height if axis == "rows" else box.width
-
-
-def _shorter(axis: str, box: Box, step: int) -> tuple[Box, Box]:
-    """Return a part without its last, and without its first, `step` rows or columns."""
-    if axis == "rows":
-        short = replace(box, height=box.height - step)
-        return short, replace(short, top=box.top + step)
-    short = replace(box, width=box.width - step)
-    return short, replace(short, left=box.left + step)
 
 
 @dataclass(frozen=True)

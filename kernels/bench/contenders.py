@@ -39,6 +39,7 @@ from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
 from ..devices.images import Images
 from ..devices.registry import open_executor
+from ..run.denoise_on import bound_of
 from . import peers
 from .cost import Stage, fused, sines_of
 from .workload import Given
@@ -248,7 +249,7 @@ def _open_kernel(
         rates=f"{executor}:{picked}{profile}",
         kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
         schedule=picked,
-        bound=_bound_of(artifact),
+        bound=bound_of(artifact),
         certified=artifact.certificate is not None,
     )
 
@@ -258,13 +259,6 @@ def _read(artifact: Artifact, given: Given) -> Images:
     gather = kernel_gather(artifact.kernels[0].program)
     images = given.integers if gather.whole else given.images
     return {image.name: images[image.name] for image in gather.images}
-
-
-def _bound_of(artifact: Artifact) -> float | None:
-    """Return the bound of rounding for all images; of a rank against the product of its factors."""
-    factored = artifact.manifest.get("factored")
-    output = (factored["rounding"] if factored else artifact.manifest["bound"])["output"]
-    return max(output) if output else None
 
 
 def of_machine(

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Program
 from ...compiler.schedules.common import kernel_gather, output_channels
+from ..run.denoise_on import products_of
 
 FLOAT_BYTES = 4
 """Bytes of a float32."""
@@ -58,12 +59,6 @@ def predicted_seconds(stages: Sequence[Stage], rates: Rates, pixels: int) -> flo
         )
         for stage in stages
     )
-
-
-def products_of(program: Program) -> int:
-    """Return the multiplications of a pixel that belong to matrices."""
-    affine = [node for node in program.nodes if node.op == "affine"]
-    return sum(program.parameters[str(node["weight"])].size for node in affine)
 
 
 def sines_of(program: Program) -> int:

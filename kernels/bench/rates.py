@@ -30,8 +30,9 @@ from ...refimpl import rng
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor
 from ..measure import Round, Times, in_turns
+from ..run.denoise_on import products_of
 from ..run.tune import noise
-from .cost import FLOAT_BYTES, Rates, products_of, sines_of
+from .cost import FLOAT_BYTES, Rates, sines_of
 
 MATRIX = 4096
 """Rows and columns of the matrices whose product is the machine's rate: larger ones are hardly faster."""

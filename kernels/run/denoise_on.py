@@ -38,6 +38,8 @@ from .kept import kept_kernels
 from .tune import Subject, pick
 
 if TYPE_CHECKING:
+    from ...compiler.artifact import Artifact
+    from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
     from ...compiler.scenes.smooth_kernel import SmoothKernels
 
@@ -256,6 +258,19 @@ def denoise_on(
     with the reference's image; by default the device may make them [`images_on`].
     """
     return Denoiser(executor, model, profile, schedule, variant, pictures, keeps).run(frame, images)
+
+
+def products_of(program: Program) -> int:
+    """Return the multiplications of a pixel that belong to matrices."""
+    affine = [node for node in program.nodes if node.op == "affine"]
+    return sum(program.parameters[str(node["weight"])].size for node in affine)
+
+
+def bound_of(artifact: Artifact) -> float | None:
+    """Return the bound of rounding for all images; of a rank against the product of its factors."""
+    factored = artifact.manifest.get("factored")
+    output = (factored["rounding"] if factored else artifact.manifest["bound"])["output"]
+    return max(output) if output else None
 
 
 def _text_of(artifact: Kernel) -> str:

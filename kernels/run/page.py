@@ -53,6 +53,7 @@ from ...refimpl.network import factored
 from ...refimpl.network.dataset import FEATURES, feature_image
 from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
+from .denoise_on import bound_of, products_of
 
 SCHEMA = "wamnet-page-4"
 """Name and version of the form of a page's data."""
@@ -329,7 +330,6 @@ def variant(
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
     held = held or plan.expected(mine)
     bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
-    whole = artifact.manifest["factored"]["rounding"] if rank else artifact.manifest["bound"]
     return {
         "name": network.name,
         "rank": rank,
@@ -339,8 +339,8 @@ def variant(
         "program": digest(program),
         "trained": {key: model.info[key] for key in TOLD if key in model.info},
         "weights": sum(kernel.weights.size for kernel in artifact.kernels),
-        "products": sum(_products(kernel) for kernel in artifact.kernels),
-        "bound": None if whole["output"] is None else max(whole["output"]),
+        "products": sum(products_of(kernel.program) for kernel in artifact.kernels),
+        "bound": bound_of(artifact),
         "passes": [_pass(kernel) for kernel in artifact.kernels],
         "check": {
             "expected": _packed(held.value, "<f8"),
@@ -356,12 +356,6 @@ def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
     text = model.info.get(f"trained_on_{RANGES}")
     scenes = model.info.get("trained_on_scene", scene).split(", ")
     return None if text is None or scene not in scenes else asdict(ranges_from_json(text))
-
-
-def _products(kernel: Artifact) -> int:
-    """Return the products of weights that one pixel takes."""
-    names = [str(node["weight"]) for node in kernel.program.nodes if node.op == "affine"]
-    return sum(kernel.program.parameters[name].size for name in names)
 
 
 def _pass(kernel: Artifact) -> dict[str, Any]:

@@ -8,8 +8,9 @@ import pytest
 
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench import rates
-from wamnet.kernels.bench.cost import products_of, sines_of
+from wamnet.kernels.bench.cost import sines_of
 from wamnet.kernels.measure import Times
+from wamnet.kernels.run.denoise_on import products_of
 
 PIXELS = 1000
 """Pixels of a picture that nobody computes."""

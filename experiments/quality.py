@@ -388,7 +388,8 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
         for row in (row for row in rows if ROWS[row].recipe):
             model, _ = bench.model(ROWS[row], 0)
             size = (frame.height, frame.width)
-            plan = tune.choose(device, plan_model(model, device.name), size, rounds).plan
+            plan = plan_model(model, device.name)
+            plan = plan.scheduled(tune.choose(device, plan, size, rounds)[0])
             kernel = compile_plan(plan)
             device.build(kernel, size)
             ways |= _ways(device, model, kernel, frame, row)

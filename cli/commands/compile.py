@@ -151,9 +151,9 @@ def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
         raise InputError("--schedule", network.schedule, "--here chooses another", "leave one of them out")
     plan = plan_model(model, executor, network.profile, variant=network.variant or FULL)
     with open_executor(executor) as runner:
-        found = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
-        say(f"schedule {found.schedule} for {runner.device}: {found.reason}")
-    return found.schedule
+        schedule, reason = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
+        say(f"schedule {schedule} for {runner.device}: {reason}")
+    return schedule
 
 
 def _compiled_model(path: Path, target: str, network: KernelRequest, limits: Request, here: bool) -> Artifact:

@@ -81,8 +81,8 @@ def tune(
     show(found)
     if known:
         say(f"measured on {found.day}; --force measures again")
-    for count, pick in picks.items():
-        say(f"for {count} image{'s' if count > 1 else ''}: {pick.schedule}; {pick.reason}")
+    for count, (schedule, reason) in picks.items():
+        say(f"for {count} image{'s' if count > 1 else ''}: {schedule}; {reason}")
 
 
 @contextmanager

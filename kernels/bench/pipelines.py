@@ -92,7 +92,8 @@ def ways_of(
     """
     shots, scene, shape = moments(name), scene_source(name).at(), (size, size)
     job = Job(size, size, feature_spp=rays)
-    denoiser = compile_plan(choose(executor, plan_model(model, executor.name), shape).plan)
+    plan = plan_model(model, executor.name)
+    denoiser = compile_plan(plan.scheduled(choose(executor, plan, shape)[0]))
 
     def separate() -> None:
         frame = render_on(executor, scene, job).frame

@@ -31,7 +31,7 @@ from ..devices.executor import Executor
 from ..measure import in_turns
 from .curve import Curve, Point
 from .denoise_on import images_of
-from .tune import noise
+from .tune import noise, trial
 
 NAMES = (
     *("full", "sine9", "sine7", "sine5", "window10", "window8", "window6", "rank24", "rank16", "rank12"),
@@ -41,9 +41,6 @@ NAMES = (
 
 MOST_SCHEDULES = 2
 """Schedules that all variants are measured under."""
-
-TRIAL_PX = 128
-"""Rows and columns of the picture on which schedules are compared."""
 
 REPEATS = 5
 """Rounds of the measurement; their median counts."""
@@ -108,14 +105,10 @@ def measure(
 
 def promising(executor: Executor, model: Model, profile: str) -> tuple[str, ...]:
     """Return the schedules under which the full network is fastest on a small picture, the best first."""
-    ways, plan = {}, plan_model(model, executor.name, profile)
-    images = noise(plan.analysed, (TRIAL_PX, TRIAL_PX))
-    for schedule in plan.target.schedules:
-        artifact = _compiled(plan.scheduled(schedule.name))
-        if artifact is not None:
-            ways[schedule.name] = partial(executor.run, artifact, images)
-    times = in_turns(ways, repeats=3, pause_s=PAUSE_S)
-    return tuple(sorted(times, key=lambda name: times[name].median)[:MOST_SCHEDULES])
+    plan = plan_model(model, executor.name, profile)
+    found = (_compiled(plan.scheduled(schedule.name)) for schedule in plan.target.schedules)
+    trials = {artifact.plan.asked: trial(executor, artifact) for artifact in found if artifact}
+    return tuple(sorted(trials, key=trials.__getitem__)[:MOST_SCHEDULES])
 
 
 def quality(

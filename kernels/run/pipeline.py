@@ -140,7 +140,7 @@ class Pipeline:
             model.is_whole,
             self._ray_count,
         )
-        self.denoise = compile_plan(choose(executor, plan, size, pictures).plan)
+        self.denoise = compile_plan(plan.scheduled(choose(executor, plan, size, pictures)[0]))
         self._drawn = self._closed = False
         self.passes = Passes(executor, self.encode, self.denoise, size)
 

@@ -95,27 +95,13 @@ class Subject:
         return Subject(plan.model, plan.profile.name, plan.cut.rank if plan.cut else 0)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A plan with its schedule, and why that was chosen."""
-
-    plan: Plan
-    reason: str
-
-    @property
-    def schedule(self) -> str:
-        """Return the schedule's name."""
-        return self.plan.asked
-
-
-def choose(executor: Executor, plan: Plan, size: tuple[int, int], pictures: int = 1) -> Choice:
-    """Return a plan for so many pictures of `size` (height, width): as measured here, or built in."""
-    name, reason = pick(executor, Subject.of(plan), size, pictures)
-    return Choice(plan.scheduled(name), reason)
+def choose(executor: Executor, plan: Plan, size: tuple[int, int], pictures: int = 1) -> tuple[str, str]:
+    """Return the schedule of a plan for so many pictures of `size` (height, width), by name, and why."""
+    return pick(executor, Subject.of(plan), size, pictures)
 
 
 def pick(executor: Executor, subject: Subject, size: tuple[int, int], pictures: int = 1) -> tuple[str, str]:
-    """Return the schedule of [`choose`] by name, and the reason, without a plan."""
+    """Return the schedule for a subject, as measured here or built in, and why, without a plan."""
     table = None if executor.interprets else remembered(executor, subject, size)
     if table is not None and (best := table.best(pictures)) is not None:
         height, width = table.size
@@ -158,7 +144,7 @@ def tune(
             rows[schedule.name] = Row(schedule.name, note=str(error))
             continue
         rows[schedule.name], ready[schedule.name] = row, artifact
-        trials[schedule.name] = _trial(executor, artifact, plan.analysed, size)
+        trials[schedule.name] = trial(executor, artifact, size)
     least = min(trials.values(), default=0.0)
     for name in [name for name, seconds in trials.items() if seconds > SLOW * least]:
         del ready[name]
@@ -204,9 +190,10 @@ def _checked(executor: Executor, artifact: Artifact, crop: Images) -> None:
         raise WrongResult(f"its result is wrong on this device: {worst:.3g} times the bound on the error")
 
 
-def _trial(executor: Executor, artifact: Artifact, program: Program, size: tuple[int, int]) -> float:
+def trial(executor: Executor, artifact: Artifact, size: tuple[int, int] = (TRIAL, TRIAL)) -> float:
     """Return the least seconds of a picture that is no larger than the whole."""
-    run = partial(executor.run, artifact, noise(program, (min(TRIAL, size[0]), min(TRIAL, size[1]))))
+    images = noise(artifact.plan.analysed, (min(TRIAL, size[0]), min(TRIAL, size[1])))
+    run = partial(executor.run, artifact, images)
     return min(measure.in_turns({"trial": run}, 2, pause_s=0.0)["trial"].seconds)
 
 

@@ -101,7 +101,8 @@ def chosen(executor, whole):
     network = siren.init([12 * 12 * 6, 32, 32, 3], 1.0, 3.0, seed=1)
     siren_or_whole = rounded(network, 12) if whole else network
     model = Model(siren_or_whole, ("color", "normal"), dataset.Window(12), dataset.Normalization())
-    plan = choose(executor, plan_model(model, executor.name), (64, 64)).plan
+    plan = plan_model(model, executor.name)
+    plan = plan.scheduled(choose(executor, plan, (64, 64))[0])
     return plan.schedule.name
 
 

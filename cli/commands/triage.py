@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
     from ...compiler.plan import Plan
     from ...kernels.devices.images import Images
-    from ...kernels.judge.apart import Runner
+    from ...kernels.judge.apart import Apart
     from ...kernels.judge.reduce import Box, Reduced
     from ...kernels.judge.triage import Compile, Kernel, Verdict
     from ...refimpl.frame import Frame
@@ -145,7 +145,7 @@ class Task:
         return self.kept.compiled if self.kept else compile_plan
 
 
-def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
+def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Apart]:
     """Open executors by name, each in a process of its own: all that are here, or those that are wanted."""
     from ...kernels.devices.registry import EXECUTORS, WAYS
     from ...kernels.judge.apart import Apart
@@ -153,7 +153,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
     for name in wanted:
         if name not in {*WAYS, *EXECUTORS}:
             raise InputError("--executor", name, "unknown", choice(name, dict.fromkeys([*EXECUTORS, *WAYS])))
-    runners: list[Runner] = []
+    runners: list[Apart] = []
     for way, (name, _) in WAYS.items():
         if wanted and not {way, name} & set(wanted):
             continue
@@ -168,7 +168,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Runner]:
     return runners
 
 
-def _judged(task: Task, runners: Sequence[Runner]) -> list[Verdict]:
+def _judged(task: Task, runners: Sequence[Apart]) -> list[Verdict]:
     """Run all kernels on the whole frame."""
     from ...compiler.core.lower import lower
     from ...kernels.judge.triage import Judge, kernels_of

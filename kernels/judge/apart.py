@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from operator import attrgetter, methodcaller
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,20 +38,6 @@ class Outcome:
     failure: str = ""
 
 
-class Runner(Protocol):
-    """An executor that tells failures in place of raising them; `way` is its name in registry.WAYS."""
-
-    way: str
-    target: str
-    device: str
-
-    def picked(self, size: tuple[int, int]) -> str:
-        """Return the name of the schedule that the executor picks for a size (height, width)."""
-
-    def run(self, artifact: Artifact, images: Images) -> Outcome:
-        """Run a kernel on images (H, W, C)."""
-
-
 def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
     """Run a kernel; an error in the house's words is a refusal, any other a failure."""
     try:
@@ -63,7 +49,10 @@ def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
 
 
 class Apart:
-    """An executor in a process of its own, as a runner; raises ExecutorUnavailable where it is missing."""
+    """An executor in a process of its own, which tells failures in place of raising them.
+
+    `way` is its name in registry.WAYS; raises ExecutorUnavailable where it is missing.
+    """
 
     def __init__(self, way: str) -> None:
         self.way, self.limit_s = way, LIMIT_S

@@ -27,7 +27,7 @@ from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
 from ...refimpl.network.whole import Whole, sine_layers
 from ..devices.images import Images
-from .apart import Runner
+from .apart import Apart
 from .triage import Compile, Judge, Kernel, Verdict, judged, kernels_of, odd_ones
 
 MOST_RUNS = 80
@@ -169,7 +169,7 @@ def stage_program(model: Model, stage: Stage) -> Program:
 
 
 def first_stage(
-    runner: Runner,
+    runner: Apart,
     schedule: str,
     model: Model,
     profile: str,

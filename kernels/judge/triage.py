@@ -28,7 +28,7 @@ from ...compiler.plan import Expected, Plan, plan_program
 from ...compiler.targets import target_named
 from ...refimpl.errors import CompileError
 from ..devices.images import Images
-from .apart import Outcome, Runner
+from .apart import Apart, Outcome
 
 Compile = Callable[[Plan], Artifact]
 """What makes a plan's kernel."""
@@ -44,7 +44,7 @@ PICKED, EVERY = "picked", "all"
 class Kernel:
     """A kernel and what runs it; without an `artifact`, the `reason` why the compiler refuses it."""
 
-    runner: Runner
+    runner: Apart
     schedule: str
     artifact: Artifact | None
     reason: str = ""
@@ -105,7 +105,7 @@ class Verdict:
 
 
 def kernels_of(
-    runners: Sequence[Runner],
+    runners: Sequence[Apart],
     program: Program,
     profile: str,
     size: tuple[int, int],

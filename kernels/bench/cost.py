@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Program
 from ...compiler.schedules.common import kernel_gather, output_channels
-from ..run.denoise_on import products_of
+from ..run.denoise_on import products_of as products_of
 
 FLOAT_BYTES = 4
 """Bytes of a float32."""

@@ -193,60 +193,65 @@ def dataset(
     if only_check:
         check(output, scene)
         return
+    numbers = {"frames": frames, "test_frames": test, "outside_frames": outside, "arc_s": arc, "seed": seed}
+    numbers |= {"spp": spp, "test_spp": test_spp}
     if from_blender is not None:
-        numbers_of = (frames, test, outside, spp, test_spp, arc, seed, noisy_spp, percent)
-        _make_from_blender(command, output, (from_blender, *numbers_of, view_layer, blender))
+        numbers |= {"noisy_spp": noisy_spp, "percent": percent}
+        _make_from_blender(command, output, from_blender, view_layer, blender, numbers)
         return
     named = scene or _missing_scene(), options.parse_parameters(parameters or [])
-    numbers = (start, seconds, frames, test, size, spp, seed, max_depth)
-    ways = (executor, sampler, feature_spp, test_spp, outside, arc)
-    limits = {"--yaw": yaw, "--pitch": pitch, "--distance": distance, "--saturation": saturation}
-    request = _request(command, named, (*numbers, *ways), limits, (seen, power, before, shadow_rays))
-    _check_workers(workers, scheduler)
-    request = replace(request, executor=chosen(executor, because=OF_SCHEDULER if scheduler else ""))
-    _make_from_scene(output, request, workers, scheduler)
+    numbers |= {"start_s": start, "seconds": seconds, "size_px": size, "max_depth": max_depth}
+    numbers |= {"feature_spp": feature_spp, "seen": seen, "shadow_rays": shadow_rays, "before": before}
+    limits: dict[str, str | None] = {"yaw_deg": yaw, "pitch_deg": pitch, "distance": distance}
+    limits |= {"saturation": saturation, "power": power}
+    fields: dict[str, Any] = {**numbers, "executor": executor, "sampler": sampler}
+    _make_from_scene(command, output, named, limits, fields, workers, scheduler)
 
 
-def _request(
+def _make_from_scene(
     command: typer.Context,
+    folder: Path,
     named: tuple[str, Parameters],
-    numbers: tuple[Any, ...],
     limits: Mapping[str, str | None],
-    last: tuple[bool, str | None, int, int],
-) -> Request:
-    """Return the request of a scene's name and parameters, of fields, ranges by option and the last four."""
-    from ...models.data.frame_plan import Request
+    fields: dict[str, Any],
+    workers: int | None,
+    scheduler: str | None,
+) -> None:
+    """Make the data set of a scene and parameters, of the texts of ranges, and other fields of a request."""
+    from ...models.data.frame_plan import Request, plan
     from ...models.data.scene_source import scene_source
 
     options.refuse_given(command, OF_BLENDER, "without --from-blender")
-    source, (seen, power, before, shadow_rays) = scene_source(*named), last
+    source = scene_source(*named)
     if source.still is not None:
         options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
-    ranges = (text and options.parse_limits(option, text) for option, text in limits.items())
-    factors = None if power is None else options.parse_limits("--power", power)
-    request = Request(source.name, source.parameters, *numbers, *ranges)
-    request = replace(request, seen=seen, power=factors, before=before, still=source.still)
-    return replace(request, shadow_rays=shadow_rays)
-
-
-def _make_from_scene(folder: Path, request: Request, workers: int | None, scheduler: str | None) -> None:
-    """Make the data set of a request, and say how to resume after an interrupt."""
-    from ...models.data.frame_plan import plan
-
+    for name, text in limits.items():
+        option = f"--{name.removesuffix('_deg')}"
+        fields[name] = None if text is None else options.parse_limits(option, text)
+    request = Request(source.name, source.parameters, still=source.still, **fields)
+    _check_workers(workers, scheduler)
+    executor = chosen(request.executor, because=OF_SCHEDULER if scheduler else "")
+    request = replace(request, executor=executor)
     with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
         make(folder, request, plan(request), workers, scheduler)
 
 
-def _make_from_blender(command: typer.Context, folder: Path, asked: tuple[Any, ...]) -> None:
-    """Make a data set of a Blender file; `asked` are the fields of what is made of the options."""
-    from .blender.dataset import Asked
+def _make_from_blender(
+    command: typer.Context,
+    folder: Path,
+    file: Path,
+    view_layer: str,
+    blender: str | None,
+    numbers: Mapping[str, Any],
+) -> None:
+    """Make a data set of a Blender file; refuse options that are only those of scenes."""
     from .blender.dataset import make as make_it
 
     known = {*OF_BOTH, *OF_BLENDER, "from_blender", "output"}
     others = [each.name for each in command.command.params if each.name and each.name not in known]
     options.refuse_given(command, others, "with --from-blender")
     with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
-        make_it(folder, Asked(*asked))
+        make_it(folder, file, view_layer, blender, **numbers)
 
 
 def _missing_scene() -> str:

@@ -7,9 +7,8 @@ project's own form, with the same manifest, checksums and resumption as other da
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ....models.data.frame_plan import KINDS
 from ...common.inputs import check_input
@@ -17,7 +16,7 @@ from ...common.terminal import progress, say
 from ...files import dataset_files, exr
 
 if TYPE_CHECKING:
-    from ....models.blender.plan import FilmFrame, Request, Shot
+    from ....models.blender.plan import Shot
     from ....models.blender.session import Blender
     from ....refimpl.frame import Frame
 
@@ -25,32 +24,15 @@ PASSES = ("color", "albedo", "normal", "depth", "position")
 """Layers of a noisy picture: what Cycles has passes of."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What the options ask for."""
-
-    file: Path
-    frames: int
-    test: int
-    outside: int
-    spp: int
-    test_spp: int
-    arc: float
-    seed: int
-    noisy_spp: int = 1
-    percent: int = 100
-    view_layer: str = ""
-    blender: str | None = None
-
-
-def make(folder: Path, asked: Asked) -> None:
-    """Make what is missing in the folder."""
+def make(folder: Path, file: Path, view_layer: str, program: str | None, **numbers: Any) -> None:
+    """Make what is missing in the folder; `numbers` are those of a request of this file."""
+    from ....models.blender.plan import Request, plan
     from ....models.blender.session import Blender
 
-    check_input(asked.file)
-    with Blender(asked.file, asked.view_layer, asked.blender) as blender:
-        request, frames = _planned(asked, blender)
-        known = 0
+    check_input(file)
+    with Blender(file, view_layer, program) as blender:
+        request = Request(file.name, dataset_files.sum_of(file).sha256, blender.animation, **numbers)
+        frames, known = plan(request), 0
         if (folder / dataset_files.MANIFEST).exists():
             known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
         with (
@@ -62,22 +44,11 @@ def make(folder: Path, asked: Asked) -> None:
                 _render(store, blender)
     animation = request.animation
     say(
-        f"{asked.file}: frames {animation.first} to {animation.last} of {animation.scene}, view layer "
+        f"{file}: frames {animation.first} to {animation.last} of {animation.scene}, view layer "
         f"{animation.view_layer}, by Cycles of Blender {animation.version}"
     )
     for line in store.summary(made):
         say(line)
-
-
-def _planned(asked: Asked, blender: Blender) -> tuple[Request, list[FilmFrame]]:
-    """Return the request for the open file, and its frames."""
-    from ....models.blender.plan import Request, plan
-
-    counts = (asked.frames, asked.test, asked.outside, asked.arc, asked.percent)
-    samples = (asked.noisy_spp, asked.spp, asked.test_spp, asked.seed)
-    digest = dataset_files.sum_of(asked.file).sha256
-    request = Request(asked.file.name, digest, blender.animation, *counts, *samples)
-    return request, plan(request)
 
 
 def _render(store: dataset_files.Store[Shot], blender: Blender) -> None:

@@ -40,21 +40,26 @@ OF_SGEMM_TOO_FAST = 1.05
 
 
 def number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as it is printed, a dash where there is none."""
+    """Return a number as it is printed, a dash where there is none; a sign only if a digit is not 0."""
     if value is None:
         return NONE
-    return f"{value:,.0f}" if form == ".3g" and abs(value) >= 1000 else format(value, form)
-
-
-def percent(value: float | None) -> str:
-    """Return a share in percent."""
-    return number(value, ".0%")
+    text = f"{value:,.0f}" if form.endswith("g") and abs(value) >= 1000 else format(value, form)
+    return text[1:] if form.startswith("+") and not float(text) else text
 
 
 def part(row: Data, name: str, key: str) -> float | None:
     """Return a number of a part of a row, if it has both."""
     found: float | None = (row.get(name) or {}).get(key)
     return found
+
+
+def cells(row: Data, columns: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return a row's numbers of columns: each a head, a key or the keys `part.key`, and a format, or none."""
+    found = []
+    for _, key, *form in columns:
+        name, _, inner = key.partition(".")
+        found.append(number(part(row, name, inner) if inner else row.get(name), *form))
+    return tuple(found)
 
 
 def _ranges(row: Data) -> str:
@@ -68,26 +73,26 @@ def measured(data: Data) -> list[Data]:
     return sorted((row for row in data["contenders"] if row["ms"]), key=lambda row: row["ms"]["median"])
 
 
+SPEED = (
+    ("predicted, ms", "predicted_ms"),
+    ("frames/s", "frames_per_s"),
+    ("GFLOP/s", "gflops"),
+    ("of sgemm", "of_sgemm", ".0%"),
+    ("compile, s", "compile_s"),
+    ("error", "error.max", ".1e"),
+    ("PSNR loss, dB", "quality.psnr_loss_db", ".2f"),
+)
+"""Columns of the first table, after name, time and range; the last is that of frames."""
+
+
 def speed_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return heads and rows of what each contender takes and how far off it is."""
-    first = ("contender", "ms", "range", "predicted, ms", "frames/s", "GFLOP/s", "of sgemm")
-    heads = (*first, "compile, s", "error", *(("PSNR loss, dB",) if data["unseen_frames"] else ()))
+    columns = SPEED if data["unseen_frames"] else SPEED[:-1]
     rows = []
     for row in measured(data):
-        cells: tuple[str, ...] = (
-            row["name"] + (" *" if row["name"] in data["front"]["error"] else ""),
-            number(part(row, "ms", "median")),
-            _ranges(row),
-            number(row.get("predicted_ms")),
-            number(row.get("frames_per_s")),
-            number(row.get("gflops")),
-            percent(row.get("of_sgemm")),
-            number(row.get("compile_s")),
-            number(part(row, "error", "max"), ".1e"),
-        )
-        cells += (number(part(row, "quality", "psnr_loss_db"), ".2f"),) if data["unseen_frames"] else ()
-        rows.append(cells)
-    return heads, rows
+        name = row["name"] + (" *" if row["name"] in data["front"]["error"] else "")
+        rows.append((name, number(part(row, "ms", "median")), _ranges(row), *cells(row, columns)))
+    return ("contender", "ms", "range", *(head for head, *_ in columns)), rows
 
 
 def short_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -97,56 +102,45 @@ def short_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     return tuple(heads[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
 
 
+DETAILS = (
+    ("spread", "ms.spread", ".0%"),
+    ("kernel, ms", "kernel_ms.median"),
+    ("of memory", "of_memory", ".0%"),
+    ("predicted / measured", "predicted_over_measured", ".2f"),
+    ("mean error", "error.mean", ".1e"),
+    ("ulp", "error.ulp"),
+    ("rounding", "rounding.max", ".1e"),
+    ("its bound", "rounding.bound", ".1e"),
+    ("PSNR, dB", "quality.psnr_db", ".2f"),
+    ("SSIM", "quality.ssim", ".4f"),
+    ("SSIM loss", "quality.ssim_loss", ".4f"),
+    ("source, bytes", "source_bytes"),
+    ("first run ever, s", "first_run_s"),
+    ("later run, s", "later_run_s"),
+)
+"""Columns of everything else that is known."""
+
+
 def detail_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return heads and rows of everything else that is known."""
-    heads = (
-        "contender", "spread", "kernel, ms", "of memory", "predicted / measured", "mean error", "ulp",
-        "rounding", "its bound", "PSNR, dB", "SSIM", "SSIM loss", "source, bytes", "first run ever, s",
-        "later run, s",
-    )  # fmt: skip
-    rows = [
-        (
-            row["name"],
-            percent(part(row, "ms", "spread")),
-            number(part(row, "kernel_ms", "median")),
-            percent(row.get("of_memory")),
-            number(row.get("predicted_over_measured"), ".2f"),
-            number(part(row, "error", "mean"), ".1e"),
-            number(part(row, "error", "ulp")),
-            number(part(row, "rounding", "max"), ".1e"),
-            number(part(row, "rounding", "bound"), ".1e"),
-            number(part(row, "quality", "psnr_db"), ".2f"),
-            number(part(row, "quality", "ssim"), ".4f"),
-            number(part(row, "quality", "ssim_loss"), ".4f"),
-            number(row.get("source_bytes")),
-            number(row.get("first_run_s")),
-            number(row.get("later_run_s")),
-        )
-        for row in measured(data)
-    ]
-    kept = [k for k in range(len(heads)) if k == 0 or any(row[k] != NONE for row in rows)]
-    return tuple(heads[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
+    rows = measured(data)
+    known = [each for each in DETAILS if any(cells(row, (each,)) != (NONE,) for row in rows)]
+    heads = ("contender", *(head for head, *_ in known))
+    return heads, [(row["name"], *cells(row, known)) for row in rows]
 
 
 def growth_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return heads and rows of the time at each size, and beside it the predicted one; dashes: left out."""
     columns = growth(data)
     heads = ("contender", *(f"{size}, ms (predicted)" for size in columns))
-    rows = []
-    for name in dict.fromkeys(name for cells in columns.values() for name in cells):
-        cells = [columns[size].get(name, {}) for size in columns]
-        texts = [
-            f"{number(part(cell, 'ms', 'median'))} ({number(cell.get('predicted_ms'))})"
-            if cell.get("ms")
-            else NONE
-            for cell in cells
-        ]
-        rows.append((name, *texts))
-    return heads, rows
+    names = dict.fromkeys(name for found in columns.values() for name in found)
+    return heads, [(name, *(_cell(found.get(name, {})) for found in columns.values())) for name in names]
 
 
 def _cell(row: Data) -> str:
-    """Return a measured time with the predicted one."""
+    """Return a measured time with the predicted one; a dash where there is none."""
+    if not row.get("ms"):
+        return NONE
     return f"{number(part(row, 'ms', 'median'))} ({number(row.get('predicted_ms'))})"
 
 
@@ -310,11 +304,21 @@ def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
         new.write_bytes(plots.trade_off(shown, theme))
 
 
-TABLE_HEADS = (
-    "variant", "executor, schedule", "profile, degree of sine", "rank", "window", "parameters", "ms",
-    "spread",
-    "PSNR, dB", "PSNR loss, dB", "largest error", "bound, this frame", "bound, all frames",
-)  # fmt: skip
+TRADE = (
+    ("rank", "rank"),
+    ("window", "window"),
+    ("parameters", "parameters"),
+    ("ms", "ms.median"),
+    ("spread", "ms.spread", ".0%"),
+    ("PSNR, dB", "quality.psnr_db", ".2f"),
+    ("PSNR loss, dB", "quality.psnr_loss_db", "+.2f"),
+    ("largest error", "rounding.max", ".1e"),
+    ("bound, this frame", "rounding.bound", ".1e"),
+    ("bound, all frames", "rounding.bound_all", ".1e"),
+)
+"""Columns of speed against error, after those that name a row."""
+
+TABLE_HEADS = ("variant", "executor, schedule", "profile, degree of sine", *(head for head, *_ in TRADE))
 """Columns of the table of speed against error."""
 
 
@@ -328,29 +332,15 @@ def _full_row(data: Data, row: Data) -> tuple[str, ...]:
     front = data["front"].get("quality", ())
     kernel = row["kind"] == "kernel"
     form = (split(row["name"])[2] or "whole") if kernel else row["name"]
-    certified = " †" if part(row, "rounding", "certified") else ""
     degree = row.get("degree")
+    *numbers, bound_all = cells(row, TRADE)
     return (
         form + (" *" if row["name"] in front else ""),
         f"{row.get('executor')} {row.get('schedule')}" if kernel else NONE,
         f"{row.get('profile')}, {degree or 'its own'}" if kernel else NONE,
-        number(row.get("rank")),
-        number(row.get("window")),
-        number(row.get("parameters")),
-        number(part(row, "ms", "median")),
-        percent(part(row, "ms", "spread")),
-        number(part(row, "quality", "psnr_db"), ".2f"),
-        _loss(part(row, "quality", "psnr_loss_db")),
-        number(part(row, "rounding", "max"), ".1e"),
-        number(part(row, "rounding", "bound"), ".1e"),
-        number(part(row, "rounding", "bound_all"), ".1e") + certified,
+        *numbers,
+        bound_all + (" †" if part(row, "rounding", "certified") else ""),
     )
-
-
-def _loss(value: float | None) -> str:
-    """Return a loss in dB with its sign; one that rounds to nothing has none."""
-    text = number(value, "+.2f")
-    return "0.00" if text in ("+0.00", "-0.00") else text
 
 
 TABLE_LEGEND = """\

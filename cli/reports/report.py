@@ -202,16 +202,9 @@ def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, 
 
     text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters["number"] = _number
+    environment.filters["number"] = bench_report.number
     bench = bench_section(data["bench"]) if data.get("bench") else None
     return environment.from_string(text).render(**{**data, "bench": bench}, pictures=pictures, plots=drawn)
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    """Return a number with so many significant digits, or a dash where there is none."""
-    if value is None:
-        return "–"
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.{digits}g}"
 
 
 def _embedded(png: bytes) -> str:

@@ -96,10 +96,8 @@ def animate(
     seed: options.Seed = 0,
     feature_spp: Rays = None,
     parameters: options.Parameters = None,
-    yaw: options.Yaw = 0.0,
-    pitch: options.Pitch = 0.0,
-    distance: options.Distance = 1.0,
-    light: options.Lights = None,
+    *,
+    view: options.View,
     executor: options.Executor = "auto",
     renderer: options.Renderer = "auto",
     rank: options.CutRank = 0,
@@ -121,7 +119,6 @@ def animate(
     by = chosen(executor), chosen(renderer, work="renderer")
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
     rays = feature_rays(network) if feature_spp is None else feature_spp
-    view = options.View(yaw, pitch, distance, tuple(light or ()))
     named = scene or scene_of(network), _parameters(parameters), view
     times = animation_times(start, seconds, fps)
     numbers = size, reference_spp, seed, rays, learned_shadow_rays(network)

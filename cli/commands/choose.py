@@ -9,10 +9,11 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from ...refimpl.errors import NO_VALUE, InputError
-from ..common import options
 from ..common.terminal import progress, say
 
 if TYPE_CHECKING:
@@ -29,12 +30,48 @@ SMALLEST_PX, LARGEST_PX = 16, 4096
 class Request:
     """What a choice is asked to keep, and where its curve comes from; None for what is not given."""
 
-    max_error: options.MaxError = None
-    max_ms: options.MaxMs = None
-    max_loss_db: options.MaxLoss = None
-    curve: options.CurveFile = None
-    frames: options.CurveFrames = None
-    size: options.CurveSize = None
+    max_error: Annotated[
+        float | None,
+        typer.Option(
+            metavar="E",
+            help="Choose the fastest variant whose measured error is at most E: the largest difference "
+            "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
+            show_default="no limit",
+        ),
+    ] = None
+    max_ms: Annotated[
+        float | None,
+        typer.Option(
+            metavar="T",
+            help="Choose the most accurate variant that takes at most T milliseconds on this machine.",
+            show_default="no limit",
+        ),
+    ] = None
+    max_loss_db: Annotated[
+        float | None,
+        typer.Option(
+            metavar="D",
+            help="Choose the fastest variant whose PSNR over the frames is at most D dB below the full "
+            "network's.",
+            show_default="no limit",
+        ),
+    ] = None
+    curve: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Choose from the measured points in this file (.json).",
+            show_default="measured and cached",
+        ),
+    ] = None
+    frames: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Data set; errors are measured on its test frames."),
+    ] = None
+    size: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Frame size for the times: N x N pixels.", show_default="1024"),
+    ] = None
 
     @property
     def limited(self) -> bool:
@@ -43,14 +80,7 @@ class Request:
 
     def options(self) -> dict[str, object]:
         """Return the options by name."""
-        return {
-            "--max-error": self.max_error,
-            "--max-ms": self.max_ms,
-            "--max-loss-db": self.max_loss_db,
-            "--curve": self.curve,
-            "--frames": self.frames,
-            "--size": self.size,
-        }
+        return {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
 
 
 def check_request(request: Request, variant: str | None) -> None:

@@ -52,10 +52,8 @@ def render(
     seed: options.Seed = 0,
     time: options.Time = None,
     parameters: options.Parameters = None,
-    yaw: options.Yaw = 0.0,
-    pitch: options.Pitch = 0.0,
-    distance: options.Distance = 1.0,
-    light: options.Lights = None,
+    *,
+    view: options.View,
     max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
     sampler: options.SamplerName = "pcg4d",
     dtype: Annotated[
@@ -77,7 +75,7 @@ def render(
     from ...refimpl.light.render import Job
     from ...refimpl.light.transport import Settings
 
-    loaded = load_scene(scene, time, parameters or [], options.View(yaw, pitch, distance, tuple(light or ())))
+    loaded = load_scene(scene, time, parameters or [], view)
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler)
@@ -121,15 +119,12 @@ def scene(
     output: Annotated[Path | None, options.output("FILE", "Output file.", "the terminal")] = None,
     time: options.Time = None,
     parameters: options.Parameters = None,
-    yaw: options.Yaw = 0.0,
-    pitch: options.Pitch = 0.0,
-    distance: options.Distance = 1.0,
-    light: options.Lights = None,
+    *,
+    view: options.View,
 ) -> None:
     """Write a scene as a JSON file that you can edit and render."""
     from ...refimpl.light.scene import to_json
 
-    view = options.View(yaw, pitch, distance, tuple(light or ()))
     text = to_json(load_scene(name, time, parameters or [], view))
     if output is None:
         typer.echo(text, nl=False)

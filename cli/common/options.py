@@ -189,52 +189,6 @@ Variant = Annotated[
         show_default="full",
     ),
 ]
-MaxError = Annotated[
-    float | None,
-    typer.Option(
-        "--max-error",
-        metavar="E",
-        help="Choose the fastest variant whose measured error is at most E: the largest difference "
-        "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
-        show_default="no limit",
-    ),
-]
-MaxMs = Annotated[
-    float | None,
-    typer.Option(
-        "--max-ms",
-        metavar="T",
-        help="Choose the most accurate variant that takes at most T milliseconds on this machine.",
-        show_default="no limit",
-    ),
-]
-MaxLoss = Annotated[
-    float | None,
-    typer.Option(
-        "--max-loss-db",
-        metavar="D",
-        help="Choose the fastest variant whose PSNR over the frames is at most D dB below the full "
-        "network's.",
-        show_default="no limit",
-    ),
-]
-CurveFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--curve",
-        metavar="FILE",
-        help="Choose from the measured points in this file (.json).",
-        show_default="measured and cached",
-    ),
-]
-CurveFrames = Annotated[
-    Path | None,
-    typer.Option("--frames", metavar="FOLDER", help="Data set; errors are measured on its test frames."),
-]
-CurveSize = Annotated[
-    int | None,
-    typer.Option("--size", metavar="N", help="Frame size for the times: N x N pixels.", show_default="1024"),
-]
 Here = Annotated[
     bool,
     typer.Option(
@@ -295,30 +249,6 @@ Seen = Annotated[
         help="Also write specular features, traced through mirrors and glass: seen_albedo, seen_normal, ...",
     ),
 ]
-Yaw = Annotated[
-    float,
-    typer.Option("--yaw", metavar="DEG", help="Orbit the camera around its target, in degrees."),
-]
-Pitch = Annotated[
-    float,
-    typer.Option(
-        "--pitch", metavar="DEG", help="Raise the camera around its target, in degrees (negative: lower it)."
-    ),
-]
-Distance = Annotated[
-    float,
-    typer.Option("--distance", metavar="X", help="Scale the camera distance; 2 moves it twice as far away."),
-]
-Lights = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--light",
-        metavar="N=R,G,B",
-        help="Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. "
-        "Repeatable.",
-        show_default="as in the scene",
-    ),
-]
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help=f"Canonical scene ({SCENES}) or scene file (.json).")
 ]
@@ -355,16 +285,36 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
 class View:
     """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
 
-    yaw_deg: float = 0.0
-    pitch_deg: float = 0.0
-    distance: float = 1.0
-    lights: tuple[str, ...] = ()
+    yaw_deg: Annotated[
+        float, typer.Option("--yaw", metavar="DEG", help="Orbit the camera around its target, in degrees.")
+    ] = 0.0
+    pitch_deg: Annotated[
+        float,
+        typer.Option(
+            "--pitch",
+            metavar="DEG",
+            help="Raise the camera around its target, in degrees (negative: lower it).",
+        ),
+    ] = 0.0
+    distance: Annotated[
+        float, typer.Option(metavar="X", help="Scale the camera distance; 2 moves it twice as far away.")
+    ] = 1.0
+    lights: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--light",
+            metavar="N=R,G,B",
+            help="Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. "
+            "Repeatable.",
+            show_default="as in the scene",
+        ),
+    ] = None
 
     def of(self, scene: Scene) -> Scene:
         """Return the scene from there and under these lamps; its info says so."""
         from ...refimpl.light.variation import Variation, varied
 
-        colors = parse_lights(self.lights, [light.color for light in scene.lights])
+        colors = parse_lights(self.lights or (), [light.color for light in scene.lights])
         return varied(scene, Variation(self.yaw_deg, self.pitch_deg, self.distance, colors))
 
 

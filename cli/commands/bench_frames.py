@@ -154,9 +154,8 @@ def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Fra
 def for_training(model: Model, folder: Path) -> Sequence[Pair]:
     """Return training frames of the model's scene, rendered where they are missing."""
     executor = fastest(work="renderer")
-    spp = min(TRAINING_SPP, SPP_OF_NUMPY) if executor == "numpy" else TRAINING_SPP
     place = folder / f"training-{trained_scene(model)}-{TRAINING_PX}"
-    numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": spp, "size_px": TRAINING_PX}
+    numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": TRAINING_SPP, "size_px": TRAINING_PX}
     _make(place, request_for(model, executor, seed=TRAINING_SEED, **numbers))
     return of_folder(place, model, "train").pairs
 

@@ -36,13 +36,10 @@ REFERENCE = "reference"
 """Name that stands for the reference among the executors."""
 
 
-Program = Annotated[
-    str | None, typer.Option("--program", metavar="CMD", help="Command that runs the program under test.")
-]
+Program = Annotated[str | None, typer.Option(metavar="CMD", help="Command that runs the program under test.")]
 Executor = Annotated[
     str | None,
     typer.Option(
-        "--executor",
         metavar="NAME",
         help="Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
     ),
@@ -57,25 +54,22 @@ Words = Annotated[
 ]
 Vectors = Annotated[
     Path | None,
-    typer.Option(
-        "--vectors", metavar="DIR", help="Folder with the test vectors.", show_default="the bundled vectors"
-    ),
+    typer.Option(metavar="DIR", help="Folder with the test vectors.", show_default="the bundled vectors"),
 ]
 Track = Annotated[
     Path | None,
     typer.Option(
-        "--track",
         metavar="FILE",
         help="Store the verdicts in this file, show the differences from the last run, and fail "
         "only on regressions.",
     ),
 ]
-Timeout = Annotated[float, typer.Option("--timeout", help="Timeout per answer, in seconds.")]
+Timeout = Annotated[float, typer.Option(help="Timeout per answer, in seconds.")]
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write a JSON report.")]
-Junit = Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write a JUnit report.")]
+Junit = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a JUnit report.")]
 Write = Annotated[
     Path | None,
-    typer.Option("--write", metavar="DIR", help="Regenerate the vectors from the reference and exit."),
+    typer.Option(metavar="DIR", help="Regenerate the vectors from the reference and exit."),
 ]
 
 

@@ -15,7 +15,7 @@ import typer
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.executors import chosen
-from ..common.inputs import CHECKPOINT_MARK
+from ..common.inputs import CHECKPOINT_MARK, load_model
 from ..common.options import Preset
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files.alone import alone_at
@@ -210,19 +210,22 @@ def _of_variant(
     from ...refimpl.network.train import check_recipe
 
     bits = whole_bits(name)
-    if begin is not None or bits is None:
-        _check_alone(name, chosen)
-        return _begin_varied(recipe, begin, name)
-    found = replace(recipe, whole=amplitude_of(bits))
-    check_recipe(found)
-    return found, None
+    if begin is None and bits is not None:
+        found = replace(recipe, whole=amplitude_of(bits))
+        check_recipe(found)
+        return found, None
+    for option, value in chosen.items():
+        if value is not None:
+            raise InputError("--variant", name, f"it chooses what {option} does", f"leave out {option}")
+    if begin is None:
+        raise InputError("--variant", name, "is derived from a trained model", "name one with --from")
+    return varied(recipe, load_model(begin), name)
 
 
 def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
     """Write a model in integers, rounded on the frames and not trained, and say so."""
     from ...models.model_file import save_model
     from ...refimpl.network.train import whole_of
-    from ..common.inputs import load_model
 
     save_model(output, whole_of(load_model(begin), pairs, recipe.whole, recipe.seed))
     say(f"{output}: {begin} in integers, rounded on {len(pairs)} frames")
@@ -230,29 +233,11 @@ def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path,
 
 def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None:
     """Return the network to begin with, if one is named."""
-    from ..common.inputs import load_model
-
     if begin is None:
         return None
     if state is not None:
         raise InputError("--from", str(begin), "a resumed run continues from its checkpoint", "leave it out")
     return load_model(begin).siren
-
-
-def _check_alone(variant: str, options: dict[str, Any]) -> None:
-    """Refuse options beside the name of a variant that choose what it chooses."""
-    for option, value in options.items():
-        if value is not None:
-            raise InputError("--variant", variant, f"it chooses what {option} does", f"leave out {option}")
-
-
-def _begin_varied(recipe: Recipe, begin: Path | None, name: str) -> tuple[Recipe, Siren]:
-    """Return the recipe and the first network of a variant of the model that a run begins with."""
-    from ..common.inputs import load_model
-
-    if begin is None:
-        raise InputError("--variant", name, "is derived from a trained model", "name one with --from")
-    return varied(recipe, load_model(begin), name)
 
 
 def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
@@ -430,7 +415,6 @@ def _say_what_there_is(path: Path, steps: int) -> None:
 def _said_of_domain(path: Path) -> str:
     """Return what a model states as its domain."""
     from ...refimpl.network.domain import LEAST_FRAMES, of_model
-    from ..common.inputs import load_model
 
     domain = of_model(load_model(path))
     if domain is None:

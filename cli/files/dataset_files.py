@@ -204,14 +204,8 @@ def manifest_of(
             known = sums.get(frame[kind]["file"])
             frame[kind] |= {"bytes": known and known.bytes, "sha256": known and known.sha256}
     head = {"schema": SCHEMA, "wamnet": version(), "request": request.as_data()}
-    complete = all(known is not None for known in _known(facts))
+    complete = all(frame[kind]["sha256"] for frame in facts for kind in KINDS)
     return {**head, "complete": complete, "nearest": dict(nearest or {}), "frames": facts}
-
-
-def _known(frames: Sequence[Mapping[str, Any]]) -> Iterator[str | None]:
-    """Yield the checksum of each picture, or None."""
-    for frame in frames:
-        yield from (frame[kind]["sha256"] for kind in KINDS)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

@@ -22,23 +22,17 @@ from ...refimpl.errors import InputError
 from ...refimpl.frame import DIRECT, HISTORY, LAYERS, SEEN, SUN
 from .exr_header import Part
 
+_LETTERS = {
+    **dict.fromkeys(("albedo", "unshadowed", "seen_albedo", "seen_emission", "history", "direct"), "RGB"),
+    **dict.fromkeys(("normal", "position", "direction", "seen_normal", "seen_position", "sun"), "XYZ"),
+    "depth": "Z",
+    "seen_depth": "Z",
+    "history_weight": "V",
+}
+
 CHANNELS: Mapping[str, tuple[str, ...]] = {
     "color": ("R", "G", "B"),
-    "albedo": ("albedo.R", "albedo.G", "albedo.B"),
-    "normal": ("normal.X", "normal.Y", "normal.Z"),
-    "depth": ("depth.Z",),
-    "position": ("position.X", "position.Y", "position.Z"),
-    "direction": ("direction.X", "direction.Y", "direction.Z"),
-    "unshadowed": ("unshadowed.R", "unshadowed.G", "unshadowed.B"),
-    "seen_albedo": ("seen_albedo.R", "seen_albedo.G", "seen_albedo.B"),
-    "seen_normal": ("seen_normal.X", "seen_normal.Y", "seen_normal.Z"),
-    "seen_depth": ("seen_depth.Z",),
-    "seen_position": ("seen_position.X", "seen_position.Y", "seen_position.Z"),
-    "seen_emission": ("seen_emission.R", "seen_emission.G", "seen_emission.B"),
-    "history": ("history.R", "history.G", "history.B"),
-    "history_weight": ("history_weight.V",),
-    "sun": ("sun.X", "sun.Y", "sun.Z"),
-    "direct": ("direct.R", "direct.G", "direct.B"),
+    **{layer: tuple(f"{layer}.{letter}" for letter in letters) for layer, letters in _LETTERS.items()},
 }
 """The channels that hold each layer in the files that are written here."""
 

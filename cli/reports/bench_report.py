@@ -5,7 +5,7 @@ The data are those of spec/bench.md; here they are only written down and drawn.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -385,10 +385,10 @@ def draw(data: Data, theme: plots.Theme) -> dict[str, bytes]:
     return drawn
 
 
-def section(data: Data) -> dict[str, Any]:
+def section(data: Data, embed: Callable[[bytes], str]) -> dict[str, Any]:
     """Return what the demo's report shows of a benchmark: texts, tables, and plots for both kinds of page."""
     heads, rows = speed_table(data)
-    by_theme = {"light": draw(data, plots.LIGHT), "dark": draw(data, plots.DARK)}
+    light, dark = draw(data, plots.LIGHT), draw(data, plots.DARK)
     return {
         "data": data,
         "network": network_text(data),
@@ -400,5 +400,5 @@ def section(data: Data) -> dict[str, Any]:
         "trade_rows": [_full_row(data, row) for row in measured(data)],
         "trade_legend": TABLE_LEGEND,
         "notes": notes(data),
-        "plots": {name: {theme: by_theme[theme][name] for theme in by_theme} for name in by_theme["light"]},
+        "plots": {name: {"light": embed(light[name]), "dark": embed(dark[name])} for name in light},
     }

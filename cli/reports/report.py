@@ -186,16 +186,6 @@ def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
     return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
 
 
-def bench_section(bench: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the page shows of a benchmark, plots as embedded pictures."""
-    found = bench_report.section(bench)
-    shown = {
-        name: {theme: _embedded(png) for theme, png in pictures.items()}
-        for name, pictures in found["plots"].items()
-    }
-    return {**found, "plots": shown}
-
-
 def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
     """Return the report as one HTML page."""
     import jinja2
@@ -203,7 +193,7 @@ def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, 
     text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters["number"] = bench_report.number
-    bench = bench_section(data["bench"]) if data.get("bench") else None
+    bench = bench_report.section(data["bench"], _embedded) if data.get("bench") else None
     return environment.from_string(text).render(**{**data, "bench": bench}, pictures=pictures, plots=drawn)
 
 

@@ -88,7 +88,7 @@ def _serve(pipe: Any) -> None:
             os._exit(0)
         try:
             pipe.send(function(*arguments))
-        except Exception:  # noqa: BLE001 - it is the caller who is told
+        except Exception:  # noqa: BLE001 - the caller sees how the process ended
             os._exit(1)
 
 

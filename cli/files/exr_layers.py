@@ -29,6 +29,7 @@ _LETTERS = {
     "seen_depth": "Z",
     "history_weight": "V",
 }
+"""Letters of each layer's channels; those of the colour have no layer before them."""
 
 CHANNELS: Mapping[str, tuple[str, ...]] = {
     "color": ("R", "G", "B"),

@@ -68,8 +68,8 @@ def _cases(
 ) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
 
-    Near two borders are `every` pair of distances, or some, and a whole group, whose items have every pair of
-    their own.
+    Near two borders are `every` pair of distances, with first columns and rows that are 0 or far, or some, and
+    a whole group, whose items have every pair of their own.
     """
     random, caps = words(seed), (steps[0] + window, steps[1] + window)
 
@@ -81,13 +81,13 @@ def _cases(
     across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
     cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
     near = range(1, caps[0] + 2), range(1, caps[1] + 2)
-    pairs = [*itertools.product(*near)]
+    corners = [*itertools.product((None, 0), repeat=2)]
+    chosen = [*itertools.product(itertools.product(*near), corners)]
     if not every:
-        pairs = [steps] * 4 + [(1 + next(random) % a[-1], 1 + next(random) % b[-1]) for a, b in [near] * SOME]
-    for n, (b, d) in enumerate(pairs):
-        k = n if n < 4 else next(random)
-        cases.append(((0 if k % 2 else None, b), (0 if k // 2 % 2 else None, d)))
-    for a, c in itertools.product((None, 0), repeat=2):
+        some = [(1 + next(random) % a[-1], 1 + next(random) % b[-1]) for a, b in [near] * SOME]
+        chosen = [(steps, c) for c in corners] + [(pair, corners[next(random) % 4]) for pair in some]
+    cases += [((x, b), (y, d)) for (b, d), (x, y) in chosen]
+    for a, c in corners:
         cases += [((a, None), (c, None)), ((a, None), (c, steps[1])), ((a, steps[0]), (c, None))]
     return np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T, caps
 

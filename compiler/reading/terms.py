@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .field import P, Words, combined, drawn, hashed, literal
+from .lanes import Wrong
 
 
 class Fold:
@@ -124,6 +125,8 @@ def operate(name: str, a: Term, b: Term, dual: bool) -> Term:
     """Return a sum, a difference or a product; `dual`: a sum may be an expression as well."""
     sums: Words | None = None
     if name == "multiply":
+        if any(each.shape is not None and _is_zero(each.shape) for each in (a, b)):
+            raise Wrong("a product with 0, which is no number where the other factor is infinite")
         if a.draw is not None or b.draw is not None:
             sums = _product(a, b)
         elif a.literal or b.literal:
@@ -151,7 +154,8 @@ def _product(a: Term, b: Term) -> Words:
 
 
 def _is_zero(shape: Words) -> bool:
-    return bool((shape == literal(0.0, "float32").known[0]).all())
+    zero = literal(0.0, "float32").known[0]
+    return shape.flat[0] == zero and bool((shape == zero).all())
 
 
 def _aligned(function: Any, a: Words, b: Words) -> Words:

@@ -507,10 +507,11 @@ class Trial(Runner):
         if key not in self.pixels:
             width, height = (self.lanes.known[axis][:, None] for axis in (1, 3))
             rows, columns = (Place.values_of(each) for each in (row, column))
-            self._wrong((rows < 0) | (rows >= height), f"image {array} is read beyond its ends")
-            found = (rows * width + columns) * channels, columns * channels, row, column
+            beyond = (rows < 0) | (rows >= height)
+            found = beyond, (rows * width + columns) * channels, columns * channels, row, column
             self.pixels = {**dict([*self.pixels.items()][-3:]), key: found}
-        first, across, *_ = self.pixels[key]
+        beyond, first, across, *_ = self.pixels[key]
+        self._wrong(beyond, f"image {array} is read beyond its ends")  # other lanes may be active now
         size = self.lanes.known[1][:, None] * channels
         shapes = []
         for k in range(kind.lanes):
@@ -531,7 +532,7 @@ class Trial(Runner):
             return self.numbers[key]
         found = stacked([self._float(self.value(each)) for each in value.args])
         if all(each.op == "const" for each in value.args):
-            if self.dual:  # a column of weights
+            if self.dual and any(each.value for each in value.args):  # a column of weights
                 found = Term(found.shape, draw=found.value)
             self.numbers[key] = found
         return found

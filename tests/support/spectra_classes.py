@@ -5,6 +5,8 @@ from __future__ import annotations
 C, BOTH, GL = ("c",), ("c", "opencl"), ("opengl",)
 BIAS = "+ *(const wamnet_vector *)(weights + (1920) * LANES)"
 TWICE = "real[t][0] += w0 * a; real[t][0] += w0 * a;"
+SEEN = "bool inside = row == top && column == left;"
+ABOVE = "image_color[(top * width + column) * 3 + 0]"
 PLACE = "number % across * OUT"
 
 CLASSES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
@@ -34,6 +36,12 @@ CLASSES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("a middle of the border only", BOTH, " : 0.0f) - 0.5f;", " : 0.5f) - 0.5f;"),
     ("an image for another", BOTH, "? image_normal[", "? image_color["),
     ("the image's last row", BOTH, "0, height - 1)", "0, height - 2)"),
+    ("another pixel in an image of one size", (*BOTH, *GL), "bool inside = row == top && column == left",
+        "bool inside = row == top && column == left && !(tile_x == 0 && width == 5 && height - tile_y == 3)"),
+    ("a row beyond the image behind the same row inside", BOTH, SEEN,
+        SEEN + " if (row == top) { float t900 = " + ABOVE + "; } float t901 = " + ABOVE + ";"),
+    ("a product of 0 and what is infinite", BOTH, "sum[p][0] += w0 * value;",
+        "sum[p][0] += w0 * value + 0.0f * (1.0f / 0.0f);"),
     # spectra of the images
     ("a conjugate that is dropped", BOTH, " = b - d;", " = b + d;"),
     ("channels exchanged", BOTH, " = b + d;", " = c - a;"),

@@ -68,7 +68,7 @@ def _cases(
 ) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
 
-    Near two borders are `every` pair of distances, with first columns and rows that are 0 or far, or some, and
+    Near two borders are `every` pair of distances, first columns and rows being 0 or far, or some, and
     a whole group, whose items have every pair of their own.
     """
     random, caps = words(seed), (steps[0] + window, steps[1] + window)

@@ -27,7 +27,7 @@ WAYS = [
     for row in targets.ROWS
     for place, held in row.places.items()
     for schedule in held.schedules
-    if schedule not in targets.SPECTRA
+    if not schedule.startswith("fft")
 ]
 """Each target with each place of its weights and each schedule there; spectra hold no integers."""
 

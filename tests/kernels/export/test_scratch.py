@@ -97,6 +97,11 @@ def test_no_call_takes_more_stack_than_its_header_states(tmp_path, schedule, com
     (tmp_path / "one.c").write_text('#include "denoise.h"\nvoid *one = (void *)wamnet_image;\n')
     for options in (("-O0",), ("-O2",)):
         tools.run(compiler, *options, "-w", "-fstack-usage", "-c", "one.c", folder=tmp_path)
-        frames = [int(line.split()[-2]) for line in (tmp_path / "one.su").read_text().splitlines()]
+        frames = {}
+        for line in (tmp_path / "one.su").read_text().splitlines():
+            function, size, _ = line.split("\t")
+            # A program runs one clone of a function: that for its processor.
+            key = re.sub(r"[.]arch_\w+", "", function)
+            frames[key] = max(frames.get(key, 0), int(size))
         # No function calls deeper than image, pixel, transform: all frames together are more than any path.
-        assert 0 < sum(frames) <= stated, options
+        assert 0 < sum(frames.values()) <= stated, options

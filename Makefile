@@ -45,7 +45,7 @@ docs: ## Build the web site: spec, tutorial, course; open out/site/index.html
 	@.ci/setup docs
 	@$(VENV)/bin/python docs/site/build.py
 
-quick: ## Run the tests that need NumPy, and no device, compiler or browser (three minutes on two cores)
+quick: ## Run the tests that need NumPy, and no device, compiler or browser (four minutes on two cores)
 	@.ci/setup quick
 	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE --budget $(QUICK_S)
 

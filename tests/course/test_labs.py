@@ -109,11 +109,7 @@ def test_an_unknown_lab_is_refused():
         ("import sys\nsys.exit(3)", "SystemExit: 3", "return a value"),
         ("x = 1", "AttributeError", "gone or renamed"),
         ("def meet_sphere(*a):\n    return meet_sphere(*a)", "RecursionError", "without an end"),
-        (
-            "import numpy as np\ndef meet_sphere(c, r, o, d):\n    return [o, d, o]",
-            "shape|",
-            "",
-        ),
+        ("import numpy as np\ndef meet_sphere(c, r, o, d):\n    return [o, d, o]", "shape|", ""),
     ],
 )
 def test_what_python_says_is_explained(code, found, likely, here):

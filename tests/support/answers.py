@@ -38,7 +38,7 @@ def answers(lab: Lab) -> list[Answer]:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return [Answer(*row) for row in module.WRONG]
+    return [Answer(old, *row) for old, rows in module.WRONG.items() for row in rows]
 
 
 def right_answer(lab: Lab) -> str:

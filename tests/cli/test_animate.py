@@ -334,10 +334,7 @@ def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
         (["--rank", -1], "rank -1: a window of "),
         (["--scene", "nowhere"], "scene 'nowhere"),
         (["--reference-spp", -1], "spp -1"),
-        (
-            ["-o", "a.avi"],
-            "output 'a.avi': must end in .mp4 or .gif, or name a folder (rename",
-        ),
+        (["-o", "a.avi"], "output 'a.avi': must end in .mp4 or .gif, or name a folder (rename"),
         (["-o", "no/a.gif"], "output folder 'no': not found"),
         (["-o", "no/a"], "output folder 'no': not found"),
         (["-o", "file"], "output folder 'file': is a file"),

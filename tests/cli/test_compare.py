@@ -141,10 +141,7 @@ def test_unexplained_components_in_words() -> None:
         (("--paths", "nowhere"), "scene 'nowhere': unknown"),
         (("--paths", "empty", "--width", 0), "width 0: must be an integer from 1 to 65536"),
         (("--paths", "empty", "--max-depth", -1), "max_depth -1: must be an integer of 0 or more"),
-        (
-            ("--paths", "empty", "--executor", "numpy", "--spp", 1),
-            "spp 1: Welch's test needs the variance",
-        ),
+        (("--paths", "empty", "--executor", "numpy", "--spp", 1), "spp 1: Welch's test needs the variance"),
     ],
 )
 def test_refusals_of_paths(refused, arguments, text) -> None:

@@ -149,29 +149,19 @@ def test_vectors_are_written(wamnet, tmp_path, monkeypatch):
         (("--program", "a", "--executor", "numpy"), "--program and --executor: exclude each other"),
         (("--program", "'"), "is not a command: No closing quotation ("),
         (("--program", " "), "is not a command"),
-        (
-            ("--program", "/no/such/program"),
-            "must answer to hello (crash: /no/such/program cannot be started",
-        ),
-        (
-            ("--executor", "abacus"),
-            "--executor 'abacus': unknown (choose one of reference, numpy, opencl, opengl",
-        ),
+        (("--program", "/no/such/program"),
+         "must answer to hello (crash: /no/such/program cannot be started"),
+        (("--executor", "abacus"),
+         "--executor 'abacus': unknown (choose one of reference, numpy, opencl, opengl"),
         (("--executor", "numpy", "--profile", "fast"), "fast"),
-        (
-            ("--executor", "numpy", "--timeout", "0"),
-            "--timeout 0.0: must be a positive number of seconds",
-        ),
-        (
-            ("--executor", "numpy", "--timeout", "nan"),
-            "--timeout nan: must be a positive number of seconds",
-        ),
+        (("--executor", "numpy", "--timeout", "0"), "--timeout 0.0: must be a positive number of seconds"),
+        (("--executor", "numpy", "--timeout", "nan"), "--timeout nan: must be a positive number of seconds"),
         (("--executor", "numpy", "-k", "nothing"), "-k 'nothing': no case has such an id, clause or flag"),
         (("--executor", "numpy", "--vectors", "/no/such/folder"), "holds no file of vectors"),
         (("--executor", "numpy", "--json", "/no/such/folder/a"), "output folder '/no/such/folder"),
         (("--write", "x", "--executor", "numpy"), "--write 'x': it makes vectors and asks nobody"),
     ],
-)
+)  # fmt: skip
 def test_what_is_refused(wamnet, arguments, text):
     done = wamnet("conformance", *arguments)
     assert (done.status, done.out) == (2, "")

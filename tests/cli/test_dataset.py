@@ -273,10 +273,7 @@ def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
         ([], "argument SCENE: missing"),
         (["--check"], "data set 'dataset': has no manifest.json (make one"),
         (["none.json"], "scene file 'none.json': not found (check"),
-        (
-            ["minicbes"],
-            "unknown (did you mean 'minicubes'? choose one of minicubes, glossy",
-        ),
+        (["minicbes"], "unknown (did you mean 'minicubes'? choose one of minicubes, glossy"),
         (["minicubes", "--frames", 0], "frames 0: must be an integer from 1 to"),
         (["minicubes", "--workers", 0], "workers 0: at least one process must work"),
         (["minicubes", "--workers", 2, "--scheduler", "x"], "a running scheduler has its own workers (leave"),
@@ -356,10 +353,7 @@ def test_a_scene_file_is_a_scene(wamnet, refused, tmp_path) -> None:
     ("arguments", "text"),
     [
         ((), "scene 'cornell': is static, and without a range of camera or lights all its frames show"),
-        (
-            ("--yaw=-9:9", "--arc", 1),
-            "argument '--arc': has no meaning for a scene file, which is static",
-        ),
+        (("--yaw=-9:9", "--arc", 1), "argument '--arc': has no meaning for a scene file, which is static"),
         (("--yaw=-9:9", "--set", "size=1"), "option for the scene 'size': a scene file has no parameters"),
     ],
 )

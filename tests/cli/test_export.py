@@ -80,32 +80,24 @@ def test_help_names_every_target():
     ("arguments", "told"),
     [
         (["--target", "abacus"], "--target 'abacus': unknown (choose one of opencl, glsl"),
-        (
-            ["--target", "c", "--weights", "texture"],
-            "--weights 'texture': is not available for target c (choose one of buffer, inline",
-        ),
+        (["--target", "c", "--weights", "texture"],
+         "--weights 'texture': is not available for target c (choose one of buffer, inline"),
         (["--target", "c", "--time", "2"], "--time 2.0: there is no scene (name one with --scene"),
         (["--target", "c", "--max-depth", "2"], "--max-depth 2: there is no scene"),
         (["--target", "c", "--moving", "time"], "--moving 'time': there is no scene"),
         (["--target", "c", "--fps", "5"], "--fps 5.0: nothing moves (add --moving time"),
-        (
-            ["--target", "c", "--scene", "minicubes", "--moving", "camera", "--seconds", "2"],
-            "--seconds 2.0: time does not move (add it to --moving",
-        ),
-        (
-            ["--target", "c", "--scene", "minicubes", "--moving", "tide"],
-            "--moving 'tide': unknown (did you mean 'time'? choose one of time, camera",
-        ),
+        (["--target", "c", "--scene", "minicubes", "--moving", "camera", "--seconds", "2"],
+         "--seconds 2.0: time does not move (add it to --moving"),
+        (["--target", "c", "--scene", "minicubes", "--moving", "tide"],
+         "--moving 'tide': unknown (did you mean 'time'? choose one of time, camera"),
         (["--target", "html", "--moving", "time"], "--moving 'time': a web page has its own"),
         (["--target", "html", "--weights", "inline"], "--weights 'inline': a web page has its own"),
         (["--target", "html", "--schedule", "plain"], "--schedule 'plain': a web page has its own"),
-        (
-            ["--target", "wgsl", "--schedule", "tile:8"],
-            "--schedule 'tile:8': is not available for target wgsl with --weights",
-        ),
+        (["--target", "wgsl", "--schedule", "tile:8"],
+         "--schedule 'tile:8': is not available for target wgsl with --weights"),
         (["--target", "c", "-o", "noisy.exr"], "output folder 'noisy.exr': is a file"),
     ],
-)
+)  # fmt: skip
 def test_refusals(refused, samples, tmp_path, arguments, told):
     (tmp_path / "noisy.exr").write_bytes(b"")
     assert told in refused("export", samples / "model.safetensors", *arguments)

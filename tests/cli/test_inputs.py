@@ -169,10 +169,7 @@ def test_models_have_names(samples, monkeypatch, tmp_path, capsys) -> None:
         (
             {"scene": "empty"},
             {"scene": "cornell", "spp": "1", "feature_spp": "4"},
-            [
-                "it shows cornell",
-                "its features are of --feature-spp 4, those of the training of 1",
-            ],
+            ["it shows cornell", "its features are of --feature-spp 4, those of the training of 1"],
         ),
     ],
 )
@@ -206,17 +203,13 @@ RANGES = Ranges((0.0, 6.0), (-24.0, 24.0), (-8.0, 8.0), (0.9, 1.1), (0.0, 0.5))
         ({}, []),
         ({"yaw_deg": "24.0", "pitch_deg": "-8.0", "distance": "1.1", "time": "13.0"}, []),
         ({"yaw_deg": "40.0"}, ["the camera's yaw is 40° (learned: -24° to 24°)"]),
-        (
-            {"time": "7.0", "pitch_deg": "-9.0"},
-            ["the time is 7 s (learned: 0 s to 6 s)", "the camera's pitch is -9° (learned: -8° to 8°)"],
-        ),
-        (
-            {"lights": json.dumps([lamp_color(scenes.WARM, 0.3, 0.7), scenes.COOL])},
-            ["the saturation of lamp 1 is 0.70 (learned: 0.00 to 0.50)"],
-        ),
+        ({"time": "7.0", "pitch_deg": "-9.0"},
+         ["the time is 7 s (learned: 0 s to 6 s)", "the camera's pitch is -9° (learned: -8° to 8°)"]),
+        ({"lights": json.dumps([lamp_color(scenes.WARM, 0.3, 0.7), scenes.COOL])},
+         ["the saturation of lamp 1 is 0.70 (learned: 0.00 to 0.50)"]),
     ],
     ids=str,
-)
+)  # fmt: skip
 def test_frames_outside_of_the_ranges_of_the_training(samples, shown, told) -> None:
     """One sentence names all; the scene's own lamps are inside, whatever their saturation."""
     model = load_model(samples / "model.safetensors")

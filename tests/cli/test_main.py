@@ -24,18 +24,9 @@ from wamnet.refimpl.light.transport import SAMPLERS
 from wamnet.refimpl.network.train import PRESETS
 
 COMMANDS = (
-    "render",
-    "scene",
-    "dataset",
-    "train",
-    "compile",
-    "denoise",
-    "compare",
-    "triage",
-    "animate",
-    "executors",
-    "demo",
-)
+    "render", "scene", "dataset", "train", "compile", "denoise", "compare", "triage", "animate", "executors",
+        "demo",
+)  # fmt: skip
 
 
 def run_process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -80,14 +80,8 @@ def test_depth_counts_edges(printed) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            "render --by numpy,abacus",
-            "--by 'numpy,abacus': must be one or more of numpy, opencl, opengl",
-        ),
-        (
-            "render --scenes nowhere",
-            "scene 'nowhere': unknown (choose one of minicubes, ",
-        ),
+        ("render --by numpy,abacus", "--by 'numpy,abacus': must be one or more of numpy, opencl, opengl"),
+        ("render --scenes nowhere", "scene 'nowhere': unknown (choose one of minicubes, "),
         ("render --scenes ,", "scene ',': unknown"),
         ("render --scenes none.json", "scene file 'none.json': not found"),
         ("pipeline --scene none.json", "scene file 'none.json': not found"),

@@ -140,37 +140,23 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
     ("arguments", "text"),
     [
         (["nowhere"], "scene 'nowhere': unknown (choose one of minicubes,"),
-        (
-            ["none.json"],
-            "scene file 'none.json': not found (check the name",
-        ),
-        (
-            ["minicubes", "--set", "orbit"],
-            "--set 'orbit': must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER",
-        ),
+        (["none.json"], "scene file 'none.json': not found (check the name"),
+        (["minicubes", "--set", "orbit"], "--set 'orbit': must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"),
         (["minicubes", "--set", "warm=x"], "--set 'warm=x': must be"),
         (["minicubes", "--set", "warm=1,2"], "--set 'warm=1,2': must be"),
-        (
-            ["minicubes", "--set", "albedo=1"],
-            "parameter 'albedo': unknown to scene minicubes (choose one of time, ",
-        ),
-        (
-            ["minicubes", "--set", "warm=1"],
-            "parameter warm 1.0: scene minicubes needs three numbers with commas",
-        ),
-        (
-            ["furnace", "--set", "albedo=1,2,3"],
-            "parameter albedo (1.0, 2.0, 3.0): scene furnace needs one number",
-        ),
+        (["minicubes", "--set", "albedo=1"],
+         "parameter 'albedo': unknown to scene minicubes (choose one of time, "),
+        (["minicubes", "--set", "warm=1"],
+         "parameter warm 1.0: scene minicubes needs three numbers with commas"),
+        (["furnace", "--set", "albedo=1,2,3"],
+         "parameter albedo (1.0, 2.0, 3.0): scene furnace needs one number"),
         (["minicubes", "--yaw", "181"], "yaw_deg 181.0: must be a number from -180 to 180 (choose"),
         (["minicubes", "--yaw", "nan"], "yaw_deg nan: must be a number from -180 to 180"),
         (["minicubes", "--pitch", "-86"], "pitch_deg -86.0: must be a number from -85 to 85"),
         (["minicubes", "--distance", "0"], "distance 0.0: must be a number from 0.1 to 10"),
         (["minicubes", "--distance", "inf"], "distance inf: must be a number from 0.1 to 10"),
-        (
-            ["minicubes", "--light", "1,1,1"],
-            "--light '1,1,1': must be N=R,G,B: a light's number and its colour (for example --light 1=",
-        ),
+        (["minicubes", "--light", "1,1,1"],
+         "--light '1,1,1': must be N=R,G,B: a light's number and its colour (for example --light 1="),
         (["minicubes", "--light", "1=1,2"], "--light '1=1,2': must be N=R,G,B"),
         (["minicubes", "--light", "x=1,1,1"], "--light 'x=1,1,1': must be N=R,G,B"),
         (["minicubes", "--light", "1=0,0,0"], "its channels must be finite, 0 or more, and not all 0"),
@@ -179,10 +165,8 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lights are 1 to 2 (choose"),
         (["minicubes", "--light", "0=1,1,1"], "--light '0=1,1,1': the scene's lights are 1 to 2 (choose"),
         (["daylight", "--light", "1=1,1,1"], "--light '1=1,1,1': the scene has no lights (leave it out"),
-        (
-            ["minicubes", "--light", "1=1,1,1", "--light", "1=1,1,0"],
-            "--light '1=1,1,0': light 1 already has a colour (give one per light",
-        ),
+        (["minicubes", "--light", "1=1,1,1", "--light", "1=1,1,0"],
+         "--light '1=1,1,0': light 1 already has a colour (give one per light"),
         (["minicubes", "--width", "0"], "width 0: must be an integer from 1 to"),
         (["minicubes", "--spp", "-1"], "spp -1: must be an integer from 1 to"),
         (["minicubes", "--seed", "-1"], "seed -1: must be an integer from 0 to"),
@@ -192,7 +176,7 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "-o", "a.jpg"], "output file 'a.jpg': must end in .exr or .png"),
         (["minicubes", "-o", "no/a.exr"], "output folder 'no': not found (create it: mkdir -p 'no'"),
     ],
-)
+)  # fmt: skip
 def test_refusals(refused, arguments, text) -> None:
     """Each before any work, and without a file."""
     assert text in refused("render", *arguments)

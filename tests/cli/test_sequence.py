@@ -53,8 +53,7 @@ def test_a_pattern_stands_for_its_files_in_order(tmp_path, pattern):
 
 
 @pytest.mark.parametrize(
-    ("pattern", "rule"),
-    [("z*.exr", "not found"), ("%d.%d.exr", "one number"), ("%d/x.exr", "one number")],
+    ("pattern", "rule"), [("z*.exr", "not found"), ("%d.%d.exr", "one number"), ("%d/x.exr", "one number")]
 )
 def test_a_pattern_that_stands_for_no_file_is_refused(tmp_path, pattern, rule):
     with pytest.raises(InputError, match=rule):

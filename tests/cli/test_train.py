@@ -82,10 +82,7 @@ def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
         (["--steps", "0"], "recipe: steps 0"),
         (["--seed", "-1"], "recipe: seed -1"),
         (["--features", "colour"], "colour"),
-        (
-            ["-i", "noisy.exr"],
-            "number of targets 1: each --input needs its --target, and there are 2 inputs",
-        ),
+        (["-i", "noisy.exr"], "number of targets 1: each --input needs its --target, and there are 2 inputs"),
         (["-o", "m.pt"], "output file 'm.pt': must end in .safetensors"),
         (["-o", "no/m.safetensors"], "output folder 'no': not found"),
         (["--resume"], "wamnet-checkpoint file 'model.checkpoint.safetensors': not found"),

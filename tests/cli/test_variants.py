@@ -127,33 +127,25 @@ REFUSED = {
     "variant 'window9': the window has 4 x 4 taps": (*COMPILE, "--variant", "window9"),
     "--variant 'full': --max-ms chooses a variant itself": (*COMPILE, "--variant", "full", "--max-ms", 3),
     "list of options '--size': a choice needs --max-error": (*COMPILE, "--size", 64),
-    "--curve 'curve.json': its points are measured already": (
-        *(*COMPILE, "--max-ms", 3, "--curve", "curve.json", "--size", 64),
-    ),
+    "--curve 'curve.json': its points are measured already": (*(*COMPILE, "--max-ms", 3, "--curve",
+        "curve.json", "--size", 64),),
     "--size 8: must be from 16 to 4096": (*COMPILE, "--max-ms", 3, "--size", 8),
     "--max-error nan: must be finite": (*COMPILE, "--max-error", "nan", "--curve", "curve.json"),
     "--frames: missing": (*COMPILE, "--max-error", 0.1),
-    "no point of the curve keeps it; the nearest is window3": (
-        *(*COMPILE, "--max-ms", 3, "--curve", "curve.json"),
-    ),
-    "curve.json: profile 'ieee': this one is for native": (
-        *(*COMPILE, "--profile", "native", "--max-ms", 3, "--curve", "curve.json"),
-    ),
+    "no point of the curve keeps it; the nearest is window3": (*(*COMPILE, "--max-ms", 3, "--curve",
+        "curve.json"),),
+    "curve.json: profile 'ieee': this one is for native": (*(*COMPILE, "--profile", "native", "--max-ms", 3,
+        "--curve", "curve.json"),),
     "curve file 'none.json': not found": (*COMPILE, "--max-ms", 3, "--curve", "none.json"),
-    "rank 2: the variant is window3": (
-        *("denoise", "model.safetensors", "noisy.exr", "--rank", 2, "--variant", "window3"),
-    ),
-    "--variant 'window3': is derived from a trained model": (
-        *("train", "-i", "noisy.exr", "-t", "reference.exr", "--variant", "window3"),
-    ),
-    "--variant 'window3': it chooses what --rank does": (
-        *("train", "-i", "noisy.exr", "-t", "reference.exr", "--from", "model.safetensors"),
-        *("--variant", "window3", "--rank", 2),
-    ),
-    "minicubes is a scene, whose kernels have one schedule, no variants": (
-        *("compile", "minicubes", "--target", "opencl", "--variant", "rank2"),
-    ),
-}
+    "rank 2: the variant is window3": (*("denoise", "model.safetensors", "noisy.exr", "--rank", 2,
+        "--variant", "window3"),),
+    "--variant 'window3': is derived from a trained model": (*("train", "-i", "noisy.exr", "-t",
+        "reference.exr", "--variant", "window3"),),
+    "--variant 'window3': it chooses what --rank does": (*("train", "-i", "noisy.exr", "-t", "reference.exr",
+        "--from", "model.safetensors"), *("--variant", "window3", "--rank", 2)),
+    "minicubes is a scene, whose kernels have one schedule, no variants": (*("compile", "minicubes",
+        "--target", "opencl", "--variant", "rank2"),),
+}  # fmt: skip
 """What is said, and of which command."""
 
 

@@ -197,16 +197,11 @@ def test_who_names_this_machine_gets_the_page(served, name):
 @pytest.mark.parametrize(
     "host",
     [
-        "Host: evil.example:{port}\r\n",
-        "Host: evil.example\r\n",
-        "Host: 127.0.0.1\r\n",
-        "Host: 127.0.0.1:1\r\n",
-        "Host: 127.0.0.1:{port}.evil.example\r\n",
-        "Host: 127.0.0.1:{port}\r\nHost: evil.example\r\n",
-        "Host:\r\n",
-        "",
+        "Host: evil.example:{port}\r\n", "Host: evil.example\r\n", "Host: 127.0.0.1\r\n",
+            "Host: 127.0.0.1:1\r\n", "Host: 127.0.0.1:{port}.evil.example\r\n",
+            "Host: 127.0.0.1:{port}\r\nHost: evil.example\r\n", "Host:\r\n", "",
     ],
-)
+)  # fmt: skip
 @pytest.mark.parametrize("method", ["GET", "HEAD"])
 def test_who_names_another_machine_gets_nothing(served, method, host):
     """A page of another site, whose name was made to point here, could read the model otherwise."""

@@ -93,21 +93,16 @@ class Maker:
 
 
 ODD: Mapping[str, list[dict[str, Any]]] = {
-    "Conv": [
-        *({"dilations": [2]}, {"pads": [1, 1]}, {"auto_pad": "SAME"}, {"strides": [2, 1]}, {"group": 0}),
-        *(
-            {"auto_pad": "SAME_UPPER", "pads": [1, 1, 1, 1]},
-            {"pads": [-1, 0, 0, 0]},
-            {"kernel_shape": [2, 2]},
-        ),
-    ],
+    "Conv": [*({"dilations": [2]}, {"pads": [1, 1]}, {"auto_pad": "SAME"}, {"strides": [2, 1]}, {"group": 0}),
+        *({"auto_pad": "SAME_UPPER", "pads": [1, 1, 1, 1]}, {"pads": [-1, 0, 0, 0]},
+        {"kernel_shape": [2, 2]})],
     "Gemm": [{"transA": 1}, {"transB": 2}, {"alpha": float("inf")}, {"beta": float("nan")}],
     "LeakyRelu": [{"alpha": -0.5}, {"alpha": 2.0}],
     "BatchNormalization": [{"epsilon": -1.0}, {"momentum": 2.0}],
     "Cast": [{"to": TensorProto.FLOAT16}, {"to": TensorProto.INT32}],
     "Concat": [{"axis": 9}],
     "Flatten": [{"axis": 9}],
-}
+}  # fmt: skip
 """Attributes that are wrong, or change what the operator does."""
 
 LAYOUTS = ("NCHW", "NCHW", "NCHW", "NCHW", "NHWC", "NWHC", "HWC", "PC", "PC", "C")

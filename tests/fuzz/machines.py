@@ -46,26 +46,16 @@ COMMANDS = (
 """What is run."""
 
 ACTIONS = (
-    "os.write(1, os.urandom(1 << {n}))",
-    "os.write(2, b'\\x1b[31m\\xff\\n')",
-    "subprocess.Popen(['sleep', '600'])",
-    "os.system('sleep 600 &')",
-    "os.close(1)",
-    "os.makedirs('d', exist_ok=True); os.chdir('d')",
-    "[(os.makedirs('e', exist_ok=True), os.chdir('e')) for _ in range(60 * {n})]",
-    "os.symlink('/', f'l{{os.getpid()}}')",
-    "os.mkfifo(f'p{{os.getpid()}}')",
-    "os.chmod('.', 0)",
-    "shutil.rmtree(os.path.dirname(sys.argv[2]), ignore_errors=True)",
-    "open(sys.argv[2], 'wb').write(os.urandom({n}))",
-    "os.mkdir(sys.argv[2])",
-    "os.symlink('/dev/zero', sys.argv[2])",
-    "np.savez(sys.argv[2], color=np.full(({n}, 4, 3), np.nan))",
-    "signal.signal({n}, signal.SIG_IGN)",
-    "os.kill(os.getpid(), {n})",
-    "sys.exit({n})",
-    "time.sleep(600)",
-)
+    "os.write(1, os.urandom(1 << {n}))", "os.write(2, b'\\x1b[31m\\xff\\n')",
+        "subprocess.Popen(['sleep', '600'])", "os.system('sleep 600 &')", "os.close(1)",
+        "os.makedirs('d', exist_ok=True); os.chdir('d')",
+        "[(os.makedirs('e', exist_ok=True), os.chdir('e')) for _ in range(60 * {n})]",
+        "os.symlink('/', f'l{{os.getpid()}}')", "os.mkfifo(f'p{{os.getpid()}}')", "os.chmod('.', 0)",
+        "shutil.rmtree(os.path.dirname(sys.argv[2]), ignore_errors=True)",
+        "open(sys.argv[2], 'wb').write(os.urandom({n}))", "os.mkdir(sys.argv[2])",
+        "os.symlink('/dev/zero', sys.argv[2])", "np.savez(sys.argv[2], color=np.full(({n}, 4, 3), np.nan))",
+        "signal.signal({n}, signal.SIG_IGN)", "os.kill(os.getpid(), {n})", "sys.exit({n})", "time.sleep(600)",
+)  # fmt: skip
 """What a renderer does, in any order."""
 
 

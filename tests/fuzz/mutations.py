@@ -20,96 +20,32 @@ from random import Random
 from typing import Any
 
 TEXTS = (
-    *(
-        "",
-        "-",
-        "--",
-        "0",
-        "-1",
-        "1",
-        "2",
-        "3",
-        "0.5",
-        "-0.0",
-        "1e-320",
-        "1e30",
-        "1e308",
-        "1e400",
-        "nan",
-        "-inf",
-    ),
+    *("", "-", "--", "0", "-1", "1", "2", "3", "0.5", "-0.0", "1e-320", "1e30", "1e308", "1e400", "nan",
+        "-inf"),
     *("inf", "2147483648", "4294967296", str(2**63), "9" * 30, "1" * 5000, "0x10", "1_0", "x", "y" * 5000),
-    *(
-        "\x1b[2J",
-        "\u202e",
-        "\udcff",
-        "\uff11",
-        "..",
-        ".",
-        "pipe",
-        "folder",
-        "link",
-        "missing/x",
-        "x.exr",
-        "x.png",
-    ),
-    *(
-        "x.html",
-        "1,2,3",
-        "a=1",
-        "=",
-        "1=1,1,1",
-        "1:2",
-        "2:1",
-        "nan:nan",
-        "*",
-        "%s",
-        "{}",
-        "[bold]",
-        "é",
-        "numpy",
-    ),
+    *("\x1b[2J", "\u202e", "\udcff", "\uff11", "..", ".", "pipe", "folder", "link", "missing/x", "x.exr",
+        "x.png"),
+    *("x.html", "1,2,3", "a=1", "=", "1=1,1,1", "1:2", "2:1", "nan:nan", "*", "%s", "{}", "[bold]", "é",
+        "numpy"),
     *("c", "native", "window2", "rank1", "minicubes", "--help", "-h", "-o", "--seed", "--size", "--time"),
-)
+)  # fmt: skip
 """Words of a command line that programs have stumbled over; a byte that is not UTF-8 comes as a surrogate."""
 
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 2, 3, 0.5, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308),
     *(float("nan"), float("inf"), float("-inf"), 2**31, 2**53 + 1, 2**63, -(2**63), 10**18, 10**400),
-    *(
-        "",
-        "x",
-        "0",
-        "nan",
-        "1e999",
-        "\x1b[2J",
-        "\0",
-        "\u202e",
-        "\ud800",
-        "\uffff",
-        "../x",
-        "/dev/zero",
-        "color",
-    ),
+    *("", "x", "0", "nan", "1e999", "\x1b[2J", "\0", "\u202e", "\ud800", "\uffff", "../x", "/dev/zero",
+        "color"),
     *([], {}, [[]], [0] * 3, [0.0] * 2000, "y" * 5000, [None] * 40),
-)
+)  # fmt: skip
 """Values that programs have taken for something else."""
 
 PIECES = (
     *(b"[" * 3000, b"{" * 70, b"}", b"]", b",", b'"', b"\\", b"\\ud800", b"null", b"NaN", b"Infinity"),
-    *(
-        b"-",
-        b"1" * 5000,
-        b"1e999",
-        b"1e-999",
-        b"0.",
-        b"\xff\xfe",
-        b"\xef\xbb\xbf",
-        b"\xed\xa0\x80",
-        b"\0" * 9,
-    ),
+    *(b"-", b"1" * 5000, b"1e999", b"1e-999", b"0.", b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80",
+        b"\0" * 9),
     *(b"\x1b[2J", b"\xff" * 8, b"\x7f\xff\xff\xff", b"\x80\0\0\0", b"../", b"/dev/zero", b'{"a":0,"a":1}'),
-)
+)  # fmt: skip
 """Bytes that programs have stumbled over."""
 
 FLOATS = (b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"\0\0\x80\xff", b"\xff\xff\x7f\x7f", b"\1\0\0\0", b"\0\0\0\x80")

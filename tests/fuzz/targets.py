@@ -325,25 +325,17 @@ COMMANDS: Sequence[tuple[str, str, str, str]] = (
     ("denoise, model", "safetensors", "model.safetensors", "denoise {} {good}/frame.exr -o out.exr"),
     ("denoise, frame", "bytes", "frame.exr", "denoise {good}/model.safetensors {} -o out.exr"),
     ("compile", "safetensors", "model.safetensors", "compile {} --target c -o out"),
-    (
-        "compile, curve",
-        "json",
-        "curve.json",
-        "compile {good}/model.safetensors --target c --max-error 0.9 --curve {} -o out",
-    ),
+    ("compile, curve", "json", "curve.json",
+     "compile {good}/model.safetensors --target c --max-error 0.9 --curve {} -o out"),
     ("export", "safetensors", "model.safetensors", "export {} --target c -o out"),
-    (
-        "train, resumed",
-        "safetensors",
-        "trained.checkpoint.safetensors",
-        "train -i {good}/frame.exr -t {good}/frame.exr --resume -o trained.safetensors",
-    ),
+    ("train, resumed", "safetensors", "trained.checkpoint.safetensors",
+     "train -i {good}/frame.exr -t {good}/frame.exr --resume -o trained.safetensors"),
     ("import", "bytes", "network.onnx", "import {} --border zero -o out.safetensors"),
     ("render", "json", "scene.json", "render {} --width 2 --height 2 --spp 1 -o out.exr"),
     ("dataset --check", "json", "set/manifest.json", "dataset --check -o set"),
     ("compare", "bytes", "picture.png", "compare {} {good}/picture.png"),
     ("certify", "json", "kernel/denoise.certificate.json", "certify {good}/kernel-copy"),
-)
+)  # fmt: skip
 """Name, way to change, the good file that is changed, and the command; {} is the changed file."""
 
 

@@ -27,10 +27,7 @@ def test_no_forbidden_content(house):
                 f"{path.relative_to(house.root)}:{number}: {reason}: {line.strip()[:80]}"
                 for reason in reasons
             ]
-    house.refuse(
-        wrong,
-        "A file holds nothing of one machine, outside the project or unfinished: rewrite it.",
-    )
+    house.refuse(wrong, "A file holds nothing of one machine, outside the project or unfinished: rewrite it.")
 
 
 def text_of(path) -> str:

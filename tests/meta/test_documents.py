@@ -124,12 +124,9 @@ def rewrite(path: Path, block: Block, printed: str) -> None:
 
 
 USUAL = (
-    "README.md",
-    "docs/guide/install.md",
-    "docs/guide/python.md",
-    "docs/guide/hosts.md",
-    "docs/first-kernel.md",
-)
+    "README.md", "docs/guide/install.md", "docs/guide/python.md", "docs/guide/hosts.md",
+        "docs/first-kernel.md",
+)  # fmt: skip
 """Documents whose commands run in every run; the others take minutes together."""
 
 

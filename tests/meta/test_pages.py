@@ -35,8 +35,7 @@ def test_each_page_says_what_it_is_good_for_and_how_long_it_takes(house):
         if not name.startswith(WITHOUT_PROMISE) and not (promise and TIME.search(promise[0])):
             wrong.append(name)
     house.refuse(
-        wrong,
-        "A page begins with what its reader will learn and how long it takes: *You will learn to ...*",
+        wrong, "A page begins with what its reader will learn and how long it takes: *You will learn to ...*"
     )
 
 

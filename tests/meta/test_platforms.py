@@ -49,12 +49,7 @@ def project(house):
 
 def installed(project, start, system, machine, python):
     """Return the packages that requirements, `start`, of the project install on a system with a Python."""
-    environment = {
-        "platform_machine": machine,
-        "python_version": python,
-        "sys_platform": system,
-        "extra": "",
-    }
+    environment = {"platform_machine": machine, "python_version": python, "sys_platform": system, "extra": ""}
     found, waiting = set(), list(start)
     while waiting:
         each = waiting.pop()

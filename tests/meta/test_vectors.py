@@ -102,10 +102,7 @@ def said_by_vectors(folder: Path) -> set[tuple[str, str]]:
 
 
 def test_clauses_and_vectors_name_each_other(house):
-    by_text, by_vectors = (
-        said_by_clauses(house.root / "spec"),
-        said_by_vectors(house.root / "spec/vectors"),
-    )
+    by_text, by_vectors = (said_by_clauses(house.root / "spec"), said_by_vectors(house.root / "spec/vectors"))
     wrong = [f"{clause} does not name `{kind}`" for clause, kind in sorted(by_vectors - by_text)]
     wrong += [f"no vector of `{kind}` names {clause}" for clause, kind in sorted(by_text - by_vectors)]
     house.refuse(

@@ -231,48 +231,29 @@ CONV, RELU = ("Conv", "xw", "a", {"pads": [1] * 4}), ("Relu", "a", "b")
 
 REFUSED = {
     "unknown": ([("Sigmoid", "x", "y")], {}, r"node n0 \(Sigmoid\) 'Sigmoid': supported are Add, .* \(exp"),
-    "stride": (
-        [("Conv", "xw", "y", {"strides": [2, 2]})],
-        {"w": W},
-        r"node n0 \(Conv\) '.*: stride 1 \(use",
-    ),
-    "padded twice": (
-        [CONV, RELU, ("Conv", "bv", "y", {"pads": [1] * 4})],
+    "stride": ([("Conv", "xw", "y", {"strides": [2, 2]})], {"w": W}, r"node n0 \(Conv\) '.*: stride 1 \(use"),
+    "padded twice": ([CONV, RELU, ("Conv", "bv", "y", {"pads": [1] * 4})],
         {"w": W, "v": np.float32(np.ones((2, 4, 3, 3)))},
-        r"node n2 \(Conv\) 'margins 1, 1, 1, 1, constant': .* --border zero or clamp",
-    ),
+        r"node n2 \(Conv\) 'margins 1, 1, 1, 1, constant': .* --border zero or clamp"),
     "reflect": ([("Pad", "xp", "y", {"mode": "reflect"})], {"p": PADS}, r"n0 \(Pad\) 'margins .*, reflect"),
     "product": ([("Mul", "xx", "y")], {}, r"n0 \(Mul\) 'two values': one of the factors must be constant"),
-    "two activations": (
-        [("Sin", "x", "a"), ("Relu", "x", "b"), ("Add", "ab", "y")],
-        {},
-        r"node n1 \(Relu\) .*: node n0 \(Sin\) is as deep and is another activation",
-    ),
-    "past a sine": (
-        [("Sin", "x", "a"), ("Add", "ax", "y")],
-        {},
-        r"node n0 \(Sin\) 'sine': .* skips past it, .* \(use Relu",
-    ),
+    "two activations": ([("Sin", "x", "a"), ("Relu", "x", "b"), ("Add", "ab", "y")], {},
+        r"node n1 \(Relu\) .*: node n0 \(Sin\) is as deep and is another activation"),
+    "past a sine": ([("Sin", "x", "a"), ("Add", "ax", "y")], {},
+        r"node n0 \(Sin\) 'sine': .* skips past it, .* \(use Relu"),
     "flat": ([("Flatten", "x", "y")], {}, r"n0 \(Flatten\) 'axes 1, C, H, W to 1, CHW': it mixes pixels"),
-    "reshaped": (
-        [("Reshape", "xs", "y")],
-        {"s": np.array([-1, 3])},
-        r"n0 \(Reshape\) 'axes 1, C, H, W to -1, 3': it splits or swaps axes, of sizes that the inputs do",
-    ),
+    "reshaped": ([("Reshape", "xs", "y")], {"s": np.array([-1, 3])},
+        r"n0 \(Reshape\) 'axes 1, C, H, W to -1, 3': it splits or swaps axes, of sizes that the inputs do"),
     "no matrix": ([("MatMul", "xm", "y")], {"m": M}, r"n0 \(MatMul\) 'axes 1, C, H, W, 2 channels"),
     "a column": ([("Add", "xc", "y")], {"c": np.ones((2,))}, r"\(Add\) 'a constant of shape \(2,\) beside"),
-    "open clip": (
-        [("Clip", ["x", "", "h"], "a"), ("Conv", "aw", "y", {"pads": [0] * 4})],
+    "open clip": ([("Clip", ["x", "", "h"], "a"), ("Conv", "aw", "y", {"pads": [0] * 4})],
         {"w": V.reshape(4, 2, 1, 1), "h": 1.0},
-        r"node n0 \(Clip\) \(-inf, 1.0\): only the last Clip may lack its lower end",
-    ),
+        r"node n0 \(Clip\) \(-inf, 1.0\): only the last Clip may lack its lower end"),
     "wide": ([CONV], {"w": np.float32(np.ones((5, 2, 3, 3)))}, r"outputs of the last layer 5: at most 4"),
-    "large": (
-        [("Conv", "xw", "a"), RELU, ("Conv", "bv", "y")],
+    "large": ([("Conv", "xw", "a"), RELU, ("Conv", "bv", "y")],
         {"w": np.float32(np.ones((90, 2, 17, 17))), "v": np.float32(np.ones((1, 90, 17, 17)))},
-        r"neurons of a layer over its window 26010: at most 8192",
-    ),
-}
+        r"neurons of a layer over its window 26010: at most 8192"),
+}  # fmt: skip
 """Graphs, and what is said of them."""
 
 

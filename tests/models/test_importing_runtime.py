@@ -183,12 +183,7 @@ WRONG = {
         SHAPE,
         r"pads=\[1, 1\]': pads must be 4",
     ),
-    "a scalar weight": (
-        [("Conv", "xw", "y")],
-        {"w": 1.0},
-        SHAPE,
-        r"weights \(\), constants",
-    ),
+    "a scalar weight": ([("Conv", "xw", "y")], {"w": 1.0}, SHAPE, r"weights \(\), constants"),
     "words": ([("Conv", "xw", "y")], {"w": np.array([["a"]])}, SHAPE, "input 1 of object': must be float"),
     "a weight of one axis": (
         [("Gemm", "xmc", "y")],
@@ -228,12 +223,7 @@ WRONG = {
         SHAPE,
         "min of float32, .*: one number",
     ),
-    "integers": (
-        [("Div", "xc", "y")],
-        {"c": np.int32([2])},
-        "int32",
-        "type of the elements 'int32': one of",
-    ),
+    "integers": ([("Div", "xc", "y")], {"c": np.int32([2])}, "int32", "type of the elements 'int32': one of"),
     "bytes": ([("Sub", "xc", "y")], {"c": np.uint8([2])}, "uint8", ".* 'integers': it would round or wrap"),
 }
 """Graphs that are rejected: nodes, constants, the input's shape or type, and the message."""
@@ -255,43 +245,18 @@ MARGINS = {
     "none": ([("Conv", "xw", "y", SAME)], {"w": W}, "zero", 0),
     "another rule": ([("Conv", "xw", "y", SAME)], {"w": W}, "clamp", 1),
     "smaller": ([("Conv", "xw", "y")], {"w": W}, "zero", 1),
-    "twice": (
-        [("Conv", "xw", "a", SAME), ("Relu", "a", "b"), ("Conv", "bw", "y", SAME)],
-        {"w": W},
-        "zero",
-        1,
-    ),
-    "moved": (
-        [("Slice", "xsea", "b"), ("Pad", "bp", "y", {"mode": "reflect"})],
+    "twice": ([("Conv", "xw", "a", SAME), ("Relu", "a", "b"), ("Conv", "bw", "y", SAME)], {"w": W}, "zero",
+        1),
+    "moved": ([("Slice", "xsea", "b"), ("Pad", "bp", "y", {"mode": "reflect"})],
         {"s": ints(1, 1), "e": ints(2**40, 2**40), "a": ints(2, 3), "p": ints(0, 0, 1, 1, 0, 0, 0, 0)},
-        "zero",
-        1,
-    ),
-    "cropped again": (
-        [("Relu", "x", "b"), ("Conv", "bw", "c", SAME), ("Slice", "csea", "y")],
-        {"w": W, "s": ints(1, 1), "e": ints(-1, -1), "a": ints(2, 3)},
-        "clamp",
-        1,
-    ),
-    "padded further": (
-        [("Conv", "xw", "b", SAME), ("Conv", "bw", "c", SAME), ("Pad", "cp", "d"), ("Conv", "dw", "y")],
-        {"w": W, "p": PAD},
-        "zero",
-        2,
-    ),
-    "one side": (
-        [
-            ("Pad", "xp", "b"),
-            ("Conv", "bw", "c"),
-            ("Relu", "c", "d"),
-            ("Pad", "dp", "e"),
-            ("Conv", "ew", "y"),
-        ],
-        {"w": W, "p": ints(0, 0, 2, 2, 0, 0, 0, 0)},
-        "clamp",
-        4,
-    ),
-}
+        "zero", 1),
+    "cropped again": ([("Relu", "x", "b"), ("Conv", "bw", "c", SAME), ("Slice", "csea", "y")],
+        {"w": W, "s": ints(1, 1), "e": ints(-1, -1), "a": ints(2, 3)}, "clamp", 1),
+    "padded further": ([("Conv", "xw", "b", SAME), ("Conv", "bw", "c", SAME), ("Pad", "cp", "d"),
+        ("Conv", "dw", "y")], {"w": W, "p": PAD}, "zero", 2),
+    "one side": ([("Pad", "xp", "b"), ("Conv", "bw", "c"), ("Relu", "c", "d"), ("Pad", "dp", "e"),
+        ("Conv", "ew", "y")], {"w": W, "p": ints(0, 0, 2, 2, 0, 0, 0, 0)}, "clamp", 4),
+}  # fmt: skip
 """Graphs, a border rule, and in how many pixels from the edge the model is another function."""
 
 

@@ -166,10 +166,7 @@ DAMAGE = {
         "'layer2.weight' must be",
     ),
     "no features": (without("features"), "list of header entries '.*': 'features' must be among them"),
-    "features unknown": (
-        with_text("features", '["glow"]'),
-        "model: feature 'glow': unknown",
-    ),
+    "features unknown": (with_text("features", '["glow"]'), "model: feature 'glow': unknown"),
     "features no list": (with_text("features", '"color"'), "features '.*': cannot be read: a list of names"),
     "features no JSON": (with_text("features", "color"), "features 'color': is not acceptable JSON"),
     "other features": (
@@ -179,10 +176,7 @@ DAMAGE = {
     "window": (with_text("window", '{"size": 0, "border": "zero"}'), "window size 0"),
     "window no JSON": (with_text("window", "12"), "window 12: must be a JSON object"),
     "window parts": (with_text("window", '{"width": 12}'), "window.width 12: Window has no such key"),
-    "window without a border": (
-        with_text("window", '{"size": 2}'),
-        "window.border: missing",
-    ),
+    "window without a border": (with_text("window", '{"size": 2}'), "window.border: missing"),
     "omega": (with_text("omega_0_first", "0.0"), "omega_0_first 0.0: must be positive"),
     "omega of Python": (
         with_text("omega_0_first", "1_0"),
@@ -190,10 +184,7 @@ DAMAGE = {
     ),
     "omega no decimal": (with_text("omega_0_first", "nan"), "omega_0_first 'nan': cannot be read"),
     "omega no number": (with_text("omega_0_hidden", "big"), "omega_0_hidden 'big': cannot be read"),
-    "scales": (
-        with_text("normalization", "{}"),
-        "model: normalization.exposure_stops: missing",
-    ),
+    "scales": (with_text("normalization", "{}"), "model: normalization.exposure_stops: missing"),
     "not finite": (
         with_tensor("layer1.bias", np.array([0, np.nan, np.inf], np.float32)),
         "layer 1: number of NaN, infinite or huge parameters 2",
@@ -275,10 +266,7 @@ def test_a_tensor_of_a_type_that_numpy_lacks_counts_as_a_layer(tmp_path: Path) -
     [
         (["F32", [2], "MORE"], "more .*: must be an object with the keys data_offsets, dtype, shape"),
         ({**ENTRY, "strides": [1]}, "more .*: must be an object with the keys .* and no others"),
-        (
-            {**ENTRY, "dtype": "C64", "shape": [1]},
-            "more.dtype 'C64': must be one of BOOL",
-        ),
+        ({**ENTRY, "dtype": "C64", "shape": [1]}, "more.dtype 'C64': must be one of BOOL"),
     ],
 )
 def test_an_entry_of_another_form_is_refused(entry: Any, rule: str, tmp_path: Path) -> None:
@@ -409,8 +397,7 @@ def test_a_model_of_integers_comes_back_to_the_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [("amplitude", 100, "amplitude"), ("fraction", 20, "fraction")],
+    ("field", "value", "message"), [("amplitude", 100, "amplitude"), ("fraction", 20, "fraction")]
 )
 def test_a_model_of_integers_that_breaks_a_rule_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, field: str, value: int, message: str

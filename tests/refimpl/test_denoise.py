@@ -96,39 +96,25 @@ def test_a_good_model_passes() -> None:
 
 
 BROKEN = {
-    "a layer that does not chain": (
-        changed(weights=(np.zeros((5, 54)), np.zeros((3, 4)))),
-        r"layer 1 'weights \(3, 4\), biases \(3,\)': weights \(D_out, 5\) .* must chain",
-    ),
-    "biases of another length": (
-        changed(biases=(np.zeros(5), np.zeros(2))),
-        r"layer 1 'weights \(3, 5\), biases \(2,\)",
-    ),
-    "weights that are not a matrix": (
-        changed(weights=(np.zeros(5), np.zeros((3, 5)))),
-        r"layer 0 'weights \(5,\)",
-    ),
-    "not finite": (
-        changed(weights=(np.full((5, 54), np.nan), np.zeros((3, 5)))),
-        "layer 0: number of NaN, infinite or huge parameters 270: all must be finite",
-    ),
-    "mixed types": (
-        changed(biases=(np.zeros(5, np.float32), np.zeros(3))),
-        "types of the parameters 'float32, float64': all must be float32, or all float64",
-    ),
+    "a layer that does not chain": (changed(weights=(np.zeros((5, 54)), np.zeros((3, 4)))),
+        r"layer 1 'weights \(3, 4\), biases \(3,\)': weights \(D_out, 5\) .* must chain"),
+    "biases of another length": (changed(biases=(np.zeros(5), np.zeros(2))),
+        r"layer 1 'weights \(3, 5\), biases \(2,\)"),
+    "weights that are not a matrix": (changed(weights=(np.zeros(5), np.zeros((3, 5)))),
+        r"layer 0 'weights \(5,\)"),
+    "not finite": (changed(weights=(np.full((5, 54), np.nan), np.zeros((3, 5)))),
+        "layer 0: number of NaN, infinite or huge parameters 270: all must be finite"),
+    "mixed types": (changed(biases=(np.zeros(5, np.float32), np.zeros(3))),
+        "types of the parameters 'float32, float64': all must be float32, or all float64"),
     "omega": (changed(omega_0_hidden=0.0), "omega_0_hidden 0.0: must be positive"),
-    "inputs": (
-        replace(model_of(), features=("color",)),
-        "inputs of the first layer 54: 3 x 3 pixels of color are 27 numbers",
-    ),
-    "outputs": (
-        changed(weights=(np.zeros((5, 54)), np.zeros((4, 5))), biases=(np.zeros(5), np.zeros(4))),
-        "outputs of the last layer 4: a colour has 3 channels",
-    ),
+    "inputs": (replace(model_of(), features=("color",)),
+        "inputs of the first layer 54: 3 x 3 pixels of color are 27 numbers"),
+    "outputs": (changed(weights=(np.zeros((5, 54)), np.zeros((4, 5))), biases=(np.zeros(5), np.zeros(4))),
+        "outputs of the last layer 4: a colour has 3 channels"),
     "features": (replace(model_of(), features=("glow",)), "feature 'glow"),
     "window": (replace(model_of(), window=Window(0)), "window size 0"),
     "scales": (replace(model_of(), normalization=Normalization(depth_scale=0.0)), "depth_scale 0.0"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", BROKEN)

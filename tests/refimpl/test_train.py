@@ -286,10 +286,7 @@ def test_sky_is_mirrors_with_the_sun() -> None:
         ({"seed": -1}, "recipe: seed -1"),
         ({"learning_rate": math.nan}, "recipe: learning_rate nan: must be finite and positive"),
         ({"learning_rate": 0.0}, r"recipe: learning_rate 0\.0"),
-        (
-            {"schedule": "step"},
-            r"recipe: schedule 'step': unknown \(choose one of constant, cosine",
-        ),
+        ({"schedule": "step"}, r"recipe: schedule 'step': unknown \(choose one of constant, cosine"),
         ({"widths": (0,)}, "widths .*"),
         ({"omega_0_first": 0.0}, "omega_0_first .*"),
         ({"features": ("glow",)}, "feature 'glow"),

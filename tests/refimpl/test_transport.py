@@ -42,11 +42,7 @@ def assert_same_image(a: R.Render, b: R.Render, count_a: int, count_b: int) -> N
 
 
 LONG = pytest.mark.needs("time")
-STRATEGIES = [
-    ("light", "power"),
-    ("bsdf", "power"),
-    ("mis", "balance"),
-]
+STRATEGIES = [("light", "power"), ("bsdf", "power"), ("mis", "balance")]
 
 
 @pytest.mark.nightly("minicubes-bsdf-power")
@@ -251,10 +247,7 @@ def test_depth_adds_light_and_nothing_else():
     ("settings", "message"),
     [
         ({"max_depth": -1}, "max_depth -1: must be an integer of 0 or more"),
-        (
-            {"max_depth": 2**31},
-            "max_depth 2147483648: must be below 2147483648, since random numbers",
-        ),
+        ({"max_depth": 2**31}, "max_depth 2147483648: must be below 2147483648, since random numbers"),
         ({"roulette_depth": 2**31}, "roulette_depth 2147483648: must be 0 or more, and below"),
         ({"max_depth": 2.5}, "max_depth 2.5: must be an integer of 0 or more"),
         ({"roulette_depth": -1}, "roulette_depth -1: must be 0 or more"),

@@ -184,11 +184,7 @@ def test_rounding_is_the_same_for_both_types() -> None:
 
 @pytest.mark.parametrize(
     ("changed", "message"),
-    [
-        ({"amplitude": 100}, "amplitude"),
-        ({"fraction": 9}, "fraction"),
-        ({"factors": ()}, "factors"),
-    ],
+    [({"amplitude": 100}, "amplitude"), ({"fraction": 9}, "fraction"), ({"factors": ()}, "factors")],
 )
 def test_fields_that_mean_nothing_are_refused(changed, message) -> None:
     with pytest.raises(InputError, match=message):

@@ -14,13 +14,9 @@ NAMES = ("chromium", "chromium-browser", "google-chrome")
 """What the program may be called."""
 
 FLAGS = (
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--no-first-run",
-)
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--disable-background-networking", "--disable-component-update", "--no-first-run",
+)  # fmt: skip
 """SwiftShader draws; nothing is fetched that no page asks for."""
 
 WAIT_MS = 120_000

@@ -96,15 +96,10 @@ class Case:
 
 
 CASES = {
-    "dataset": Case(
-        (*DATASET, "--workers", "1"), ["out/t*/*.exr"], ["out/manifest.json", "out/unfinished/*"]
-    ),
-    "dataset-2": Case(
-        (*DATASET, "--workers", "2"),
-        ["out/t*/*.exr"],
-        ["out/manifest.json", "out/unfinished/*"],
-        workers=True,
-    ),
+    "dataset": Case((*DATASET, "--workers", "1"), ["out/t*/*.exr"],
+        ["out/manifest.json", "out/unfinished/*"]),
+    "dataset-2": Case((*DATASET, "--workers", "2"), ["out/t*/*.exr"],
+        ["out/manifest.json", "out/unfinished/*"], workers=True),
     "train": Case(TRAIN, ["out.safetensors"], ["out.checkpoint.safetensors"]),
     "train-often": Case(TRAIN, ["out.safetensors"], ["out.checkpoint.safetensors"], prelude=OFTEN),
     "animate": Case((*ANIMATE, "-o", "out"), ["out/*.png"]),
@@ -113,17 +108,12 @@ CASES = {
     "compile": Case(("compile", "m.safetensors", "--target", "opencl", "-o", "out"), ["out/*"], locks=False),
     "render": Case((*RENDER, "--workers", "2"), ["out.exr"], locks=False, workers=True),
     "view": Case(("view", "m.safetensors", "-o", "out.html"), ["out.html"], locks=False),
-    "tune": Case(
-        ("tune", "m.safetensors", "--size", "12", "--force", "--cache", "out"), ["none"], ["out/*.json"]
-    ),
-    "demo": Case(
-        ("demo", "--quick", "-o", "out"),
-        ["out/frames/t*/*.exr", "out/model.safetensors"],
-        ["out/*"],
-        prelude=SMALLER,
-    ),
+    "tune": Case(("tune", "m.safetensors", "--size", "12", "--force", "--cache", "out"), ["none"],
+        ["out/*.json"]),
+    "demo": Case(("demo", "--quick", "-o", "out"), ["out/frames/t*/*.exr", "out/model.safetensors"],
+        ["out/*"], prelude=SMALLER),
     "bench": Case((*BENCH, *ONCE, "-o", "out"), ["out/frames-*/t*/*.exr"], ["out/*"]),
-}
+}  # fmt: skip
 """The commands. Times are in the results of the last three: of those files only the others are compared."""
 
 LONG = {"demo", "bench"}

@@ -13,12 +13,7 @@ from typing import Any
 
 import pytest
 
-PACKAGES = {
-    "torch": "PyTorch",
-    "pyoidn": "Open Image Denoise",
-    "onnx": "ONNX",
-    "onnxruntime": "ONNX Runtime",
-}
+PACKAGES = {"torch": "PyTorch", "pyoidn": "Open Image Denoise", "onnx": "ONNX", "onnxruntime": "ONNX Runtime"}
 """Their names for Python and for people."""
 
 SANDBOX = "bubblewrap"

@@ -93,6 +93,7 @@ def conformance(
     from ...compiler.core.profiles import profile_named
     from ...spec.conformance import report, run
     from ...spec.conformance import vectors as all_vectors
+    from ...spec.conformance.case import FOLDER
 
     if write is not None:
         _refuse_others(write, program, executor)
@@ -101,7 +102,7 @@ def conformance(
     profile_named(profile)
     command = _command(program, executor)
     _check_options(timeout, [path for path in (track, as_json, junit) if path is not None])
-    cases = run.chosen(run.read_vectors(vectors or all_vectors.FOLDER), words or ())
+    cases = run.chosen(run.read_vectors(vectors or FOLDER), words or ())
     _check_words(cases, words or ())
     before = None if track is None else report.read_track(track)
     verdicts = _asked(command, cases, profile, timeout)

@@ -1,9 +1,9 @@
 """Cases: what is given, what is expected, how far off an answer may be, and which clause says so.
 
-1. A kind of case has a function of the reference, the clauses that it tests, and a way to make its cases
-   [`Kind`]; all kinds are in `kinds/`.
-2. A file of vectors holds the cases of one kind, with the version of the format [`save`], [`load`]. Files are
-   text that can be reviewed: floats are hexadecimal (numbers.py).
+1. A kind of case has a function of the reference, and one that bounds its answers [`Kind`]; see `kinds/`.
+2. A file of vectors holds the cases of one kind, with the version of the format [`text_of`], [`load`]. Files
+   are text that can be reviewed: floats are hexadecimal (numbers.py). It is the table of the kind's cases:
+   inputs, notes and clauses are written there, and what is expected is computed from them [`Kind.make`].
 3. A case is valid, and has expected values with bounds, or invalid, and must be refused.
 
 Versions are X.Y.Z: X changes with the format, Y with the behaviour that is expected, Z with the cases.
@@ -14,15 +14,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...refimpl.errors import InputError
+from ...refimpl.errors import CompileError, InputError
 from ...refimpl.reading import parse_json, plain_name, read_file, refusing
 from .numbers import from_file, from_json, rounded_up, to_json
+
+FOLDER = Path(__file__).resolve().parents[1] / "vectors"
+"""Where the vectors are, in the repository and where the package is installed."""
 
 VERSION = "1.12.0"
 """Version of format, behaviour and cases."""
@@ -49,17 +52,27 @@ class Output:
     clause: str = ""
 
 
-def exact(
-    outputs: Mapping[str, Any], source: str = "exact", clause: Callable[[str], str] = lambda name: ""
-) -> dict[str, Output]:
-    """Return outputs that are expected to the bit; `clause` is what a deviation of each is blamed on."""
-    return {name: Output(value, 0.0, source, clause=clause(name)) for name, value in outputs.items()}
+Expect = Callable[[Mapping[str, Any], Mapping[str, Any], Mapping[str, Any]], Mapping[str, Output]]
+"""(inputs, the reference's answer, the outputs that the file has) -> outputs with bounds."""
+
+
+def exact(source: str = "exact") -> Expect:
+    """Return what expects answers to the bit."""
+    return lambda inputs, wanted, told: {name: Output(value, 0.0, source) for name, value in wanted.items()}
+
+
+EXACT = exact()
+"""Expects answers to the bit, whose bound needs no reason."""
+
+EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
+"""Where the bounds of undecided cases come from."""
 
 
 @dataclass(frozen=True)
 class Case:
     """One question to a program, and the answer. `expected` None: the program must refuse the input.
 
+    `inputs` are in the form of JSON.
     `refusal`: what is blamed where it refuses a valid one, if that is not the case's clause.
     `id`: the kind's name and a number (kinds/__init__.py)."""
 
@@ -84,7 +97,7 @@ class Case:
             data["note"] = self.note
         if self.refusal:
             data["refusal"] = self.refusal
-        data |= {"valid": self.expected is not None, "input": to_json(dict(self.inputs))}
+        data |= {"valid": self.expected is not None, "input": dict(self.inputs)}
         if self.expected is not None:
             data["expected"] = {name: _output_json(output) for name, output in self.expected.items()}
         return data
@@ -114,20 +127,50 @@ def _bound_json(bound: Any) -> Any:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of case: its name, title, what its fields are, its cases, and the reference's answer.
+    """A kind of case: its name, title, what its fields are, the reference's answer, and how that is bounded.
 
-    `inputs` and `outputs` describe fields for the format page: type, shape, unit. `files` are those that its
-    cases name, by path relative to the folder of vectors; `notes` say what else a reader must know.
+    `inputs` and `outputs` describe fields for the format page: type, shape, unit; `notes` say what else a
+    reader must know. `float32`: all inputs are numbers of that type.
     """
 
     name: str
     title: str
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
-    make: Callable[[], Sequence[Case]]
     answer: Callable[[Mapping[str, Any]], Mapping[str, Any]]
-    files: Callable[[], Mapping[str, bytes]] = field(default=dict)
+    expect: Expect = EXACT
     notes: str = ""
+    float32: bool = False
+
+    def make(self) -> list[Case]:
+        """Return the cases of the kind's file; what is expected is computed again."""
+        data = parse_json(
+            read_file(FOLDER / f"{self.name}.json", "file of vectors"), self.name, "see git diff"
+        )
+        return [self.made(row, number) for number, row in enumerate(data["cases"])]
+
+    def made(self, row: Mapping[str, Any], number: int = 0) -> Case:
+        """Return the case of a row, which has an input and a clause at least.
+
+        It is valid if the reference answers. An output has the clause that the row states, if any."""
+        asked, told = dict(row["input"]), row.get("expected", {})
+        if self.float32:
+            asked = {name: to_json(single(given(value))) for name, value in asked.items()}
+        expected, flags = None, [flag for flag in row.get("flags", ()) if flag != "undecided"]
+        try:
+            check_integers(self, asked)
+            inputs = {name: given(_placed(value, FOLDER)) for name, value in asked.items()}
+            wanted = self.answer(inputs)
+        except (InputError, CompileError):
+            pass
+        else:
+            expected = {
+                name: replace(output, clause=told.get(name, {}).get("clause", ""))
+                for name, output in self.expect(inputs, wanted, told).items()
+            }
+            flags += ["undecided"] * any(output.source == EITHER for output in expected.values())
+        note, refusal = row.get("note", ""), row.get("refusal", "")
+        return Case(row["clause"], asked, expected, note, refusal, tuple(flags), f"{self.name}/{number}")
 
     @property
     def integers(self) -> list[str]:
@@ -147,9 +190,14 @@ def check_integers(kind: Kind, inputs: Mapping[str, Any]) -> None:
             raise InputError(name, inputs[name], rule, "write it without a point")
 
 
-def text_of(kind: Kind) -> str:
+def single(value: Any) -> Any:
+    """Return numbers (...) rounded to float32, in float64."""
+    return np.asarray(value, np.float32).astype(np.float64)
+
+
+def text_of(kind: Kind, cases: Sequence[Case]) -> str:
     """Return the vectors of a kind as text, one case a line."""
-    lines = [json.dumps(case.to_json(), allow_nan=False) for case in kind.make()]
+    lines = [json.dumps(case.to_json(), allow_nan=False) for case in cases]
     head = {"format": FORMAT, "version": VERSION, "kind": kind.name, "title": kind.title}
     opening = json.dumps(head)[:-1]
     return opening + ', "cases": [\n' + ",\n".join(lines) + "\n]}\n"

@@ -4,14 +4,13 @@
 2. The same function, traced, has for each output a range of what single precision may give, under the
    promises of profile `ieee` (compiler/proof/ranges.py): its farther end is the bound
    [`Function.bounded`]. Where a decision is closer to its threshold than rounding, either way is accepted;
-   the flag is `undecided`.
-3. Cases are chosen numbers, edge cases first, and others from the project's own generator [`drawn`].
+   the flag is `undecided`. No rounding decides ties of numbers that are the same to the bit wherever like
+   operations round alike: the file has [`GUIDED`] as the source of their bounds.
 """
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -24,50 +23,33 @@ from ...compiler.core.passes import pipeline
 from ...compiler.core.trace import trace
 from ...compiler.proof import ranges
 from ...compiler.scenes.lower_scene import PASSES
-from ...refimpl import rng, vectors
-from .case import Case, Kind, Output
+from ...refimpl import vectors
+from .case import EITHER, Kind, Output
 
 Numbers = Mapping[str, Any]
 
 SOURCE = "range of single precision under profile ieee (compiler/proof/ranges.py)"
 """Where these bounds come from."""
 
-SEED = 20_240_817
-"""Seed of the numbers that are drawn for cases."""
-
 
 class Field(NamedTuple):
-    """An input or output: what it is, its components (0: a number), and the least and largest value given.
-
-    `clause` governs an output where it is not the function's."""
+    """An input or output: what it is, its components (0: a number), and the least and largest value given."""
 
     text: str
     size: int = 0
     low: float = 0.0
     high: float = 1.0
-    clause: str = ""
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function of the reference as a kind of case: `call` has the inputs and the float type of constants.
-
-    `given`: inputs of cases with a note, and a clause where it is another one; `draws` more are drawn by
-    `draw` from uniform numbers in [0, 1). `decided`: ties, with note and clause, of numbers that are the same
-    to the bit wherever like operations round alike, so that no rounding decides. `later` come last.
-    """
+    """A function of the reference as a kind: `call` has the inputs and the float type of constants."""
 
     name: str
     title: str
-    clause: str
     inputs: Mapping[str, Field]
     outputs: Mapping[str, Field]
     call: Callable[[Numbers, Any], Numbers]
-    given: Sequence[tuple[Any, ...]] = ()
-    draw: Callable[[NDArray[np.float64]], Numbers] | None = None
-    draws: int = 8
-    decided: Sequence[tuple[Any, ...]] = ()
-    later: Sequence[tuple[Any, ...]] = ()
 
     def kind(self) -> Kind:
         """Return the kind of case."""
@@ -75,56 +57,37 @@ class Function:
             {name: f"{_shape(field.size)}, {field.text}" for name, field in side.items()}
             for side in (self.inputs, self.outputs)
         ]
-        return Kind(self.name, self.title, fields[0], fields[1], self.cases, self.answer)
-
-    def cases(self) -> list[Case]:
-        """Return the cases with their answers and bounds."""
-        rows = [*self.given]
-        if self.draw is not None:
-            rows += [("", self.draw(drawn(self.name, index))) for index in range(self.draws)]
-        return [self._case(*row) for row in (*rows, *((*row, True) for row in self.decided), *self.later)]
-
-    def _case(self, note: str, values: Numbers, clause: str = "", decided: bool = False) -> Case:
-        """Return a case; `decided`: ranges touch, and no rounding decides."""
-        inputs = {name: np.asarray(values[name], np.float32).astype(np.float64) for name in self.inputs}
-        expected, undecided = (self._as_decided(inputs), False) if decided else self.bounded(inputs)
-        flags = ("undecided",) if undecided else ()
-        return Case(clause or self.clause, inputs, expected, note, flags=flags)
+        return Kind(self.name, self.title, fields[0], fields[1], self.answer, self.expect, float32=True)
 
     def answer(self, inputs: Numbers) -> Numbers:
         """Return the reference's answer, in float64."""
         lanes = {name: np.asarray(inputs[name], np.float64)[np.newaxis] for name in self.inputs}
         return {name: np.asarray(value)[0] for name, value in self.call(lanes, np.float64).items()}
 
-    def bounded(self, inputs: Numbers) -> tuple[dict[str, Output], bool]:
-        """Return expected outputs with bounds, and whether some decision is undecided."""
-        wanted = self.answer(inputs)
+    def bounded(self, inputs: Numbers) -> dict[str, Output]:
+        """Return expected outputs with bounds."""
+        return self.expect(inputs, self.answer(inputs), {})
+
+    def expect(self, inputs: Numbers, wanted: Numbers, told: Mapping[str, Any]) -> dict[str, Output]:
+        """Return an answer with bounds; ties that no rounding decides are those that the file calls so."""
         given = components(self.inputs, inputs)
-        found = ranges.evaluate(self.program(), given)
-        outputs, sure = {}, all(bool(np.all(part.sure & part.known)) for part in found.values())
+        guided = bool(told) and all(output.get("source") == GUIDED for output in told.values())
+        found = ranges.evaluate(self.program(), given, guided=guided)
+        sure = guided or all(bool(np.all(part.sure & part.known)) for part in found.values())
+        outputs = {}
         for name, field in self.outputs.items() if sure else ():
             value = np.asarray(wanted[name], np.float64)
             low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
             bound = np.maximum(high - value, value - low)
-            outputs[name] = Output(value, bound, SOURCE, clause=field.clause)
+            outputs[name] = Output(value, bound, GUIDED if guided else SOURCE)
+            if guided:
+                assert np.all(np.isfinite(bound) & (bound >= 0.0)), f"{self.name}: no bound at {inputs}"
+                continue
             # Single precision may be sure of its way, and double precision go the other one.
             outside = np.maximum(low - value, value - high)
             sure &= bool(np.max(outside) <= APART * (1.0 + float(np.max(np.abs(value)))))
         if not sure:
-            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True)), True
-        return outputs, False
-
-    def _as_decided(self, inputs: Numbers) -> dict[str, Output]:
-        """Return outputs where all decisions fall as the reference's, though ranges touch."""
-        wanted = self.answer(inputs)
-        found = ranges.evaluate(self.program(), components(self.inputs, inputs), guided=True)
-        outputs = {}
-        for name, field in self.outputs.items():
-            value = np.asarray(wanted[name], np.float64)
-            low, high = (_ends(found, name, field, end).reshape(value.shape) for end in ENDS)
-            bound = np.maximum(high - value, value - low)
-            assert np.all(np.isfinite(bound) & (bound >= 0.0)), f"{self.name}: no bound at {inputs}"
-            outputs[name] = Output(value, bound, GUIDED, clause=field.clause)
+            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True))
         return outputs
 
     def _either(
@@ -150,7 +113,7 @@ class Function:
             assert np.isfinite(bound), f"{self.name}: no bound at {inputs}"
             bounds = [np.maximum(bound, ULP * np.abs(other)) for other in (value, *others)]
             accepted = tuple({"value": v, "bound": b} for v, b in zip(others, bounds[1:], strict=True))
-            outputs[name] = Output(value, bounds[0], EITHER, accepted, clause=field.clause)
+            outputs[name] = Output(value, bounds[0], EITHER, accepted)
         return outputs
 
     @cached_property
@@ -202,22 +165,11 @@ APART = 2.0**-10
 GUIDED = "range of single precision with decisions as the reference takes them: what ties is equal to the bit"
 """Where the bounds of ties come from that no rounding decides."""
 
-EITHER = "range of single precision with decisions as the reference takes them, or as it does 2^-20 away"
-"""Where the bounds of undecided cases come from."""
-
 ULP = 2.0**-23
 """One ulp of float32, relative: the rounding of the answer itself."""
 
 ENDS = ("low", "high")
 """The ends of a range."""
-
-
-def drawn(name: str, index: int, count: int = 16) -> NDArray[np.float64]:
-    """Return uniform numbers (count,) in [0, 1) for a case of a kind, the same on every machine."""
-    stream = rng.counter(zlib.crc32(name.encode()))
-    blocks = rng.counter(np.arange((count + 3) // 4))
-    found = rng.uniforms(rng.counter(SEED), blocks, rng.counter(index), stream, np.float64)
-    return np.stack(found, axis=-1).reshape(-1)[:count]
 
 
 def names(name: str, count: int) -> list[str]:

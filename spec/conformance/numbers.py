@@ -20,10 +20,6 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.reading import read_file, refusing
 
 
-class Decimal(float):
-    """A number that a case gives as JSON writes it, `1.0`: for an integer, it must be refused."""
-
-
 def number_text(value: float) -> str:
     """Return a float as text: hexadecimal with the shortest fraction, or inf, -inf, nan."""
     if not math.isfinite(value):
@@ -72,8 +68,6 @@ def to_json(value: Any) -> Any:
         return bool(value)
     if isinstance(value, (int, np.integer)):
         return int(value)
-    if isinstance(value, Decimal):
-        return float(value)
     if isinstance(value, (float, np.floating, np.ndarray)):
         return number_text(float(value))
     return value

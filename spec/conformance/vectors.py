@@ -1,25 +1,23 @@
 """The folder of vectors: a file a kind, the files that cases name, a schema and a page about all formats.
 
-1. [`contents`] makes all of it from the reference, by name.
-2. [`write`] writes it; nothing else does, and a test compares.
+1. [`contents`] has all of it, by name: what cases expect is computed by the reference; their inputs and the
+   files that they name stay as they are.
+2. [`write`] writes it; a test compares.
 """
 
 from __future__ import annotations
 
 import errno
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...models.writing import write_together
 from ...refimpl.errors import InputError
-from .case import VERSION, Kind, text_of
+from .case import FOLDER, VERSION, Case, Kind, text_of
 from .kinds import KINDS
 from .run import SCHEMA
-
-FOLDER = Path(__file__).resolve().parents[1] / "vectors"
-"""Where the vectors are, in the repository and where the package is installed."""
 
 
 def schema() -> dict[str, Any]:
@@ -28,8 +26,8 @@ def schema() -> dict[str, Any]:
     return found
 
 
-def page() -> str:
-    """Return the page about all kinds."""
+def page(cases: Mapping[str, Sequence[Case]]) -> str:
+    """Return the page about all kinds, each with its cases."""
     lines = [
         "# Vectors",
         "",
@@ -42,13 +40,12 @@ def page() -> str:
         "`[n]` are lists. `expected` is there where `valid` is true.",
     ]
     for kind in KINDS.values():
-        lines += ["", *_about(kind)]
+        lines += ["", *_about(kind, cases[kind.name])]
     return "\n".join(lines) + "\n"
 
 
-def _about(kind: Kind) -> list[str]:
+def _about(kind: Kind, cases: Sequence[Case]) -> list[str]:
     """Return the page's lines about one kind."""
-    cases = kind.make()
     bad = sum(case.expected is None for case in cases)
     clauses = ", ".join(dict.fromkeys(clause for case in cases for clause in case.clauses))
     counted = f"{len(cases)} cases" + (f", {bad} of them to be refused" if bad else "")
@@ -77,11 +74,12 @@ def _cell(text: str) -> str:
 
 def contents() -> Mapping[str, bytes]:
     """Return all files of the folder by name."""
-    found = {f"{name}.json": text_of(kind).encode() for name, kind in KINDS.items()}
-    for kind in KINDS.values():
-        found |= kind.files()
+    cases = {name: kind.make() for name, kind in KINDS.items()}
+    found = {f"{name}.json": text_of(kind, cases[name]).encode() for name, kind in KINDS.items()}
+    named = [path for path in FOLDER.glob("*/*") if path.is_file()]
+    found |= {path.relative_to(FOLDER).as_posix(): path.read_bytes() for path in named}
     found[SCHEMA] = (json.dumps(schema(), indent=1) + "\n").encode()
-    found["README.md"] = page().encode()
+    found["README.md"] = page(cases).encode()
     return found
 
 

@@ -6,6 +6,7 @@ import io
 import json
 import re
 from collections import Counter
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -87,8 +88,9 @@ def test_the_radiance_of_a_whole_path_has_no_light_sample_of_its_last_vertex():
     """Where roulette ends a path, as where the depth does: after the vertex's emission, as the page says."""
     ended = 0
     for sample in range(8):
-        view = paths.View("cornell", Settings(roulette_depth=0), 8, 8, sample)
-        inputs = {**view.inputs(), "scene": paths.scene_text("cornell")}
+        scene = (vectors.FOLDER / "scenes/cornell.json").read_text()
+        numbers = {"width": 16, "height": 16, "x": 8, "y": 8, "seed": 20, "sample": sample}
+        inputs = {"scene": scene, "settings": asdict(Settings(roulette_depth=0)), **numbers}
         found = paths.whole(inputs)
         count = len(found["t"])
         inputs["settings"]["max_depth"] = count - 1
@@ -342,13 +344,11 @@ def test_a_decision_on_its_threshold_is_accepted_either_way():
     step = Function(
         "k",
         "t",
-        "RNG-3",
         {"x": Field("number")},
         {"y": Field("1 or 2")},
         lambda given, dtype: {"y": np.where(given["x"] * given["x"] < 3.0, 1.0 + 0.0 * given["x"], 2.0)},
-        [("near", {"x": 3.0**0.5}), ("far", {"x": 1.0})],
     )
-    near, far = step.cases()
+    near, far = (step.kind().made({"clause": "RNG-3", "input": {"x": x}}) for x in (3.0**0.5, 1.0))
     assert near.flags == ("undecided",)
     values = {
         float(near.expected["y"].value),

@@ -1,28 +1,32 @@
-"""Kinds of images: features, windows at borders, draws of pixels, metrics.
+"""Kinds of images: features, the edge-avoiding filter, windows at borders, draws of pixels, metrics.
 
 Features and metrics are computed in float64 (DAT-3, MET-1): their bounds are roundings of float64, and of the
 one rounding to float32. u = 2^-53 and gamma(n) = n u / (1 - n u) for n roundings, Higham, "Accuracy and
 Stability of Numerical Algorithms", 2002, section 3.1.
+
+Of the filter: an exponent has 24 roundings at most: the difference and its factor three, squared, nine
+squares added, in any order. A weight exp(-E) is then off by (24 E + 8) u, 4 of them the exponential's own and
+2 its product with the spline's number, and moves a mean by its share of the distance to it. Two sums of 25
+terms, a product of each and the quotient add 54 u of the largest colour. What the level before was off by,
+the next takes the mean of [`_bound_of`].
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....refimpl import metrics, rng
+from ....refimpl import metrics
 from ....refimpl.errors import InputError
-from ....refimpl.frame import LAYERS, USUAL, Frame, validate
-from ....refimpl.network import dataset
+from ....refimpl.frame import LAYERS, Frame, validate
+from ....refimpl.network import dataset, smoothing
 from ....refimpl.network.dataset import Normalization, Window
-from ..case import Case, Kind, Output, exact
-from . import smoothing
-from .smoothing import UNIT, Layers, single
-from .tables import kind, table
+from ..case import Kind, Output
+from .tables import kind
 
 Array = NDArray[Any]
 
@@ -33,12 +37,8 @@ ULP = 2.0**-23
 """One ulp of float32 numbers up to 1, and more of smaller ones."""
 
 
-def noise(index: int, shape: tuple[int, ...]) -> Array:
-    """Return uniform numbers (...) in [0, 1), the same on every machine."""
-    count = int(np.prod(shape))
-    blocks = rng.counter(np.arange(-(-count // 4)))
-    found = rng.uniforms(rng.counter(31), blocks, rng.counter(index), rng.counter(0), np.float64)
-    return np.stack(found, axis=-1).reshape(-1)[:count].reshape(shape)
+UNIT = 2.0**-53
+"""Unit roundoff of float64."""
 
 
 # ---- features ---------------------------------------------------------------------------------------------
@@ -66,97 +66,47 @@ def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"image": dataset.feature_image(frame, names, normalization_of(inputs))}
 
 
-def bad_layers(height: int, width: int, index: int) -> dict[str, Array]:
-    """Return the layers of a small frame with NaN, infinities, negatives and a firefly."""
-    layers = {
-        name: single(noise(index + i, (height, width, layer.channels)) * 1.5 - 0.25)
-        for i, (name, layer) in enumerate((name, LAYERS[name]) for name in USUAL)
-    }
-    flat = layers["color"].reshape(-1)
-    flat[:6] = (np.nan, np.inf, -np.inf, 1e6, -3.0, 0.0)
-    layers["normal"].reshape(-1)[:2] = (np.nan, 7.0)
-    layers["depth"].reshape(-1)[:3] = (np.nan, np.inf, -1.0)
-    return layers
+def _of_features(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+    """Return the feature image with its bound."""
+    return {"image": Output(wanted["image"], ULP, ENCODED)}
 
 
-ROWS = table("images")
-"""Scales, features, windows, draws and pictures of the cases, which are data: each row ends with its note."""
-
-SCALES, OTHER_SCALES, FAR_SCALES = (
-    {name: np.array(value) if isinstance(value, list) else value for name, value in row.items()}
-    for row in ROWS["scales"]
-)
-"""Scales of the cases; others that lead beyond what features are clipped to; and some with a centre whose
-encoded position is far from 0."""
-
-ENDS = (np.nan, -np.inf, np.inf, 0.0, -1e30, 1e30)
-"""Numbers of which a layer may hold any, and what each is clipped to tells nothing of the others."""
+# ---- the filter -------------------------------------------------------------------------------------------
 
 
-def ends_of(layer: str, turn: int = 0) -> Array:
-    """Return a layer (2, 3, channels) that has every one of `ENDS` in each channel, in turn."""
-    channels = LAYERS[layer].channels
-    return np.stack([np.roll(ENDS, turn + channel).reshape(2, 3) for channel in range(channels)], axis=-1)
+def _smoothed(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return colour after some levels."""
+    layers = frame_of({name: inputs[name] for name in ("color", *smoothing.GUIDES, smoothing.DEPTH)}).layers
+    validate(Frame(layers), finite=False)
+    guides = {name: layer for name, layer in layers.items() if name != "color"}
+    return {"color": smoothing.smooth(layers["color"], guides, int(inputs["levels"]))}
 
 
-def _layers_of(names: str, shape: tuple[int, int]) -> dict[str, Array]:
-    """Return the layers of features, with numbers from -0.5 to 2.5."""
-    layers = [layer for name in names.split(",") for layer in dataset.FEATURES[name].layers]
-    return {
-        layer: single(noise(80 + i, (*shape, LAYERS[layer].channels)) * 3.0 - 0.5)
-        for i, layer in enumerate(dict.fromkeys(layers))
-    }
+def _bound_of(color: Array, layers: Mapping[str, Array], levels: int) -> Array:
+    """Return how far off colours (H, W, 3) may be after some levels."""
+    guides, factors = smoothing.guides_of(layers)
+    height, width = color.shape[:2]
+    error = np.zeros_like(color)
+    for level in range(levels):
+        mean = smoothing.smooth_once(color, guides, factors, 2**level)
+        moved, total, largest = np.zeros_like(color), np.zeros_like(color[..., :1]), np.zeros_like(color)
+        for spline, rows, columns in smoothing.taps(height, width, 2**level):
+            there = np.ix_(rows, columns)
+            apart = (guides[there] - guides) * factors
+            exponent = 0.5 * np.sum(apart * apart, axis=-1, keepdims=True)
+            weight = spline * np.exp(-exponent)
+            of_weight = weight * (24.0 * exponent + 8.0) * UNIT
+            moved += of_weight * np.abs(color[there] - mean) + weight * error[there]
+            total, largest = total + weight, np.maximum(largest, np.abs(color[there]))
+        error = 1.001 * (moved / total + 54.0 * UNIT * largest)
+        color = mean
+    return error
 
 
-PLAIN = ("other scales", "two of one layer")
-"""Notes of those whose refusal is blamed on their clause."""
-
-
-def _feature_rows() -> Iterator[tuple[str, str, bool, str, Layers, dict[str, Any]]]:
-    """Yield clause, note, whether it is valid, features, layers and scales of feature images.
-
-    Those of a frame with bad pixels first; then other features, each with its limits, and what is refused."""
-    layers = bad_layers(2, 3, 50)
-    for names, clause, note, bad in ROWS["features"]:
-        wanted = {layer for name in names.split(",") for layer in dataset.FEATURES[name].layers}
-        shown = {n: v if bad else v[1:] for n, v in layers.items() if n in wanted}  # bad ones are in row 0
-        yield clause, note, True, names, shown, SCALES
-    all_of = ("position", "depth", "color", "unshadowed", "normal")
-    shown = {name: v for name, v in bad_layers(3, 2, 60).items() if name in all_of}
-    shown["normal"] = single(-1.5 * shown["normal"])
-    yield "DAT-1", PLAIN[0], True, ",".join(all_of), shown, OTHER_SCALES
-    shown = {name: layers[name][1:] for name in ("color", "depth")}
-    yield "DAT-1", PLAIN[1], True, "highlights,depth,color", shown, SCALES
-    for names, note in ROWS["wrong_features"][:3]:
-        yield "DAT-9", note, False, names, {"color": layers["color"]}, SCALES
-    for feature in dataset.FEATURES.values():
-        if not feature.guides:
-            note = "NaN is 0 before it is encoded, infinities are the ends of the range"
-            yield "DAT-10", note, True, feature.name, {feature.layer: ends_of(feature.layer)}, FAR_SCALES
-    for names, note in ROWS["later_features"]:
-        yield "DAT-1", note, True, names, _layers_of(names, (2, 2)), OTHER_SCALES
-    color = {"color": single(noise(90, (2, 3, 3)))}
-    for names, note in ROWS["wrong_features"][3:]:
-        more = {"depth": single(noise(91, (2, 3, 1)))} if "depth," in names else {}
-        yield "DAT-9", note, False, names, {**color, **more}, SCALES
-    for layer, shape, note in ROWS["wrong_layers"]:
-        yield "FRM-5", note, False, f"color,{layer}", {**color, layer: np.full(shape, 0.5)}, SCALES
-    for clause, note, names, guided, stops in smoothing.feature_rows():
-        yield clause, note, True, names, guided, {**SCALES, "exposure_stops": stops}
-    for note, names, guided in smoothing.missing_rows():
-        yield "DAT-9", note, False, names, guided, SCALES
-
-
-def _feature_cases() -> list[Case]:
-    """Return feature images, and what is refused."""
-    cases: list[Case] = []
-    for clause, note, valid, names, layers, scales in _feature_rows():
-        inputs = {**layers, "features": names, **scales}
-        expected = {"image": Output(_features(inputs)["image"], ULP, ENCODED)} if valid else None
-        # A program that knows no feature refuses the first one; later ones have other layers.
-        refusal = "" if not valid or note in PLAIN else "FRM-5" if cases else "DAT-9"
-        cases.append(Case(clause, inputs, expected, note, refusal))
-    return cases
+def _of_smoothed(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+    """Return smoothed colour with its bound."""
+    bound = _bound_of(inputs["color"], inputs, int(inputs["levels"]))
+    return {"color": Output(wanted["color"], bound, "roundings of float64, level by level (DAT-3)")}
 
 
 # ---- windows ----------------------------------------------------------------------------------------------
@@ -177,18 +127,6 @@ def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"window": dataset.windows_at(image, y, x, window)[0]}
 
 
-def _window_cases() -> list[Case]:
-    """Return windows; channel c of the pixel (x, y) holds 100 y + 10 x + c, or 0 if it is refused."""
-    cases = []
-    for clause, refusal, height, width, size, border, x, y, note in ROWS["windows"]:
-        row, column, channel = np.indices((height, width, 2 if size < 12 and refusal else 1))
-        image = (100 * row + 10 * column + channel) * (note != "the largest window" and refusal is not None)
-        inputs = {"image": image, "size": size, "border": border, "x": x, "y": y}
-        expected = exact(_window(inputs)) if refusal is not None else None
-        cases.append(Case(clause, inputs, expected, note, refusal or ""))
-    return cases
-
-
 # ---- draws ------------------------------------------------------------------------------------------------
 
 
@@ -198,13 +136,6 @@ def _draws(inputs: Mapping[str, Any]) -> dict[str, Any]:
     seed, stream, count = (int(inputs[name]) for name in ("seed", "stream", "count"))
     found = dataset.sample_pixels(seed, stream, count, shapes)
     return dict(zip(("frame", "y", "x"), found, strict=True))
-
-
-def _draw_cases() -> list[Case]:
-    """Return draws from one frame and from several."""
-    given = [dict(zip(("seed", "stream", "count", "shapes"), row, strict=True)) for row in ROWS["draws"]]
-    given = [{**inputs, "shapes": np.array(inputs["shapes"])} for inputs in given]
-    return [Case("DAT-8", inputs, exact(_draws(inputs))) for inputs in given]
 
 
 # ---- metrics ----------------------------------------------------------------------------------------------
@@ -241,106 +172,38 @@ def _ssim_bound(value: float, count: int, largest: float = 1.0) -> float:
 
 Bound = Callable[[float, int], float]
 
-METRICS: Mapping[str, tuple[str, Callable[[Array, Array], float], Bound]] = {
-    "mse": ("MET-3", metrics.mse, _sum_bound),
-    "psnr": ("MET-4", metrics.psnr, _psnr_bound),
-    "ssim": ("MET-5", metrics.ssim, _ssim_bound),
-    "relmse": ("MET-6", metrics.relmse, _sum_bound),
-    "smape": ("MET-7", metrics.smape, _sum_bound),
-    "blurred": ("MET-10", metrics.blurred, _blur_bound),
+METRICS: Mapping[str, tuple[Callable[[Array, Array], float], Bound]] = {
+    "mse": (metrics.mse, _sum_bound),
+    "psnr": (metrics.psnr, _psnr_bound),
+    "ssim": (metrics.ssim, _ssim_bound),
+    "relmse": (metrics.relmse, _sum_bound),
+    "smape": (metrics.smape, _sum_bound),
+    "blurred": (metrics.blurred, _blur_bound),
 }
-"""Clause, function and bound of each metric."""
+"""Function and bound of each metric."""
 
-SHAPE = (13, 12, 3)
-"""Shape of the pictures that are compared."""
-
-
-def _pictures() -> dict[str, Array]:
-    """Return a reference, pictures near it, and one of fireflies, all in float32."""
-    y, x, c = np.indices(SHAPE)
-    reference = single(0.5 + 0.4 * np.sin(0.7 * x + 0.3 * y * y + c))
-    return {
-        "reference": reference,
-        "noisy": single(np.clip(reference + 0.2 * (noise(70, SHAPE) - 0.5), 0.0, 1.0)),
-        "near": single(reference + 2.0**-20 * noise(71, SHAPE)),
-        "flat": np.full(SHAPE, 0.25),
-    }
-
-
-def files() -> dict[str, bytes]:
-    """Return the pictures as files."""
-    return {f"images/{name}.f32": values.astype("<f4").tobytes() for name, values in _pictures().items()}
-
-
-def _in_file(name: str) -> dict[str, Any]:
-    """Return the input that names a picture."""
-    return {"file": f"images/{name}.f32", "shape": list(SHAPE)}
-
-
-def _metric_cases(name: str) -> list[Case]:
-    """Return the cases of a metric."""
-    clause, function, bound = METRICS[name]
-    pictures, cases = _pictures(), list[Case]()
-
-    def add(image: Any, reference: Any, value: float | None, note: str, rule: str = clause) -> None:
-        text = "roundings of float64, any order"
-        expected = (
-            None if value is None else {"value": Output(value, bound(value, int(np.prod(SHAPE))), text)}
-        )
-        inputs = {"image": image, "reference": reference}
-        refusal = "" if value is None else "MET-1"
-        cases.append(Case(rule, inputs, expected, note, refusal))
-
-    for image, reference, note in ROWS["pairs"]:
-        add(_in_file(image), _in_file(reference), function(pictures[image], pictures[reference]), note)
-    for note, *small in ROWS["small"]:
-        left, right = map(np.array, small)
-        valid = name != "ssim" and (name != "blurred" or left.ndim == 3)
-        why = note if valid else "two axes" if name == "blurred" else "smaller than a window"
-        add(left, right, function(left, right) if valid else None, why)
-    if name == "ssim":
-        left, right = pictures["noisy"][:11, :11, :1], pictures["reference"][:11, :11, :1]
-        add(left, right, function(left, right), "exactly a window")
-        add(left[:10], right[:10], None, "a row less than a window")
-        add(left[:, :10], right[:, :10], None, "a column less than a window")
-        add(left[..., 0], right[..., 0], None, "two axes")
-    one = np.full((1, 1, 3), 0.5)
-    add(one, np.full((1, 2, 3), 0.5), None, "other shapes", "MET-1")
-    add(one[:0, 0, 0], one[:0, 0, 0], None, "no number", "MET-1")
-    for value in (np.nan, np.inf):
-        add(np.where(one > 0, [value, 0.5, 0.5], one), one, None, f"{value} in a picture", "MET-1")
-    more = 1 if name != "ssim" else metrics.WINDOW_SIZE_PX
-    for shape, other, note in ROWS["shapes"]:
-        add(np.full(shape, 0.5), np.full(other, 0.5), None, note, "MET-1")
-    square = np.full((more, more, 1), 0.5)
-    for value in (np.nan, -np.inf):
-        bad = square.copy()
-        bad[-1, -1] = value
-        add(square, bad, None, f"{value} in a reference", "MET-1")
-    add(bad, bad, None, "-inf in both, at the same place", "MET-1")
-    if name == "mse":
-        whole = _in_file("reference")
-        for sides, note in ROWS["sizes"]:
-            add({**whole, "shape": sides}, {**whole, "shape": sides}, None, note, "RDG-4")
-        add(square.tolist(), [[[0.5], [0.5]], [[0.5]]], None, "rows of two lengths", "MET-1")
-    return cases
+MOST_NUMBERS = 13 * 12 * 3
+"""Numbers of the largest pictures that are compared."""
 
 
 def _metric(name: str) -> Kind:
     """Return the kind of a metric."""
-    function = METRICS[name][1]
+    function, bound = METRICS[name]
+
+    def expect(inputs: Any, wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+        value = wanted["value"]
+        return {"value": Output(value, bound(value, MOST_NUMBERS), "roundings of float64, any order")}
+
     return kind(
-        f"metric.{name}",
-        lambda: _metric_cases(name),
-        lambda inputs: {"value": function(inputs["image"], inputs["reference"])},
-        files,
+        f"metric.{name}", lambda inputs: {"value": function(inputs["image"], inputs["reference"])}, expect
     )
 
 
 KINDS = (
-    kind("image.features", _feature_cases, _features),
-    kind("image.window", _window_cases, _window),
-    kind("image.draws", _draw_cases, _draws),
+    kind("image.features", _features, _of_features),
+    kind("image.window", _window),
+    kind("image.draws", _draws),
     *map(_metric, METRICS),
+    kind("image.smoothed", _smoothed, _of_smoothed),
 )
 """The kinds of this module."""

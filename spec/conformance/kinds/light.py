@@ -12,9 +12,9 @@ from ....refimpl.light import camera, environment, sampling
 from ....refimpl.light.scene import Camera, Light, Quad, Sky, Sphere
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK
-from ..case import Case, Kind, Output
+from ..case import Kind, Output
 from ..functions import Numbers
-from .tables import WORDS, direct, function, kind
+from .tables import direct, function, kind
 
 ROUNDED = "float64, rounded once to float32"
 """Where bounds of numbers come from that are computed once for a scene: with a margin, one ulp."""
@@ -22,25 +22,19 @@ ROUNDED = "float64, rounded once to float32"
 # ---- numbers of a scene -----------------------------------------------------------------------------------
 
 
-def _layout(name: str, clause: str, call: Callable[..., Any]) -> Kind:
-    """Return a kind of numbers that are computed once for a scene, in float64; each row has all inputs."""
+def _layout(name: str, call: Callable[..., Any]) -> Kind:
+    """Return a kind of numbers that are computed once for a scene, in float64."""
 
     def answer(given: Mapping[str, Any]) -> dict[str, Any]:
         return dict(call(*(np.asarray(value, np.float64).tolist() for value in given.values())))
 
-    def cases() -> list[Case]:
-        found = []
-        for row in WORDS[name]["given"]:
-            inputs = zip(WORDS[name]["inputs"], row, strict=True)
-            given = {key: np.asarray(value, np.float64) for key, value in inputs}
-            expected = {
-                key: Output(value, np.maximum(2.0**-23 * np.abs(value), 2.0**-26), ROUNDED)
-                for key, value in answer(given).items()
-            }
-            found.append(Case(clause, given, expected))
-        return found
+    return kind(name, answer, _rounded)
 
-    return kind(name, cases, answer)
+
+def _rounded(inputs: Any, wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+    """Return numbers with the bounds of one rounding."""
+    bounds = {name: np.maximum(2.0**-23 * np.abs(value), 2.0**-26) for name, value in wanted.items()}
+    return {name: Output(value, bounds[name], ROUNDED) for name, value in wanted.items()}
 
 
 def _axes(position: Any, look_at: Any, up: Any, fov: float) -> dict[str, Any]:
@@ -61,9 +55,9 @@ def _share(zenith: Any, horizon: Any, ground: Any, sun_irradiance: Any) -> dict[
 
 
 KINDS = (
-    _layout("camera.axes", "CAM-1", _axes),
-    _layout("transport.lamp", "SCN-5", _lamp),
-    _layout("sky.share", "ENV-2", _share),
+    _layout("camera.axes", _axes),
+    _layout("transport.lamp", _lamp),
+    _layout("sky.share", _share),
 )
 """Kinds of this module that are not functions which executors run; a sky without light has no share."""
 
@@ -138,65 +132,26 @@ def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
     return {"t": Quad.distance(row, given["origin"], given["direction"])}
 
 
-def pair(u: np.ndarray) -> dict[str, float]:
-    """Return two uniform numbers."""
-    return {"u0": u[0], "u1": u[1]}
-
-
-def unit(u: np.ndarray) -> np.ndarray:
-    """Return a unit vector from uniform numbers, rounded like a renderer's."""
-    v = 2.0 * u[:3] - 1.0
-    return np.asarray(v / np.sqrt(v @ v), np.float32)
-
-
-def aimed(u: np.ndarray) -> dict[str, Any]:
-    """Return a ray from outside towards something near the sphere's centre."""
-    origin = np.asarray(4.0 * unit(u), np.float32)
-    target = np.array(SPHERE_CENTER) + 1.6 * (u[4:7] - 0.5)
-    direction = target - origin
-    return {"origin": origin, "direction": direction / np.sqrt(direction @ direction)}
-
-
 FUNCTIONS = (
-    direct(
-        "vector",
-        _vector,
-        lambda u: {name: 4.0 * u[3 * i : 3 * i + 3] - 2.0 for i, name in enumerate("abc")},
-        draws=5,
-    ),
-    function(
-        "camera.ray",
-        _ray,
-        lambda u: {"x": int(WIDTH * u[0]), "y": int(HEIGHT * u[1]), "u": u[2], "v": u[3]},
-    ),
-    direct("sampling.concentric_disk", sampling.sample_concentric_disk, pair),
-    direct("sampling.cosine_hemisphere", _hemisphere, pair),
-    direct(
-        "sampling.spherical_cauchy", _cauchy, lambda u: {**pair(u), "concentration": 1000.0 * u[2] * u[2]}
-    ),
+    direct("vector", _vector),
+    function("camera.ray", _ray),
+    direct("sampling.concentric_disk", sampling.sample_concentric_disk),
+    direct("sampling.cosine_hemisphere", _hemisphere),
+    direct("sampling.spherical_cauchy", _cauchy),
     direct(
         "sampling.quad",
         lambda u0, u1, corner, edge_u, edge_v: (
             sampling.sample_quad(u0, u1, corner, edge_u, edge_v),
             sampling.quad_pdf(edge_u, edge_v),
         ),
-        lambda u: {
-            **pair(u),
-            "corner": 4.0 * u[2:5] - 2.0,
-            "edge_u": u[5:8] + 0.5,
-            "edge_v": unit(u[8:11]),
-        },
-        draws=4,
     ),
-    function("sampling.discrete", _discrete, lambda u: {"u0": u[0]}, draws=4),
-    direct("sampling.tangent_frame", sampling.tangent_frame, lambda u: {"normal": unit(u)}),
+    function("sampling.discrete", _discrete),
+    direct("sampling.tangent_frame", sampling.tangent_frame),
     direct(
         "sampling.to_world",
         lambda vector, normal: (sampling.to_world(vector, normal), sampling.to_local(vector, normal)),
-        lambda u: {"vector": 2.0 * u[3:6] - 1.0, "normal": unit(u)},
-        draws=4,
     ),
-    function("intersection.sphere", _sphere, aimed),
-    function("intersection.quad", _quad, aimed),
+    function("intersection.sphere", _sphere),
+    function("intersection.quad", _quad),
 )
 """The functions of this module."""

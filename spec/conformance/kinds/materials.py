@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ....refimpl.light import environment, transport
+from ....refimpl.light import scene as scene_module
 from ....refimpl.light.intersection import reflecting
 from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
 from ....refimpl.light.materials.conductor import distribution, sample_visible_normal, schlick
 from ....refimpl.light.materials.dielectric import fresnel, refract
 from ....refimpl.light.materials.material import Site
-from ....refimpl.light.scene import Sky
+from ....refimpl.light.scene import Scene, Sky
 from ....refimpl.vectors import dot
+from ..case import FOLDER
 from ..functions import Numbers
-from .light import pair, unit
 from .tables import direct, function
-from .views import scene
 
 # ---- surfaces ---------------------------------------------------------------------------------------------
 
@@ -50,24 +51,6 @@ def _refracted(wo: Any, normal: Any, ratio: Any) -> tuple[Any, Any]:
     return refract(site, np.minimum(np.maximum(dot(wo, normal), 0.0), 1.0), ratio)
 
 
-def _facing(direction: Any, normal: Any) -> Any:
-    """Return a direction, or its opposite, on the side of a normal."""
-    return direction if float(normal.astype(np.float64) @ direction) > 0.0 else -direction
-
-
-def _vertex(u: Any) -> dict[str, Any]:
-    """Return a vertex and three uniform numbers from others."""
-    normal = unit(u[:3])
-    vertex = {"normal": normal, "wo": _facing(unit(u[3:6]), normal), "reflectance": u[6:9]}
-    return {**vertex, "u0": u[9], "u1": u[10], "u_choice": u[11]}
-
-
-def _raised(u: Any) -> Any:
-    """Return a unit vector above the surface, in local terms."""
-    found = unit(u)
-    return found * np.sign(found[2])
-
-
 # ---- lights -----------------------------------------------------------------------------------------------
 
 NO_SETTINGS = cast(transport.Settings, None)
@@ -75,6 +58,12 @@ NO_SETTINGS = cast(transport.Settings, None)
 
 SKY = Sky((0.16, 0.30, 0.62), (0.62, 0.70, 0.80), (0.18, 0.16, 0.14), (0.6, 0.8, 0.0), (2.6, 2.2, 1.6), 64.0)
 """The sky of all directions."""
+
+
+@cache
+def _terrace() -> Scene:
+    """Return the scene whose lamps are sampled."""
+    return scene_module.from_json((FOLDER / "scenes/terrace.json").read_text(encoding="utf-8"))
 
 
 class Heuristic(NamedTuple):
@@ -97,14 +86,14 @@ def _sky_sample(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the light of the terrace's lamps at points of its surfaces."""
-    world = transport.build(scene("terrace"), NO_SETTINGS, dtype)
+    world = transport.build(_terrace(), NO_SETTINGS, dtype)
     surface = reflecting(given["point"], given["normal"], given["reflectance"])
     return {"unshadowed": transport.unshadowed(world, surface)}
 
 
 def _light_pdf(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return the densities of both lamps of the terrace."""
-    lights = transport.build(scene("terrace"), NO_SETTINGS, dtype).lights
+    lights = transport.build(_terrace(), NO_SETTINGS, dtype).lights
     assert lights is not None
     square, cosine = given["square"], given["cosine"]
     index = np.zeros_like(square, np.int32)
@@ -112,66 +101,32 @@ def _light_pdf(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 
 FUNCTIONS = (
-    direct("material.ggx", distribution, lambda u: {"m": unit(u), "roughness": 0.05 + 0.9 * u[3]}, draws=4),
-    direct("material.schlick", schlick, lambda u: {"reflectance": u[:3], "cosine": u[3]}, draws=3),
-    direct(
-        "material.visible_normal",
-        sample_visible_normal,
-        lambda u: {**pair(u), "wo": _raised(u[2:]), "roughness": 0.05 + 0.9 * u[5]},
-        draws=4,
-    ),
-    direct("material.refracted", _refracted, lambda u: {**_vertex(u), "ratio": 0.5 + 0.5 * u[6]}, draws=4),
-    direct(
-        "material.fresnel",
-        fresnel,
-        lambda u: {"cosine": u[0], "behind": u[1], "ratio": 0.25 + 3.0 * u[2]},
-        draws=4,
-    ),
+    direct("material.ggx", distribution),
+    direct("material.schlick", schlick),
+    direct("material.visible_normal", sample_visible_normal),
+    direct("material.refracted", _refracted),
+    direct("material.fresnel", fresnel),
+    function("transport.light_pdf", _light_pdf),
+    function("material.lambertian", lambda given, dtype: _sampled(Lambertian, given)),
+    function("material.mirror", lambda given, dtype: _sampled(Mirror, given)),
     function(
-        "transport.light_pdf",
-        _light_pdf,
-        lambda u: {"square": 4.0 * u[0], "cosine": u[1]},
-        draws=3,
+        "material.conductor", lambda given, dtype: _sampled(Conductor, given, parameter=given["roughness"])
     ),
-    function("material.lambertian", lambda given, dtype: _sampled(Lambertian, given), _vertex, draws=4),
-    function("material.mirror", lambda given, dtype: _sampled(Mirror, given), _vertex, draws=4),
-    function(
-        "material.conductor",
-        lambda given, dtype: _sampled(Conductor, given, parameter=given["roughness"]),
-        lambda u: {**_vertex(u), "roughness": 0.05 + 0.9 * u[12]},
-    ),
-    function(
-        "material.conductor_value",
-        _valued,
-        lambda u: {
-            **_vertex(u),
-            "wi": _facing(unit(u[9:12]), unit(u[:3])),
-            "roughness": 0.05 + 0.9 * u[12],
-        },
-        draws=4,
-    ),
+    function("material.conductor_value", _valued),
     function(
         "material.dielectric",
         lambda given, dtype: _sampled(
             Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5
         ),
-        lambda u: {**_vertex(u), "ior": 1.0 + u[12], "outside": round(u[13])},
     ),
     direct(
         "transport.mis_weight",
         lambda pdf, other: tuple(
             transport.mis_weight(cast(Any, Heuristic(name)), pdf, other) for name in ("balance", "power")
         ),
-        lambda u: {"pdf": 4.0 * u[0], "other": 4.0 * u[1]},
-        draws=4,
     ),
-    function(
-        "transport.unshadowed",
-        _unshadowed,
-        lambda u: {"point": 4.0 * u[:3] - 2.0, "normal": unit(u[3:])},
-        draws=4,
-    ),
-    function("sky.radiance", _sky, lambda u: {"direction": unit(u)}, draws=4),
-    function("sky.sample", _sky_sample, lambda u: {"u_choice": u[0], "u0": u[1], "u1": u[2]}, draws=6),
+    function("transport.unshadowed", _unshadowed),
+    function("sky.radiance", _sky),
+    function("sky.sample", _sky_sample),
 )
 """The functions of this module."""

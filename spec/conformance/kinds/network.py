@@ -7,6 +7,7 @@ by step.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -25,32 +26,16 @@ from ....compiler.training.step import SQUARES, sum_errors
 from ....refimpl.errors import InputError
 from ....refimpl.network import adam, siren, train
 from ....refimpl.network.siren import Siren
-from ..case import Case, Output, exact
-from ..functions import drawn
-from .tables import kind, table
+from ..case import Output, exact
+from .tables import kind
 
 Array = NDArray[Any]
 
 POSTERIORI = "bounds of profile ieee at these inputs (compiler/proof/bounds.py)"
 """Where the bounds of networks come from."""
 
-ROWS = table("networks")
-"""Networks of the cases, which are data: widths, omega_0 of the first layer and of the others; networks with
-more than 1,024 weights or 255 neurons in a layer and large seeds, which are only drawn; what is refused;
-layers and inputs that do not fit a network of 4, 5 and 3 numbers (SIR-1); and for Adam gradients of the first
-step, which halve from step to step, and every second one turns in the second row."""
-
-SIZES = ROWS["sizes"]
-"""Networks of the cases."""
-
-EXAMPLES = 4
-"""Examples of a minibatch."""
-
-
-def _network(index: int) -> Siren:
-    """Return the network of a case: large weights in the third."""
-    widths, first, hidden = SIZES[index]
-    return siren.init(widths, first, hidden, seed=index, dtype=np.float32)
+STEPS = "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
+"""Where the bounds of Adam's runs come from."""
 
 
 def as_inputs(network: Siren) -> dict[str, Any]:
@@ -81,11 +66,13 @@ def _check_fit(weights: Sequence[Array], biases: Sequence[Array]) -> None:
             raise InputError(f"layer {layer}", weight.shape, rule, "give layers that fit one another")
 
 
-def _numbers(index: int, shape: tuple[int, ...], scale: float = 1.0) -> Array:
-    """Return numbers (...) in [-scale, scale], float32 in float64."""
-    count = int(np.prod(shape))
-    flat = (2.0 * drawn("network", index, count) - 1.0) * scale
-    return flat.astype(np.float32).astype(np.float64).reshape(shape)
+def _single(inputs: Mapping[str, Any]) -> Siren:
+    """Return the network of a case in float32."""
+    network = network_of(inputs)
+    weights, biases = (
+        tuple(part.astype(np.float32) for part in parts) for parts in (network.weights, network.biases)
+    )
+    return replace(network, weights=weights, biases=biases)
 
 
 # ---- initial parameters -----------------------------------------------------------------------------------
@@ -102,20 +89,6 @@ def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
         np.float32,
     )
     return {name: value for name, value in as_inputs(drawn_ones).items() if not name.startswith("omega")}
-
-
-def _init_cases() -> list[Case]:
-    """Return some networks."""
-    cases = []
-    rows = [(*row, index) for index, row in enumerate(SIZES)]
-    for widths, first, hidden, seed in [*rows, *ROWS["drawn"]]:
-        inputs = {"widths": np.array(widths), "omega_0_first": first, "omega_0_hidden": hidden, "seed": seed}
-        cases.append(Case("SIR-5", inputs, exact(_init(inputs), "exact, rounded once to float32")))
-    for name, value in ROWS["wrong"]:
-        inputs = {"widths": np.array([4, 5, 3]), "omega_0_first": 3.0, "omega_0_hidden": 1.0, "seed": 0}
-        wrong = {**inputs, name: np.array(value) if isinstance(value, list) else value}
-        cases.append(Case("SIR-5", wrong, None, f"{name} = {wrong[name]}"))
-    return cases
 
 
 # ---- activations ------------------------------------------------------------------------------------------
@@ -147,28 +120,15 @@ def _forward(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value[0] for name, value in found.items()}
 
 
-def _forward_cases() -> list[Case]:
+def _of_forward(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
     """Return activations with bounds."""
-    cases = []
-    rows = [(index, note) for index in range(len(SIZES)) for note in ("", "zeros", "an input of a firefly")]
-    for number, (index, note) in enumerate(rows):
-        network, n_in = _network(index), SIZES[index][0][0]
-        x = {"": _numbers(number, (n_in,)), "zeros": np.zeros(n_in)}.get(
-            note, _numbers(number, (n_in,), 40.0)
-        )
-        inputs = {**as_inputs(network), "x": x}
-        program = analysed(trace(partial(activations, network), {"x": Type(shape=(n_in,))}))
-        found = bounds.at_inputs(program, {"x": x[np.newaxis]}, EMITTED_SINE)
-        expected = {
-            name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
-            for name, value in _forward(inputs).items()
-        }
-        cases.append(Case("SIR-2", inputs, expected, note))
-    good = as_inputs(siren.init([4, 5, 3], 3.0, 1.0, seed=0, dtype=np.float32))
-    for note, name, shape in ROWS["unfit"]:
-        wrong = {**good, "x": np.zeros(4), name: np.zeros(shape)}
-        cases.append(Case("SIR-1", wrong, None, note))
-    return cases
+    types = {"x": Type(shape=inputs["x"].shape)}
+    program = analysed(trace(partial(activations, _single(inputs)), types))
+    found = bounds.at_inputs(program, {"x": inputs["x"][np.newaxis]}, EMITTED_SINE)
+    return {
+        name: Output(value, np.broadcast_to(found[name], (1, value.size))[0], POSTERIORI)
+        for name, value in wanted.items()
+    }
 
 
 # ---- derivatives ------------------------------------------------------------------------------------------
@@ -184,28 +144,20 @@ def _gradient(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return derivatives
 
 
-def _gradient_cases() -> list[Case]:
-    """Return derivatives with bounds."""
-    cases = []
-    for index, (widths, _, _) in enumerate(SIZES):
-        network = _network(index)
-        x, target = _numbers(20 + index, (EXAMPLES, widths[0])), _numbers(30 + index, (EXAMPLES, widths[-1]))
-        inputs = {**as_inputs(network), "x": x, "target": target}
-        step = step_of(partial(siren.forward, network), widths[0], widths[-1], EXAMPLES)
-        errors = sum_errors(step, x, target)
-        expected = {}
-        # The loss comes first: what is wrong with it is wrong with all derivatives.
-        for name, value in _gradient(inputs).items():
-            if name == "loss":
-                # The mean of all squares is their sums' sum over their number: 8 more roundings at most.
-                error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value
-                expected[name] = Output(value, error, POSTERIORI, clause="TRN-3")
-                continue
+def _of_gradient(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+    """Return derivatives with bounds. The mean of all squares has 8 roundings more than their sums."""
+    x, target = inputs["x"], inputs["target"]
+    step = step_of(partial(siren.forward, _single(inputs)), x.shape[1], target.shape[1], len(x))
+    errors, expected = sum_errors(step, x, target), {}
+    for name, value in wanted.items():
+        if name == "loss":
+            error = float(errors[SQUARES].sum()) / target.size + gamma(8) * value
+        else:
             array = inputs[name.removeprefix("d")]
             owner = next(n for n, p in step.program.parameters.items() if np.array_equal(p, array))
-            expected[name] = Output(value, errors[owner].reshape(value.shape), POSTERIORI)
-        cases.append(Case("SIR-7", inputs, expected))
-    return cases
+            error = errors[owner].reshape(value.shape)
+        expected[name] = Output(value, error, POSTERIORI)
+    return expected
 
 
 # ---- Adam -------------------------------------------------------------------------------------------------
@@ -246,31 +198,19 @@ def _rounded(value: float) -> Range:
     return Range(np.float64(ends[0]), np.float64(ends[1]), near)
 
 
-def _adam_cases() -> list[Case]:
-    """Return runs of a few steps."""
-    cases = []
-    for index, (note, first, count) in enumerate(ROWS["adam"]):
-        factors = [(-0.5 if index == 1 else 0.5) ** k for k in range(count)]
-        gradients = np.array([np.float32(f) * np.array(first, np.float32) for f in factors], np.float64)
-        inputs = {"theta": _numbers(40 + index, (4,)), "gradients": gradients, "learning_rate": 2.0**-10}
-        found, ends = _adam(inputs), _adam_ranges(inputs)
-        expected = {
-            name: Output(value, np.maximum(ends[name][1] - value, value - ends[name][0]), ranges_text())
-            for name, value in found.items()
-        }
-        cases.append(Case("ADM-1", inputs, expected, note))
-    return cases
-
-
-def ranges_text() -> str:
-    """Return where the bounds of Adam's runs come from."""
-    return "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
+def _of_adam(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
+    """Return the runs with bounds."""
+    ends = _adam_ranges(inputs)
+    return {
+        name: Output(value, np.maximum(ends[name][1] - value, value - ends[name][0]), STEPS)
+        for name, value in wanted.items()
+    }
 
 
 KINDS = (
-    kind("network.init", _init_cases, _init),
-    kind("network.forward", _forward_cases, _forward),
-    kind("network.gradient", _gradient_cases, _gradient),
-    kind("adam.run", _adam_cases, _adam),
+    kind("network.init", _init, exact("exact, rounded once to float32")),
+    kind("network.forward", _forward, _of_forward),
+    kind("network.gradient", _gradient, _of_gradient),
+    kind("adam.run", _adam, _of_adam),
 )
 """The kinds of this module."""

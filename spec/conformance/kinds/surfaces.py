@@ -12,7 +12,6 @@ from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Spher
 from ....refimpl.light.shapes.box import slabs
 from ....refimpl.light.shapes.shape import inverse
 from ..functions import Numbers
-from .light import aimed
 from .tables import function
 
 GRAY = (0.5, 0.5, 0.5)
@@ -84,8 +83,8 @@ def _occluded(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 
 FUNCTIONS = (
-    function("intersection.slabs", _slabs, aimed, draws=4),
-    *(function(name, _met(scene), aimed) for name, scene in SCENES.items()),
-    function("intersection.occluded", _occluded, lambda u: {**aimed(u), "distance": 8.0 * u[7]}),
+    function("intersection.slabs", _slabs),
+    *(function(name, _met(scene)) for name, scene in SCENES.items()),
+    function("intersection.occluded", _occluded),
 )
 """The functions of this module."""

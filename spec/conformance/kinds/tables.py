@@ -1,61 +1,41 @@
-"""Kinds as rows: titles, fields and chosen inputs are data in this folder; Python has what they call.
+"""Kinds as rows: titles and fields are data in this folder, cases are in the files of vectors.
 
-1. `functions.json` has a row for each function of numbers: its title, clause and fields, then inputs of
-   cases, each with a note and a clause where it is another one; `usual` are the inputs that a case does not
-   name. A row of Python adds the call and how more inputs are drawn [`function`], [`direct`].
-2. `kinds.json` has the title and the fields of every other kind; Python adds cases and answer [`kind`].
+1. `functions.json` has the title and the fields of each function of numbers: text, and perhaps components,
+   least and largest value; a row of Python adds the call [`function`], [`direct`].
+2. `kinds.json` has those of every other kind; a row of Python adds answer and bound [`kind`].
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..case import Case, Kind
+from ..case import EXACT, Expect, Kind
 from ..functions import Field, Function, Numbers
 
-Draw = Callable[[NDArray[np.float64]], Numbers]
-"""Inputs of a case from uniform numbers."""
+ROWS: Mapping[str, Mapping[str, Any]] = {
+    name: json.loads((Path(__file__).parent / f"{name}.json").read_text(encoding="utf-8"))
+    for name in ("functions", "kinds")
+}
+"""The functions of numbers by name, and the other kinds."""
 
 
-def table(name: str) -> Any:
-    """Return the data of a file beside this module."""
-    return json.loads((Path(__file__).parent / f"{name}.json").read_text(encoding="utf-8"))
-
-
-ROWS: Mapping[str, Any] = table("functions")
-"""The functions of numbers, by name."""
-
-
-def function(
-    name: str, call: Callable[[Numbers, Any], Numbers], draw: Draw | None = None, draws: int = 8
-) -> Function:
+def function(name: str, call: Callable[[Numbers, Any], Numbers]) -> Function:
     """Return the function of a row: `call` has the inputs by name, and the float type of constants."""
-    row = ROWS[name]
+    row = ROWS["functions"][name]
     inputs, outputs = (
         {key: Field(*([field] if isinstance(field, str) else field)) for key, field in row[side].items()}
         for side in ("inputs", "outputs")
     )
-    usual = row.get("usual", {})
-    given, decided, later = (
-        [(note, {**usual, **values}, *clause) for note, values, *clause in row.get(part, ())]
-        for part in ("given", "decided", "later")
-    )
-    drawn = (lambda u: {**usual, **draw(u)}) if draw is not None else None
-    return Function(
-        name, row["title"], row["clause"], inputs, outputs, call, given, drawn, draws, decided, later
-    )
+    return Function(name, row["title"], inputs, outputs, call)
 
 
-def direct(name: str, call: Callable[..., Any], draw: Draw | None = None, draws: int = 8) -> Function:
+def direct(name: str, call: Callable[..., Any]) -> Function:
     """Return the function of a row: `call` has the inputs one after another, and returns all outputs so."""
-    inputs, outputs = ROWS[name]["inputs"], ROWS[name]["outputs"]
+    inputs, outputs = (ROWS["functions"][name][side] for side in ("inputs", "outputs"))
 
     def named(given: Numbers, dtype: Any) -> dict[str, Any]:
         # Looked up at each call, so that a fault that is planted in the reference is seen.
@@ -63,19 +43,10 @@ def direct(name: str, call: Callable[..., Any], draw: Draw | None = None, draws:
         found = now(*(given[key] for key in inputs))
         return dict(zip(outputs, found if isinstance(found, tuple) else (found,), strict=True))
 
-    return function(name, named, draw, draws)
+    return function(name, named)
 
 
-WORDS: Mapping[str, Any] = table("kinds")
-"""Titles and fields of the kinds that are not functions of numbers, by name."""
-
-
-def kind(
-    name: str,
-    make: Callable[[], Sequence[Case]],
-    answer: Callable[[Mapping[str, Any]], Mapping[str, Any]],
-    files: Callable[[], Mapping[str, bytes]] = dict,
-) -> Kind:
+def kind(name: str, answer: Callable[[Mapping[str, Any]], Mapping[str, Any]], expect: Expect = EXACT) -> Kind:
     """Return a kind whose title and fields are in the table."""
-    row = WORDS[name]
-    return Kind(name, row["title"], row["inputs"], row["outputs"], make, answer, files, row.get("notes", ""))
+    row = ROWS["kinds"][name]
+    return Kind(name, row["title"], row["inputs"], row["outputs"], answer, expect, row.get("notes", ""))

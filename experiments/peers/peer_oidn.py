@@ -32,10 +32,6 @@ LAYERS = ("color", "albedo", "normal")
 """Layers that it is given, in the order of its arguments."""
 
 
-QUALITIES = ("fast", "balanced", "high")
-"""Its qualities, worst first."""
-
-
 def filtered(
     color: Frame, aux: Frame | None = None, clean: bool = False, quality: str = "high"
 ) -> NDArray[np.float32]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,25 +21,6 @@ from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
 
 from .common import layered, told_as_missing
-
-
-def _open(tools: Tools, model: Model, size: int) -> Opened:
-    """Return a session of the graph."""
-    with told_as_missing("onnxruntime"):
-        import onnxruntime
-
-        text = graph(model)
-        session = onnxruntime.InferenceSession(text, providers=["CPUExecutionProvider"])
-
-    def run(given: Given) -> NDArray[np.float32]:
-        found: NDArray[np.float32] = session.run(None, dict(given.images))[0]
-        return found
-
-    device = f"ONNX Runtime {onnxruntime.__version__}, CPU provider"
-    return Opened(run, device, layered(model, fuses=False))
-
-
-# ---- 8 bits -----------------------------------------------------------------------------------------------
 
 CALIBRATION_PX = 256
 """Width and height of the part of the frame that ranges are measured on."""
@@ -93,27 +75,29 @@ def at_first(make: Callable[[Given], Run]) -> Run:
     return run
 
 
-def _open_int8(tools: Tools, model: Model, size: int) -> Opened:
-    """Return ONNX Runtime with the graph in 8 bits."""
-    with told_as_missing("onnxruntime:int8"):
+def _open(name: str, tools: Tools, model: Model, size: int) -> Opened:
+    """Return a session of the graph, of that in 8 bits for `onnxruntime:int8`."""
+    with told_as_missing(name):
         import onnxruntime
 
-        def make(given: Given) -> Run:
-            session = onnxruntime.InferenceSession(
-                quantised(model, given), providers=["CPUExecutionProvider"]
-            )
-            return lambda given: session.run(None, dict(given.images))[0]
+        def session(graph_: bytes) -> Run:
+            made = onnxruntime.InferenceSession(graph_, providers=["CPUExecutionProvider"])
+            return lambda given: made.run(None, dict(given.images))[0]
 
         device = f"ONNX Runtime {onnxruntime.__version__}, CPU provider"
-    return Opened(at_first(make), device, layered(model, fuses=False))
+        if name.endswith("int8"):
+            run = at_first(lambda given: session(quantised(model, given)))
+        else:
+            run = session(graph(model))
+    return Opened(run, device, layered(model, fuses=False))
 
 
 CONTENDERS = (
-    Contender("onnxruntime", "ONNX Runtime", _open, packages=("onnx", "onnxruntime")),
+    Contender("onnxruntime", "ONNX Runtime", partial(_open, "onnxruntime"), packages=("onnx", "onnxruntime")),
     Contender(
         "onnxruntime:int8",
         "ONNX Runtime in 8 bits",
-        _open_int8,
+        partial(_open, "onnxruntime:int8"),
         variant=None,
         packages=("onnx", "onnxruntime"),
     ),

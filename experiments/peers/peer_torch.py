@@ -10,12 +10,13 @@ It trains too, eager and with its own Adam: a peer of the compiled trainer [`tra
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import Contender, Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import NO_CACHE, Contender, Opened, Tools, activation_in
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.denoise import Model
@@ -96,16 +97,18 @@ def network(model: Model, device: str = "cpu", spectra: bool = False) -> Callabl
     return computed
 
 
-def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
-    """Return the network, compiled or not; with `spectra` its first layer is computed by them."""
-    import torch
+def _open(name: str, tools: Tools, model: Model, size: int) -> Opened:
+    """Return the network, eager or compiled when it is first run; `torch.fft`: its first layer by spectra."""
+    compiled = name != "torch"
+    with told_as_missing(name):
+        import torch
 
-    computed = network(model, spectra=spectra)
+        computed = network(model, spectra=name == "torch.fft")
 
-    def of_images(images: Sequence[Any]) -> Any:
-        return computed(torch.cat(images, dim=1))
+        def of_images(images: Sequence[Any]) -> Any:
+            return computed(torch.cat(images, dim=1))
 
-    function = torch.compile(of_images) if compiled else of_images
+        function = torch.compile(of_images) if compiled else of_images
 
     def run(given: Given) -> NDArray[np.float32]:
         with torch.inference_mode():
@@ -115,24 +118,6 @@ def _open(compiled: bool, model: Model, spectra: bool = False) -> Opened:
 
     device = f"PyTorch {torch.__version__}, {torch.get_num_threads()} threads"
     return Opened(run, device, layered(model, fuses=compiled))
-
-
-def _open_eager(tools: Tools, model: Model, size: int) -> Opened:
-    """Return the network as PyTorch runs it operation by operation."""
-    with told_as_missing("torch"):
-        return _open(compiled=False, model=model)
-
-
-def _open_compiled(tools: Tools, model: Model, size: int) -> Opened:
-    """Return the network that PyTorch compiles when it is first run."""
-    with told_as_missing("torch.compile"):
-        return _open(compiled=True, model=model)
-
-
-def _open_spectra(tools: Tools, model: Model, size: int) -> Opened:
-    """Return the network with a first layer by spectra, which PyTorch compiles when it is first run."""
-    with told_as_missing("torch.fft"):
-        return _open(compiled=True, model=model, spectra=True)
 
 
 def trainer(
@@ -179,21 +164,14 @@ def trainer(
 CACHES = "PyTorch keeps code on disk, in a folder torchinductor_USER of temporary files"
 """What is kept of compiled code."""
 
-CONTENDERS = (
-    Contender("torch", "PyTorch, eager", _open_eager, packages=("torch",)),
-    Contender(
-        "torch.compile",
-        "PyTorch, compiled",
-        _open_compiled,
-        packages=("torch",),
-        caches=CACHES,
-    ),
-    Contender(
-        "torch.fft",
-        "PyTorch, compiled, its first layer by torch.fft",
-        _open_spectra,
-        packages=("torch",),
-        caches=CACHES,
-    ),
+CONTENDERS = tuple(
+    Contender(name, text, partial(_open, name), packages=("torch",), caches=CACHES if at else NO_CACHE)
+    for at, (name, text) in enumerate(
+        {
+            "torch": "PyTorch, eager",
+            "torch.compile": "PyTorch, compiled",
+            "torch.fft": "PyTorch, compiled, its first layer by torch.fft",
+        }.items()
+    )
 )
 """All forms."""

@@ -23,8 +23,6 @@ from . import (
 )
 from .moving import MitsubaOidn
 from .peer_cycles import Cycles
-from .peer_embree import Embree
-from .peer_numba import Numba
 
 contenders: tuple[Contender, ...] = (
     *peer_torch.CONTENDERS,
@@ -34,10 +32,6 @@ contenders: tuple[Contender, ...] = (
     *peer_halide.CONTENDERS,
     *peer_oidn.CONTENDERS,
 )
-renderers: Mapping[str, Renderer] = {
-    "mitsuba": peer_mitsuba.renderer,
-    "embree": lambda *given: Embree(*given).render,
-    "numba": lambda *given: Numba(*given).render,
-}
+renderers: Mapping[str, Renderer] = {"mitsuba": peer_mitsuba.renderer}
 makers: Mapping[str, Callable[[Scene, int], Maker]] = {"mitsuba": MitsubaOidn, "cycles": Cycles}
 trainer = peer_torch.trainer

@@ -8,8 +8,8 @@
    tables with a loop or a tree do. Tracing and emitting are timed, then building by a driver without its
    caches on disk, until it has followed a first row of paths.
 
-A sample is one path: at every vertex but the last a shadow ray and a scattering. Peers are Mitsuba 3, all
-samples in one pass, and two written by hand: in C with Embree's packets of 16 rays, and compiled by Numba.
+A sample is one path: at every vertex but the last a shadow ray and a scattering. The peer is Mitsuba 3, all
+samples in one pass.
 """
 
 from __future__ import annotations
@@ -38,11 +38,8 @@ from ..run.render_on import render_on
 from ..run.render_pool import render_parallel
 from . import peers
 
-BY_HAND = ("embree", "numba")
-"""Path tracers that were written as peers, for scenes of matte surfaces."""
-
-PEERS = ("mitsuba", *BY_HAND)
-"""Renderers that are peers. Those of Mitsuba and Embree have trees, Numba's has lists."""
+PEERS = ("mitsuba",)
+"""Renderers that are peers."""
 
 BUILT = ("opencl", "opengl", "c", *PEERS)
 """What forms are measured of: executors whose kernels a driver or a compiler builds, and peers."""
@@ -69,9 +66,6 @@ NO_CACHES = {
 MOST_STATEMENTS = 300
 """Most primitives that are measured as statements: a driver takes minutes for those of more."""
 
-ABOUT = {"mitsuba": VARIANT, **dict.fromkeys(BY_HAND, "by hand")}
-"""What each peer is, in words."""
-
 
 def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) -> list[Entry]:
     """Return what renders a scene, in the order of `by`; the fact `means` has each round's mean colour."""
@@ -82,7 +76,7 @@ def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) ->
                 text = f"numpy, {count} process{'es' if count > 1 else ''}"
                 ways[text] = partial(_reference, scene, job, count)
         elif kind in PEERS:
-            ways[f"{kind}, {ABOUT[kind]}"] = partial(_peer, kind, scene, job)
+            ways[f"{kind}, {VARIANT}"] = partial(_peer, kind, scene, job)
         else:
             ways[kind] = partial(_kernel, kind, scene, job)
     return [_entry(name, text, way) for text, way in ways.items()]
@@ -180,7 +174,7 @@ def _peer_s(name: str, scene: Scene, part: Part) -> Entry:
         "build_s": time.perf_counter() - traced,
         "chosen": False,
     }
-    return Entry(ABOUT[name], facts=facts, round=lambda _number: follow())
+    return Entry(VARIANT, facts=facts, round=lambda _number: follow())
 
 
 def _compiled(executor: Executor, scene: Scene, forms: Forms) -> PathArtifact:

@@ -64,15 +64,9 @@ def is_declared_elsewhere(node: ast.stmt) -> bool:
     return any(d.endswith(("overload", "override", ".setter")) for d in decorators)
 
 
-UNTYPED = {"experiments/peers/peer_numba.py"}
-"""Files whose functions have the types that a compiler of Python finds."""
-
-
 def test_functions_are_typed(house):
     wrong = []
     for source in house.installed():
-        if source.path in UNTYPED:
-            continue
         for node in source.functions():
             a = node.args
             arguments = [*a.posonlyargs, *a.args, *a.kwonlyargs, *filter(None, [a.vararg, a.kwarg])]

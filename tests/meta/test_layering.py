@@ -17,7 +17,6 @@ PEERS = {
     "openvino": ("experiments/peers/peer_openvino.py",),
     "tinygrad": ("experiments/peers/peer_tinygrad.py",),
     "halide": ("experiments/peers/peer_halide.py",),
-    "numba": ("experiments/peers/peer_numba.py",),
     "pyoidn": ("experiments/peers/peer_oidn.py",),
     "mitsuba": ("experiments/peers/peer_mitsuba.py", "spec/conformance/renderers/mitsuba_process.py"),
     "bpy": ("experiments/peers/cycles_process.py", "models/blender/process.py"),

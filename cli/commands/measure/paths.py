@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 RENDER_EXAMPLES = """Examples:
 wamnet bench render --size 512 --spp 2 --repeats 5
-wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba,embree --workers 2 --spp 16"""
+wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16"""
 """Shown below the help of `wamnet bench render`."""
 
 PRIMITIVES_EXAMPLES = """Examples:
 wamnet bench primitives
-wamnet bench primitives --executors opencl,mitsuba,embree --kinds spheres --counts 30,3000"""
+wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000"""
 """Shown below the help of `wamnet bench primitives`."""
 
 Spp = Annotated[int, typer.Option(help="Samples per pixel.")]
@@ -42,7 +42,7 @@ def render(
             "--by",
             "--executors",
             metavar="NAME,...",
-            help="Renderers to measure: numpy, opencl, opengl, c, mitsuba, embree, numba.",
+            help="Renderers to measure: numpy, opencl, opengl, c, mitsuba.",
         ),
     ] = "numpy",
     workers: Annotated[
@@ -54,12 +54,12 @@ def render(
     depth: Annotated[int, typer.Option(help="Maximum path length, including the camera ray.")] = 6,
     repeats: Repeats = 5,
 ) -> None:
-    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3, Embree.
+    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3.
 
     Each renders its first frame with empty compiler caches, then all are interleaved. The table has the
     median and the range, samples (paths) per second, and the ratio to the last row's. A second table
     compares each mean colour with that of the first renderer, in standard errors. [bold]pip install
-    mitsuba[/] adds Mitsuba, which also needs libLLVM; Embree needs a C compiler and libembree-dev.
+    mitsuba[/] adds Mitsuba, which also needs libLLVM.
     """
     from ....kernels.bench import paths
     from ....kernels.bench.fresh import empty_caches
@@ -106,7 +106,7 @@ def _agreement(entries: Sequence[Entry]) -> Iterator[str]:
 
 def primitives(
     executors: Annotated[
-        str, options.names("Path tracers to measure: opencl, opengl, c, mitsuba, embree, numba.")
+        str, options.names("Path tracers to measure: opencl, opengl, c, mitsuba.")
     ] = "opencl,opengl",
     kinds: Annotated[
         str, options.names("Kinds of primitives: shared, turned, spheres, quads, mixture.")

@@ -8,8 +8,7 @@
    poses for each seed, though all seeds share them, makes it too small.
 3. The interval lies between the percentiles of these means: Efron and Tibshirani, *An Introduction to the
    Bootstrap*, 1993, chapter 13.
-4. Two methods are compared by their difference on the same poses [`paired`], by the ratio of their means
-   [`ratio`], or, where each has poses of its own, by the difference of their means [`apart`].
+4. Two methods are compared by their difference on the same poses [`paired`].
 
 A sample of n has a bootstrap variance (n - 1) / n times the unbiased one: with three seeds the part of the
 seeds is too narrow by a factor of 0.82, which a table with few seeds should say. Of three values in all the
@@ -65,7 +64,8 @@ def interval(values: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES
     table = _table(values)
     if not 0.0 < level < 1.0:
         raise InputError("level", level, "must lie between 0 and 1", "0.95 is usual")
-    return _between(resampled_means(table, resamples), float(table.mean()), table.shape, level)
+    low, high = np.quantile(resampled_means(table, resamples), [0.5 - level / 2.0, 0.5 + level / 2.0])
+    return Interval(float(table.mean()), float(low), float(high), *table.shape)
 
 
 def resampled_means(table: NDArray[np.float64], resamples: int = RESAMPLES) -> NDArray[np.float64]:
@@ -74,15 +74,10 @@ def resampled_means(table: NDArray[np.float64], resamples: int = RESAMPLES) -> N
     Tables of one shape have the same rows and columns drawn.
     """
     generator = np.random.default_rng(SEED)
-    rows, columns = (_weights(generator, n, resamples) for n in table.shape)
+    # How large a part of each resample each row and column is.
+    rows, columns = (generator.multinomial(n, np.full(n, 1.0 / n), resamples) / n for n in table.shape)
     means: NDArray[np.float64] = np.einsum("ri,ij,rj->r", rows, table, columns, optimize=True)
     return means
-
-
-def _weights(generator: np.random.Generator, count: int, resamples: int) -> NDArray[np.float64]:
-    """Return how large a part of each resample each of so many values is, (resamples, count)."""
-    drawn: NDArray[np.float64] = generator.multinomial(count, np.full(count, 1.0 / count), resamples) / count
-    return drawn
 
 
 def paired(first: ArrayLike, second: ArrayLike, level: float = LEVEL) -> Interval:
@@ -92,52 +87,9 @@ def paired(first: ArrayLike, second: ArrayLike, level: float = LEVEL) -> Interva
     """
     one, other = _table(first), _table(second)
     if one.shape[1] != other.shape[1] or (one.shape[0] != other.shape[0] and 1 not in (len(one), len(other))):
-        raise _unlike(one, other, "must have the same seeds and poses")
+        rule = "must have the same seeds and poses"
+        raise InputError("values to compare", f"{one.shape} and {other.shape}", rule, "measure both again")
     return interval(one - other, level)
-
-
-def ratio(first: ArrayLike, second: ArrayLike, level: float = LEVEL) -> Interval:
-    """Return the interval of mean(first) / mean(second), positive and both (seeds, poses) of the same poses.
-
-    A resample draws the same seeds and poses for both.
-    """
-    one, other = _table(first), _table(second)
-    if one.shape != other.shape:
-        raise _unlike(one, other, "must have the same seeds and poses")
-    if not (np.all(one > 0.0) and np.all(other > 0.0)):
-        low = float(min(one.min(), other.min()))
-        raise InputError("values of a ratio", low, "must be positive", "compare by a difference")
-    ratios = resampled_means(one) / resampled_means(other)
-    return _between(ratios, float(one.mean() / other.mean()), one.shape, level)
-
-
-def apart(first: ArrayLike, second: ArrayLike, level: float = LEVEL) -> Interval:
-    """Return the interval of mean(first) - mean(second), of the same seeds, each with poses of its own.
-
-    A resample draws the same seeds for both, and poses of each. `poses` is the smaller number.
-    """
-    one, other = _table(first), _table(second)
-    if len(one) != len(other):
-        raise _unlike(one, other, "must have the same seeds")
-    generator = np.random.default_rng(SEED)
-    rows = _weights(generator, len(one), RESAMPLES)
-    means = [
-        np.einsum("ri,ij,rj->r", rows, t, _weights(generator, t.shape[1], RESAMPLES), optimize=True)
-        for t in (one, other)
-    ]
-    shape = len(one), min(one.shape[1], other.shape[1])
-    return _between(means[0] - means[1], float(one.mean() - other.mean()), shape, level)
-
-
-def _between(found: NDArray[np.float64], mean: float, shape: tuple[int, ...], level: float) -> Interval:
-    """Return the interval between the percentiles of resampled numbers."""
-    low, high = np.quantile(found, [0.5 - level / 2.0, 0.5 + level / 2.0])
-    return Interval(mean, float(low), float(high), *shape)
-
-
-def _unlike(one: NDArray[np.float64], other: NDArray[np.float64], rule: str) -> InputError:
-    """Return the refusal of values whose shapes do not fit."""
-    return InputError("values to compare", f"{one.shape} and {other.shape}", rule, "measure both again")
 
 
 def _table(values: ArrayLike) -> NDArray[np.float64]:

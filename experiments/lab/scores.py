@@ -12,7 +12,7 @@
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of
 255^2 / MSE; so does [`paper_figure`]. Its MSE of 82.93 for pictures of 1 spp is 28.9 dB. Such pictures have
-that if they are some stops darker, but then their SSIM is far above the 0.21 beside it (`claims.py`). Squares
+that if they are some stops darker, but then their SSIM is far above the 0.21 beside it (`paper.py`). Squares
 of 8-bit numbers that wrap around give numbers of that size [`wrapped_mse`]; that the paper's did is a
 conjecture.
 """
@@ -33,9 +33,6 @@ from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import LEVELS, from_display, to_8bit, to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Floats
-
-LOWER_IS_BETTER = ("mse", "mse255", "wrapped", "flip", "blurred", "relmse", "smape")
-"""The scores that fall as a picture gets better."""
 
 
 def score(picture: Floats, reference: Floats, linear: Floats | None = None) -> dict[str, float]:

@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 import importlib
-import math
 import statistics
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -18,7 +17,7 @@ from typing import Any
 
 from wamnet.refimpl.errors import InputError
 
-from . import printed, same, support, tables
+from . import paper, printed, same, support, tables
 from .intervals import interval, paired
 from .records import Records
 from .results import PER_FRAME, Results, number, summary
@@ -167,90 +166,7 @@ def quality_times(records: Records) -> str:
     return tables.markdown(["a frame, interleaved", "ms, median", "ms, range"], cells)
 
 
-# ---- the paper's table and claims -----------------------------------------------------------------------
-
-
-def table1(records: Records) -> str:
-    """Return the table as the experiment prints it."""
-    made: str = importlib.import_module("table1").written(records["table1"], records["table1-times"])
-    return made
-
-
-def claims(what: str) -> TableOf:
-    """Return the verdicts about the paper's claims, or what their noisy frames have at several exposures."""
-
-    def made(records: Records) -> str:
-        text: str = getattr(importlib.import_module("claims"), what)(records["claims"])
-        return text
-
-    return made
-
-
-PRINTED: Mapping[str, tuple[str, str]] = {
-    "input": ("82.93", "0.21"),
-    "dncnn": ("79.03", "0.44"),
-    "wamnet": ("48.04", "0.68"),
-    "pix2pix": ("39.28", "0.70"),
-}
-"""MSE and SSIM of the paper's Table 1."""
-
-PAPER_ROWS = (
-    *("input", "dncnn", "dncnn-shrunk", "wamnet-color", "wamnet-color-own", "wamnet", "wamnet-own"),
-    *("wamnet-short", "wamnet-best", "pix2pix", "svgf", "nlm", "oidn", "render30"),
-)
-"""Rows of Table 1 that docs/results/paper.md shows."""
-
-
-def table1_readme(records: Records) -> str:
-    """Return the rows of Table 1 of docs/results/paper.md, beside what the paper prints."""
-    found, rows = records["table1"], importlib.import_module("baselines.rows").ROWS
-    cells = []
-    for row in (row for row in PAPER_ROWS if row in found.configurations()):
-        mse, ssim = (f"; {text}" if text else "" for text in PRINTED.get(row, ("", "")))
-        cells.append(
-            [
-                rows[row].text,
-                found.text(row, "psnr", 2),
-                f"{_mean(found, row, 'paper'):.2f}",
-                f"{_mean(found, row, 'wrapped'):.1f}{mse}",
-                f"{_mean(found, row, 'ssim'):.3f}{ssim}",
-                f"{_mean(found, row, 'flip'):.3f}",
-                f"{_mean(found, row, 'worth'):.0f}",
-            ]
-        )
-    heads = [
-        "",
-        "PSNR, dB",
-        'the paper\'s "PSNR"',
-        "MSE modulo 256; the paper",
-        "SSIM; the paper",
-        "FLIP",
-        "equivalent spp",
-    ]
-    return tables.markdown(heads, cells)
-
-
-def _mean(found: Results, configuration: str, value: str) -> float:
-    """Return the mean of a number over the seeds; NaN without one."""
-    summary = found.summary(configuration, value)
-    return summary.mean if summary else math.nan
-
-
-def departures(records: Records) -> str:
-    """Return the PSNR of each choice that the paper leaves open."""
-    found = records["departures"]
-    return tables.table(found, [Column("psnr", "PSNR, dB")], found.data()["rows"], "choice")
-
-
-def departure(name: str, sign: float = 1.0) -> Callable[[Records], str]:
-    """Return how many decibels a choice has more than that of the spec, or, with sign -1, less."""
-
-    def made(records: Records) -> str:
-        found = records["departures"]
-        first = found.configurations()[0]
-        return f"{sign * (_mean(found, name, 'psnr') - _mean(found, first, 'psnr')):.2f}"
-
-    return made
+# ---- studies ------------------------------------------------------------------------------------------
 
 
 MARKS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 90.0)
@@ -448,9 +364,9 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "ahead-of-oidn": ahead("minicubes", ours="page-16"),
     "ahead-of-oidn-lamps": ahead("minicubes-page", ours="shipped"),
     "ahead-of-oidn-outside": ahead("minicubes", "outside", ours="page-16"),
-    "departures-clip": departure("unclipped", -1.0),
-    "departures-loss": departure("summed"),
-    "departures-replacement": departure("without replacement"),
+    "departures-clip": paper.departure("unclipped", -1.0),
+    "departures-loss": paper.departure("summed"),
+    "departures-replacement": paper.departure("without replacement"),
     "hard-ms": frame_ms("lit-16", "hard-light-times"),
     "hard-oidn-ms": frame_ms("oidn-past-prefiltered16", "hard-light-times"),
     "hard-oidn-clean-ms": frame_ms("oidn-past-clean16", "hard-light-times"),
@@ -479,14 +395,35 @@ def planted_faults(records: Records) -> str:
     return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
 
 
+SEEDED = {
+    "on a device": ("device",), "by the source checker": ("reader",),
+    "only when compiled": ("compile", "import"),
+    "missed": ("missed",), "no difference": ("equal", "text"), "open": ("open",),
+}  # fmt: skip
+"""Columns of the bugs that were seeded in the emitters, and what a record calls what they count."""
+
+
+def seeded(records: Records) -> str:
+    """Return how many bugs of each group of emitters and origin are detected, and by what."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for values in (record["values"] for record in records["house3"].records()):
+        if values["part"] == "kills":
+            for row in ((values["group"], values["origin"]), ("~", "")):
+                counts.setdefault(row, Counter()).update([values["tier"] or values["state"]])
+    cells = [
+        [group.replace("~", "all"), origin, str(found.total())]
+        + [str(sum(found[kind] for kind in kinds)) for kinds in SEEDED.values()]
+        for (group, origin), found in sorted(counts.items())
+    ]
+    return tables.markdown(["emitters of", "origin", "bugs", *SEEDED], cells)
+
+
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
     "course", "gpu-pipeline", "moving-quality", "savings", "shadows", "sines-speed", "specialisation",
     "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
-SHOWN_BY_MODULE = ("gpu", "house3")
-"""Records whose module has a function `rows` that makes the table."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
     "blender": blender,
@@ -496,16 +433,18 @@ TABLES: Mapping[str, TableOf] = {
     **{name: bench(name) for name in ("bench-integers", "bench-paper")},
     "bench-train-paper": as_printed("bench-train", 1),
     "bench-train-short": as_printed("bench-train", 2),
-    **{f"claims{end}": claims(kind) for end, kind in {"": "verdicts", "-exposures": "exposures"}.items()},
+    "claims": paper.claims,
+    "claims-exposures": paper.exposures,
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
-    **{n: lambda records, n=n: importlib.import_module(n).rows(records[n]) for n in SHOWN_BY_MODULE},
+    "gpu": lambda records: importlib.import_module("gpu").rows(records["gpu"]),
+    "house3": seeded,
     "sequence": as_printed("sequence", 2),
     "sequence-frame": as_printed("sequence", 1),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
-    "departures": departures,
+    "departures": paper.departures,
     "domain": domain,
     "fig-prediction": study("fig_prediction"),
     **{name: study(name) for name in ("flicker", "lights")},
@@ -540,8 +479,8 @@ TABLES: Mapping[str, TableOf] = {
     "speed-against-error": speed_against_error("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),
     "support": support.matrix,
-    "table1": table1,
-    "table1-readme": table1_readme,
+    "table1": paper.table1,
+    "table1-readme": paper.table1_readme,
     "train-speed": train_speed,
     "variants": as_printed("variants", without=TIMES),
 }

@@ -7,7 +7,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from lab.intervals import RESAMPLES, apart, interval, paired, ratio, resampled_means
+from lab.intervals import RESAMPLES, interval, paired, resampled_means
 from scipy import stats
 
 from wamnet.refimpl.errors import InputError
@@ -124,49 +124,3 @@ def test_the_ends_of_three_values_are_the_least_and_the_largest():
     # All three draws hit the same value in one of 27 cases, which is more than 2.5 %.
     found = interval([[1.0], [2.0], [4.0]])
     assert (found.low, found.high) == (1.0, 4.0)
-
-
-def test_a_ratio_has_what_both_share_cancelled():
-    second = np.random.default_rng(3).uniform(1.0, 100.0, (3, 5))
-    found = ratio(0.25 * second, second)
-    # A quarter is exact, and so is each of the sums.
-    assert (found.mean, found.low, found.high, found.seeds, found.poses) == (0.25, 0.25, 0.25, 3, 5)
-
-
-def test_a_ratio_is_one_of_means_not_a_mean_of_ratios():
-    found = ratio([[1.0, 9.0]], [[1.0, 1.0]])
-    assert (found.mean, found.low, found.high) == (5.0, 1.0, 9.0)
-    assert ratio([[1.0, 9.0]], [[1.0, 3.0]]).mean == 2.5  # the mean of ratios is 2
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "what"),
-    [
-        ([[1.0]], [[0.0]], "positive"),
-        ([[-1.0]], [[1.0]], "positive"),
-        ([[1.0, 2.0]], [[1.0]], "seeds and poses"),
-    ],
-)
-def test_ratios_that_mean_nothing_are_refused(first, second, what):
-    with pytest.raises(InputError, match=what):
-        ratio(first, second)
-
-
-def test_poses_of_their_own_are_drawn_independently():
-    first, second = [0.0] * 5 + [1.0] * 3, [0.0] * 4 + [10.0] * 2
-    found = apart(first, second)
-    exact: Counter[float] = Counter()
-    for a, p in binomial_means(5, 3).items():
-        for b, q in binomial_means(4, 2).items():
-            exact[round(a - 10.0 * b, 9)] += p * q
-    assert_is_quantile(found.low, 0.025, exact)
-    assert_is_quantile(found.high, 0.975, exact)
-    assert (found.seeds, found.poses) == (1, 6)
-
-
-def test_seeds_are_shared_by_poses_of_their_own():
-    seeds = np.array([[0.0], [1.0], [5.0]])
-    found = apart(seeds + np.zeros(4), seeds + np.ones(6))
-    assert max(abs(found.low + 1.0), abs(found.high + 1.0)) <= 8 * EPS
-    with pytest.raises(InputError, match="same seeds"):
-        apart([[1.0], [2.0]], [[1.0]])

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ...refimpl.errors import NO_VALUE, InputError
+from ..common.request import given
 from ..common.terminal import progress, say
 
 if TYPE_CHECKING:
@@ -78,22 +79,18 @@ class Request:
         """Return whether anything is to be chosen."""
         return not (self.max_error is self.max_ms is self.max_loss_db is None)
 
-    def options(self) -> dict[str, object]:
-        """Return the options by name."""
-        return {f"--{name.replace('_', '-')}": value for name, value in vars(self).items()}
-
 
 def check_request(request: Request, variant: str | None) -> None:
     """Refuse options that contradict each other, or have nothing to act on."""
     from ...kernels.run import curve
 
-    given = [name for name, value in request.options().items() if value is not None]
-    if variant is not None and given:
-        rule = f"{given[0]} chooses a variant itself"
+    named = list(given(request))
+    if variant is not None and named:
+        rule = f"{named[0]} chooses a variant itself"
         raise InputError("--variant", variant, rule, "leave out one of them")
-    if given and not request.limited:
+    if named and not request.limited:
         rule = "a choice needs --max-error, --max-ms or --max-loss-db"
-        raise InputError("list of options", ", ".join(given), rule, f"leave out {given[0]}, or give a limit")
+        raise InputError("list of options", ", ".join(named), rule, f"leave out {named[0]}, or give a limit")
     if request.curve is not None and (request.frames is not None or request.size is not None):
         rule = "its points are measured already"
         raise InputError("--curve", str(request.curve), rule, "leave out --frames and --size")

@@ -20,7 +20,7 @@ from ..common import options
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
 from ..common.options import Sampler, Target
-from ..common.request import KernelRequest
+from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_parent, unwritable
 from .choose import Request, check_request, choose
@@ -67,11 +67,6 @@ class OfScene:
         ),
     ] = None
 
-    def options(self) -> dict[str, object]:
-        """Return the options by name."""
-        given = {"--time": self.time, "--set": self.parameters, "--lanes": self.lanes}
-        return {**given, "--max-depth": self.max_depth, "--sampler": self.sampler}
-
     def compiled(self, name: str, target: str, profile: str) -> PathArtifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
         from ...compiler.scenes.lower_scene import lower_scene
@@ -114,13 +109,13 @@ def compile_model(
     folder, name = output or Path(target), EXECUTOR_OF[target]
     kernel: Files
     if is_scene(model):
-        of_models = {"--schedule": network.schedule, "--variant": network.variant, "--here": here or None}
+        of_models = given(network, "schedule", "variant") | {"--here": here or None} | given(limits)
         rule = f"{model} is a scene, whose kernels have one schedule, no variants"
-        _only_for("a model", of_models | limits.options(), rule)
+        refuse(of_models, rule, "leave it out, or name a model")
         check_folder(folder, name, of_scene=True)
         kernel = of_scene.compiled(model, name, network.profile)
     else:
-        _check_name(model, of_scene.options())
+        _check_name(model, given(of_scene))
         check_folder(folder, name)
         kernel = _compiled_model(Path(model), name, network, limits, here)
     _write(kernel, folder)
@@ -143,13 +138,11 @@ def _write(kernel: Files, folder: Path) -> None:
 
 def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
     """Return the schedule of a variant for this machine's device, and say why."""
-    from ...compiler.variants import FULL, plan_model
     from ...kernels import open_executor
     from ...kernels.run import tune
 
-    if network.schedule is not None:
-        raise InputError("--schedule", network.schedule, "--here chooses another", "leave one of them out")
-    plan = plan_model(model, executor, network.profile, variant=network.variant or FULL)
+    refuse(given(network, "schedule"), "--here chooses another", "leave one of them out")
+    plan = network.plan(model, executor)
     with open_executor(executor) as runner:
         schedule, reason = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
         say(f"schedule {schedule} for {runner.device}: {reason}")
@@ -159,30 +152,19 @@ def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
 def _compiled_model(path: Path, target: str, network: KernelRequest, limits: Request, here: bool) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ...compiler.compile import compile_plan
-    from ...compiler.schedules.schedules import PLAIN
-    from ...compiler.variants import FULL, plan_model
 
-    profile, schedule, variant = network.profile, network.schedule, network.variant
-    check_request(limits, variant)
+    check_request(limits, network.variant)
     model = load_model(path, imported=True)
     if limits.limited:
         if model.is_imported:
             rule = "limits are measured on frames, which an imported network does not read"
             raise InputError("limits", NO_VALUE, rule, "leave them out")
-        if here:
-            rule = "limits choose the schedule too"
-            raise InputError("--here", NO_VALUE, rule, "leave it out")
-        variant, schedule = choose(model, limits, target, profile, schedule)
+        refuse({"--here": NO_VALUE if here else None}, "limits choose the schedule too")
+        variant, schedule = choose(model, limits, target, network.profile, network.schedule)
+        network = replace(network, variant=variant, schedule=schedule)
     elif here:
-        schedule = _chosen_here(model, target, network)
-    return compile_plan(plan_model(model, target, profile, schedule or PLAIN, variant or FULL))
-
-
-def _only_for(what: str, given: Mapping[str, Any], rule: str) -> None:
-    """Refuse options that are given though what is compiled is something else."""
-    for option, value in given.items():
-        if value is not None:
-            raise InputError(option, value, rule, f"leave it out, or name {what}")
+        network = replace(network, schedule=_chosen_here(model, target, network))
+    return compile_plan(network.plan(model, target))
 
 
 def is_scene(name: str) -> bool:
@@ -194,7 +176,8 @@ def is_scene(name: str) -> bool:
 
 def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
     """Refuse options of scenes, and what looks like a scene's name but is not one: a model's file exists."""
-    _only_for("a scene", of_scenes, f"{name} is not a scene: neither a canonical one nor a .json file")
+    rule = f"{name} is not a scene: neither a canonical one nor a .json file"
+    refuse(of_scenes, rule, "leave it out, or name a scene")
     comes_along = name.startswith(MODEL_PREFIX)
     if not comes_along and not Path(name).suffix and not Path(name).exists():
         from ... import models

@@ -12,9 +12,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,12 +25,13 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
+from ..common.request import option_of
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
 if TYPE_CHECKING:
     from ...models.data.frame_plan import FramePlan, Request, Task
-    from ...models.data.scene_source import Parameters
+    from ...models.data.scene_source import SceneSource
 
 EXAMPLES = """Examples:
 wamnet dataset minicubes -o cubes
@@ -56,132 +58,154 @@ SceneOrNone = Annotated[
         metavar="SCENE", help=f"Canonical scene ({options.SCENES}) or scene file (.json); --check needs none."
     ),
 ]
-
-
-Outside = Annotated[
-    int,
-    typer.Option(
-        help="Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
-        "--yaw, or beyond --saturation."
-    ),
-]
-TestSpp = Annotated[
-    int, typer.Option(help="Paths per pixel of each test target.", show_default="same as --spp")
-]
-Arc = Annotated[float, typer.Option(help="Seconds at the end of the animation to hold out from training.")]
-Yaw = Annotated[str, typer.Option(metavar=LIMITS, help="Range of camera orbit angles, in degrees.")]
-Pitch = Annotated[str, typer.Option(metavar=LIMITS, help="Range of camera elevation angles, in degrees.")]
-Distance = Annotated[
-    str, typer.Option(metavar=LIMITS, help="Range of factors applied to the camera distance.")
-]
-Saturation = Annotated[
-    str | None,
-    typer.Option(
-        metavar=LIMITS,
-        help="Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
-        show_default="the scene's colours",
-    ),
-]
-Power = Annotated[
-    str | None,
-    typer.Option(
-        metavar=LIMITS,
-        help="Range of factors applied to each light's power.",
-        show_default="the scene's powers",
-    ),
-]
-Before = Annotated[
-    int,
-    typer.Option(
-        metavar="N",
-        help="Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
-    ),
-]
 Workers = Annotated[int | None, typer.Option(help="Number of worker processes.", show_default="one per core")]
 Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler; its workers are used."),
 ]
-
-Output = Annotated[Path, options.output("FOLDER", "Data set folder.")]
-OnlyCheck = Annotated[
-    bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
-]
 FromBlender = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Render frames of this Blender file instead of a scene.")
 ]
-NoisySpp = Annotated[int, typer.Option(help="Paths per pixel of a noisy Blender frame.")]
-Percent = Annotated[int, typer.Option(help="Percentage of the Blender file's render resolution.")]
-ViewLayer = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME", help="View layer of the Blender file to render.", show_default="the only one"
-    ),
-]
-BlenderProgram = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PROGRAM",
-        help="Path of the Blender program.",
-        show_default="the bpy package, or blender on the PATH",
-    ),
-]
-TestFrames = Annotated[
-    int, typer.Option(help="Number of test frames, sampled separately within the same ranges.")
-]
-Duration = Annotated[
-    float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
-]
 
-OF_BLENDER = ("noisy_spp", "percent", "view_layer", "blender")
-"""Options that mean nothing without --from-blender."""
+
+@dataclass(frozen=True)
+class Frames:
+    """The fields of a request that mean the same for a scene and for a Blender file."""
+
+    frames: Annotated[int, typer.Option(help="Number of training frames.")] = 8
+    test_frames: Annotated[
+        int, typer.Option("--test", help="Number of test frames, sampled separately within the same ranges.")
+    ] = 2
+    outside_frames: Annotated[
+        int,
+        typer.Option(
+            "--outside",
+            help="Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
+            "--yaw, or beyond --saturation.",
+        ),
+    ] = 0
+    spp: Annotated[int, typer.Option(help="Paths per pixel of each target; noisy frames have 1.")] = 64
+    test_spp: Annotated[
+        int, typer.Option(help="Paths per pixel of each test target.", show_default="same as --spp")
+    ] = 0
+    arc_s: Annotated[
+        float,
+        typer.Option("--arc", help="Seconds at the end of the animation to hold out from training."),
+    ] = 0.0
+    seed: options.Seed = 0
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What frames of a scene draw their cameras and lights from, as texts."""
+
+    yaw_deg: Annotated[
+        str, typer.Option("--yaw", metavar=LIMITS, help="Range of camera orbit angles, in degrees.")
+    ] = "0:0"
+    pitch_deg: Annotated[
+        str, typer.Option("--pitch", metavar=LIMITS, help="Range of camera elevation angles, in degrees.")
+    ] = "0:0"
+    distance: Annotated[
+        str,
+        typer.Option("--distance", metavar=LIMITS, help="Range of factors applied to the camera distance."),
+    ] = "1:1"
+    saturation: Annotated[
+        str | None,
+        typer.Option(
+            "--saturation",
+            metavar=LIMITS,
+            help="Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
+            show_default="the scene's colours",
+        ),
+    ] = None
+    power: Annotated[
+        str | None,
+        typer.Option(
+            "--power",
+            metavar=LIMITS,
+            help="Range of factors applied to each light's power.",
+            show_default="the scene's powers",
+        ),
+    ] = None
+
+    def limits(self) -> dict[str, tuple[float, float] | None]:
+        """Return the ranges by field; None for the scene's own colours and powers."""
+        return {
+            name: None if text is None else options.parse_limits(option_of(Ranges, name), text)
+            for name, text in vars(self).items()
+        }
+
+
+@dataclass(frozen=True)
+class OfScene:
+    """Further fields of a request that only a scene has."""
+
+    size_px: Annotated[int, typer.Option("--size", help="Width and height in pixels.")] = 64
+    feature_spp: options.FeatureSpp = 0
+    seen: options.Seen = False
+    shadow_rays: options.ShadowRays = 0
+    start_s: Annotated[float, typer.Option("--start", help="Start time of the animation, in seconds.")] = 0.0
+    seconds: Annotated[
+        float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
+    ] = 8.0
+    before: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            help="Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
+        ),
+    ] = 0
+    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5
+    executor: options.Renderer = "auto"
+    sampler: options.SamplerName = "pcg4d"
+
+
+@dataclass(frozen=True)
+class OfBlender:
+    """What means nothing without --from-blender."""
+
+    noisy_spp: Annotated[int, typer.Option(help="Paths per pixel of a noisy Blender frame.")] = 1
+    percent: Annotated[int, typer.Option(help="Percentage of the Blender file's render resolution.")] = 100
+    view_layer: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="View layer of the Blender file to render.", show_default="the only one"
+        ),
+    ] = ""
+    blender: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PROGRAM",
+            help="Path of the Blender program.",
+            show_default="the bpy package, or blender on the PATH",
+        ),
+    ] = None
+
 
 OF_SCHEDULER = "the scheduler's workers may have no other"
 """Why only NumPy is chosen for them."""
 
-OF_TIMES = ("start", "seconds", "arc")
+OF_TIMES = ("start_s", "seconds", "arc_s")
 """Options that mean nothing for a static scene."""
-
-OF_BOTH = ("frames", "test", "outside", "spp", "test_spp", "arc", "seed")
-"""Options that mean the same with it and without."""
 
 
 def dataset(
     command: typer.Context,
     scene: SceneOrNone = None,
-    output: Output = Path("dataset"),
-    frames: Annotated[int, typer.Option(help="Number of training frames.")] = 8,
-    test: TestFrames = 2,
-    outside: Outside = 0,
-    size: Annotated[int, typer.Option(help="Width and height in pixels.")] = 64,
-    spp: Annotated[int, typer.Option(help="Paths per pixel of each target; noisy frames have 1.")] = 64,
-    test_spp: TestSpp = 0,
-    feature_spp: options.FeatureSpp = 0,
-    seen: options.Seen = False,
-    shadow_rays: options.ShadowRays = 0,
-    start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
-    seconds: Duration = 8.0,
-    arc: Arc = 0.0,
-    yaw: Yaw = "0:0",
-    pitch: Pitch = "0:0",
-    distance: Distance = "1:1",
-    saturation: Saturation = None,
-    power: Power = None,
-    before: Before = 0,
-    seed: options.Seed = 0,
+    output: Annotated[Path, options.output("FOLDER", "Data set folder.")] = Path("dataset"),
+    *,
+    frames: Frames,
+    of_scene: OfScene,
+    ranges: Ranges,
     parameters: options.Parameters = None,
-    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
-    executor: options.Renderer = "auto",
     context: options.OpenGLContext = None,
-    sampler: options.SamplerName = "pcg4d",
     workers: Workers = None,
     scheduler: Scheduler = None,
     from_blender: FromBlender = None,
-    noisy_spp: NoisySpp = 1,
-    percent: Percent = 100,
-    view_layer: ViewLayer = "",
-    blender: BlenderProgram = None,
-    only_check: OnlyCheck = False,
+    of_blender: OfBlender,
+    only_check: Annotated[
+        bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
+    ] = False,
 ) -> None:
     """Render a data set: noisy frames and their targets over an animation.
 
@@ -190,68 +214,39 @@ def dataset(
     After an interruption, the same command resumes, and replaces damaged files. The files do not depend
     on the number of workers.
     """
+    from ...models.data.scene_source import scene_source
+    from .blender.dataset import make as make_from_blender
+
+    blender = [field.name for field in dataclasses.fields(OfBlender)]
     if only_check:
         check(output, scene)
-        return
-    numbers = {"frames": frames, "test_frames": test, "outside_frames": outside, "arc_s": arc, "seed": seed}
-    numbers |= {"spp": spp, "test_spp": test_spp}
-    if from_blender is not None:
-        numbers |= {"noisy_spp": noisy_spp, "percent": percent}
-        _make_from_blender(command, output, from_blender, view_layer, blender, numbers)
-        return
-    named = scene or _missing_scene(), options.parse_parameters(parameters or [])
-    numbers |= {"start_s": start, "seconds": seconds, "size_px": size, "max_depth": max_depth}
-    numbers |= {"feature_spp": feature_spp, "seen": seen, "shadow_rays": shadow_rays, "before": before}
-    limits: dict[str, str | None] = {"yaw_deg": yaw, "pitch_deg": pitch, "distance": distance}
-    limits |= {"saturation": saturation, "power": power}
-    fields: dict[str, Any] = {**numbers, "executor": executor, "sampler": sampler}
-    _make_from_scene(command, output, named, limits, fields, workers, scheduler)
+    elif from_blender is not None:
+        known = {*(field.name for field in dataclasses.fields(Frames)), *blender, "from_blender", "output"}
+        others = [each.name for each in command.command.params if each.name and each.name not in known]
+        options.refuse_given(command, others, "with --from-blender")
+        with hint_on_interrupt(lambda: f"{output}: the same command resumes"):
+            make_from_blender(output, from_blender, **vars(of_blender), **vars(frames))
+    else:
+        source = scene_source(scene or _missing_scene(), options.parse_parameters(parameters or []))
+        options.refuse_given(command, blender, "without --from-blender")
+        if source.still is not None:
+            options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
+        fields: dict[str, Any] = {**vars(frames), **vars(of_scene), **ranges.limits()}
+        _make_from_scene(output, source, fields, workers, scheduler)
 
 
 def _make_from_scene(
-    command: typer.Context,
-    folder: Path,
-    named: tuple[str, Parameters],
-    limits: Mapping[str, str | None],
-    fields: dict[str, Any],
-    workers: int | None,
-    scheduler: str | None,
+    folder: Path, source: SceneSource, fields: dict[str, Any], workers: int | None, scheduler: str | None
 ) -> None:
-    """Make the data set of a scene and parameters, of the texts of ranges, and other fields of a request."""
+    """Make the data set of a scene and the other fields of a request."""
     from ...models.data.frame_plan import Request, plan
-    from ...models.data.scene_source import scene_source
 
-    options.refuse_given(command, OF_BLENDER, "without --from-blender")
-    source = scene_source(*named)
-    if source.still is not None:
-        options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
-    for name, text in limits.items():
-        option = f"--{name.removesuffix('_deg')}"
-        fields[name] = None if text is None else options.parse_limits(option, text)
     request = Request(source.name, source.parameters, still=source.still, **fields)
     _check_workers(workers, scheduler)
     executor = chosen(request.executor, because=OF_SCHEDULER if scheduler else "")
     request = replace(request, executor=executor)
     with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
         make(folder, request, plan(request), workers, scheduler)
-
-
-def _make_from_blender(
-    command: typer.Context,
-    folder: Path,
-    file: Path,
-    view_layer: str,
-    blender: str | None,
-    numbers: Mapping[str, Any],
-) -> None:
-    """Make a data set of a Blender file; refuse options that are only those of scenes."""
-    from .blender.dataset import make as make_it
-
-    known = {*OF_BOTH, *OF_BLENDER, "from_blender", "output"}
-    others = [each.name for each in command.command.params if each.name and each.name not in known]
-    options.refuse_given(command, others, "with --from-blender")
-    with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
-        make_it(folder, file, view_layer, blender, **numbers)
 
 
 def _missing_scene() -> str:
@@ -290,9 +285,7 @@ def make(
             say(f"{folder / name}: damaged, rendered again")
         if made:
             _render(store, request, frames[0], workers, scheduler)
-    for line in summed_up(nearest):
-        say(line)
-    for line in store.summary(made):
+    for line in [*summed_up(nearest), *store.summary(made)]:
         say(line)
 
 

@@ -171,7 +171,7 @@ def denoise(
     for result in outputs:
         check_output(result, suffixes, [model, *paths])
     network, notes = load_model(model), Notes()
-    cut, name = chosen_variant(kernel.variant, rank), chosen(executor)
+    cut, name = kernel.network(rank), chosen(executor)
     profile, schedule = kernel.profile, kernel.schedule
     with open_executor(name) as runner:
         denoiser = Denoiser(runner, network, profile, schedule, cut, len(paths), keeps=True)
@@ -273,17 +273,6 @@ def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes
         if layer in layers:
             rule = "NaN is read as 0, an infinity as the end of the range"
             notes.add(f"{path}: {count} pixels of {layer} are not finite: {rule}")
-
-
-def chosen_variant(variant: str | None, rank: int) -> str:
-    """Return the variant of a network that two options name; the compiler is imported only for one."""
-    from ...compiler.kernel.interface import FULL
-
-    if not rank:
-        return variant or FULL
-    from ...compiler.variants import with_rank
-
-    return with_rank(variant or FULL, rank)
 
 
 def executors() -> None:

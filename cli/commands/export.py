@@ -11,7 +11,7 @@ import typer
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene
-from ..common.request import KernelRequest
+from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
@@ -130,18 +130,10 @@ class Shown:
     def check(self) -> None:
         """Refuse options that mean nothing without others."""
         if self.scene is None:
-            turned = None if self.sampler == "pcg4d" else self.sampler
-            depth = None if self.max_depth == DEPTH else self.max_depth
-            given: dict[str, Any] = {"--time": self.time, "--set": self.parameters, "--sampler": turned}
-            given |= {"--max-depth": depth, "--moving": self.moving}
-            _refuse(given, "there is no scene", "name one with --scene, or leave it out")
+            of_scenes = given(self, "time", "parameters", "sampler", "max_depth", "moving")
+            refuse(of_scenes, "there is no scene", "name one with --scene, or leave it out")
         if self.moving is None:
-            _refuse(self._table, "nothing moves", "add --moving time, or leave it out")
-
-    @property
-    def _table(self) -> dict[str, Any]:
-        """Return the length and the density of the table of times, by option."""
-        return {"--seconds": self.seconds, "--fps": self.fps}
+            refuse(given(self, "seconds", "fps"), "nothing moves", "add --moving time, or leave it out")
 
     def at(self, time: float | None) -> Scene:
         """Return the scene at a time."""
@@ -160,7 +152,8 @@ class Shown:
             return None
         kinds, start = tuple(self.moving.split(",")), self.time or 0.0
         if TIME not in kinds:
-            _refuse(self._table, "time does not move", "add it to --moving, or leave it out")
+            rule, remedy = "time does not move", "add it to --moving, or leave it out"
+            refuse(given(self, "seconds", "fps"), rule, remedy)
             return Motion((start,), (self.at(self.time),), kinds)
         fps = FPS if self.fps is None else self.fps
         spaced = animation_times(start, SECONDS if self.seconds is None else self.seconds, fps)
@@ -200,14 +193,10 @@ def export(
     target = _target(target, host)
     folder = output or Path(host or target)
     if target == HTML:
-        of_kernels: dict[str, Any] = {
-            "--weights": kernel.weights,
-            "--variant": kernel.variant,
-            "--check": check or None,
-        }
-        of_kernels |= {"--time": shown.time, "--schedule": kernel.schedule, "--moving": shown.moving}
-        of_kernels |= {"--seconds": shown.seconds, "--fps": shown.fps, "--measure": measure or None}
-        _refuse(of_kernels, "a web page has its own", "leave it out")
+        of_kernels = given(kernel, "weights", "variant", "schedule")
+        of_kernels |= given(shown, "time", "moving", "seconds", "fps")
+        of_kernels |= {"--check": check or None, "--measure": measure or None}
+        refuse(of_kernels, "a web page has its own")
         page = webpage.page_of(model, shown.scene, shown.parameters or [], None)
         _write(folder, {PAGE_NAME: page.encode()})
         return
@@ -232,16 +221,8 @@ def _target(target: str | None, host: str | None) -> str:
     return target
 
 
-def _refuse(given: dict[str, Any], rule: str, way_out: str) -> None:
-    """Refuse options that are given though they mean nothing."""
-    for option, value in given.items():
-        if value is not None:
-            raise InputError(option, value, rule, way_out)
-
-
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
     """Return the export that the options ask for; `measured`: it says how long it takes."""
-    from ...compiler.variants import FULL
     from ...kernels.export.package import Request, with_speed
     from ...kernels.export.package import export as exported
     from ...kernels.export.speed import check_measured, measure
@@ -252,7 +233,7 @@ def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, m
     settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
     motion = shown.motion()
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
-    how = (kernel.profile, kernel.weights or "", kernel.variant or FULL, settings, kernel.schedule or "")
+    how = (kernel.profile, kernel.weights or "", kernel.network(), settings, kernel.schedule or "")
     made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
     return with_speed(made, measure(made).facts()) if measured else made
 

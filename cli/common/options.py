@@ -360,9 +360,9 @@ def parse_names(text: str) -> tuple[str, ...]:
 
 def refuse_given(context: typer.Context, names: Sequence[str], where: str) -> None:
     """Refuse arguments and options that were given on the command line and have no meaning."""
+    typed = {each.name: each.opts[-1] for each in context.command.params}
     for name in names:
         source = context.get_parameter_source(name)
         if source is not None and source.name not in ("DEFAULT", "ENVIRONMENT"):
-            option = f"--{name.replace('_', '-')}"
-            shown = {"parameters": "--set", "image": "IMAGE", "scene": "SCENE"}.get(name, option)
+            shown = typed[name] if typed[name].startswith("-") else name.upper()
             raise InputError("argument", shown, f"has no meaning {where}", "leave it out")

@@ -1,16 +1,22 @@
 """Data classes as parameters of a command: the command line fills one in, with an option for each field.
 
-A command passes such a request on as it is. One that several commands share is defined once.
+A command passes such a request on as it is. One that several commands share is defined once. Options that
+mean nothing beside others are found by their defaults [`given`] and refused [`refuse`].
 """
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Callable
-from typing import Any, get_type_hints
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, get_type_hints
 
+from ...refimpl.errors import InputError
 from . import options
+
+if TYPE_CHECKING:
+    from ...compiler.variants import VariedPlan
+    from ...refimpl.network.denoise import Model
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,6 +26,46 @@ class KernelRequest:
     profile: options.Profile = "ieee"
     schedule: options.Schedule = None
     variant: options.Variant = None
+
+    def network(self, rank: int = 0) -> str:
+        """Return the variant's name, which may be given as a rank instead."""
+        from ...compiler.kernel.interface import FULL
+
+        if not rank:
+            return self.variant or FULL
+        from ...compiler.variants import with_rank
+
+        return with_rank(self.variant or FULL, rank)
+
+    def plan(self, model: Model, target: str) -> VariedPlan:
+        """Return the plan of a model's kernel for a target."""
+        from ...compiler.schedules.schedules import PLAIN
+        from ...compiler.variants import plan_model
+
+        return plan_model(model, target, self.profile, self.schedule or PLAIN, self.network())
+
+
+def given(request: Any, *names: str) -> dict[str, object]:
+    """Return the values of fields, of all without names, that are not their defaults, by option."""
+    found = {}
+    for field in dataclasses.fields(request):
+        value = getattr(request, field.name)
+        if value != field.default and field.name in (names or (field.name,)):
+            found[option_of(type(request), field.name)] = value
+    return found
+
+
+def option_of(kind: type, field: str) -> str:
+    """Return the option of a field as it is typed; in an annotation its name is where a default would be."""
+    named = get_type_hints(kind, include_extras=True)[field].__metadata__[0].default
+    return named if isinstance(named, str) else f"--{field.replace('_', '-')}"
+
+
+def refuse(values: Mapping[str, object], rule: str, remedy: str = "leave it out") -> None:
+    """Refuse options that are given though they mean nothing."""
+    for option, value in values.items():
+        if value is not None:
+            raise InputError(option, value, rule, remedy)
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:

@@ -24,14 +24,14 @@ PASSES = ("color", "albedo", "normal", "depth", "position")
 """Layers of a noisy picture: what Cycles has passes of."""
 
 
-def make(folder: Path, file: Path, view_layer: str, program: str | None, **numbers: Any) -> None:
+def make(folder: Path, file: Path, view_layer: str, blender: str | None, **numbers: Any) -> None:
     """Make what is missing in the folder; `numbers` are those of a request of this file."""
     from ....models.blender.plan import Request, plan
     from ....models.blender.session import Blender
 
     check_input(file)
-    with Blender(file, view_layer, program) as blender:
-        request = Request(file.name, dataset_files.sum_of(file).sha256, blender.animation, **numbers)
+    with Blender(file, view_layer, blender) as opened:
+        request = Request(file.name, dataset_files.sum_of(file).sha256, opened.animation, **numbers)
         frames, known = plan(request), 0
         if (folder / dataset_files.MANIFEST).exists():
             known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
@@ -41,7 +41,7 @@ def make(folder: Path, file: Path, view_layer: str, program: str | None, **numbe
         ):
             made = len(store.missing)
             if made:
-                _render(store, blender)
+                _render(store, opened)
     animation = request.animation
     say(
         f"{file}: frames {animation.first} to {animation.last} of {animation.scene}, view layer "

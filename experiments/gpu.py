@@ -8,6 +8,7 @@
    turns for some rounds [`timed`]. PyTorch does the same with the same network [`by_torch`]. Processes
    compile beside each other, and one at a time has the device [`alone`].
 4. Without a GPU the same runs on software: PoCL, Mesa, and CUDA C as C++ (a rehearsal: no times of a GPU).
+   On a processor `--only` names C's kernels too, and these as WebAssembly in Node [`by_node`].
 
     python experiments/gpu.py --prepare --prepared DIR   # for a machine without glslang, in less time there
     python experiments/gpu.py --prepared DIR
@@ -26,6 +27,7 @@ import selectors
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -35,8 +37,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from lab import node
 from lab.command import begin
 from lab.nvcc import NvccRunner
+from lab.patches import ODD, Wanted, cropped, patches
 from lab.results import Results
 from lab.tables import markdown
 from numpy.typing import NDArray
@@ -61,12 +65,6 @@ from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import round_image
 
 Picture = NDArray[np.float32]
-
-ODD = (75, 101)
-"""Height and width of the image that is compared as a whole."""
-
-PATCH = (8, 64)
-"""Height and width of the parts of the timed image that are compared."""
 
 BATCH_S = 0.1
 """Seconds of launches between two looks at the clock."""
@@ -146,6 +144,7 @@ WAYS: Mapping[str, Way] = {
         ("tile:4", "fft:4", "groupdot:4"),
         (*FLOATS, "minicubes, integers", "minicubes, rank 16"),
     ),
+    "c": Way((lambda _: open_executor("c"),), ()),
     "opengl": Way((lambda _: open_executor("opengl", context="egl"),), GROUPS),
     "glsl-compute": Way((lambda _: Compute("egl"),), GROUPS),
     "wgsl": Way((lambda _: Wgpu(),), GROUPS),
@@ -153,8 +152,11 @@ WAYS: Mapping[str, Way] = {
 }
 """By target."""
 
-TORCH = "torch"
-"""The peer's name among the languages."""
+GPU_WAYS = tuple(language for language in WAYS if language != "c")
+"""What runs on graphics processors."""
+
+TORCH, NODE = "torch", "webassembly"
+"""Names of the peer, and of C's kernels in Node, among the languages."""
 
 # ---- one language and network, in a process of its own ----------------------------------------------------
 
@@ -222,51 +224,6 @@ def launches_of(seconds: Callable[[int], float]) -> int:
     while (taken := seconds(count)) < BATCH_S / 4 and count < MOST:
         count = min(MOST, 4 * count)
     return max(1, min(MOST, round(count * BATCH_S / taken)))
-
-
-Patch = tuple[slice, slice]
-"""Rows and columns of an image."""
-
-
-def patches(size: tuple[int, int]) -> list[Patch]:
-    """Return what is compared: all of the small image, both corners and the middle of the other."""
-    if size == ODD:
-        return [(slice(0, size[0]), slice(0, size[1]))]
-    least = [min(most, length) for most, length in zip(PATCH, size, strict=True)]
-    places = [
-        [(length - most) * part // 2 for length, most in zip(size, least, strict=True)] for part in range(3)
-    ]
-    return [(slice(row, row + least[0]), slice(column, column + least[1])) for row, column in places]
-
-
-def cropped(images: Mapping[str, Picture], reach: int, patch: Patch) -> tuple[dict[str, Picture], Patch]:
-    """Return what the windows of a patch touch, and where the patch is in it."""
-    size = next(iter(images.values())).shape
-    outer = [
-        slice(max(0, s.start - reach), min(n, s.stop + reach)) for s, n in zip(patch, size, strict=False)
-    ]
-    inner = [slice(s.start - o.start, s.stop - o.start) for s, o in zip(patch, outer, strict=True)]
-    return {name: image[outer[0], outer[1]] for name, image in images.items()}, (inner[0], inner[1])
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What a kernel must write: patches of the reference's image, and how far each number may be off."""
-
-    patches: Sequence[Patch]
-    value: Sequence[NDArray[np.float64]]
-    bound: Sequence[NDArray[np.float64]]
-
-    def share(self, picture: Picture) -> tuple[float, float]:
-        """Return the largest error and the largest share of its bound; NaN is infinitely wrong."""
-        error = most = 0.0
-        for patch, value, bound in zip(self.patches, self.value, self.bound, strict=True):
-            off = np.abs(picture[patch].astype(np.float64) - value)
-            off = np.where(np.isnan(off), np.inf, off)
-            with np.errstate(divide="ignore"):
-                shares = np.divide(off, bound, out=np.zeros_like(off), where=off != 0)
-            error, most = max(error, float(off.max())), max(most, float(shares.max()))
-        return error, most
 
 
 def wanted(plan: Plan, name: str, images: Mapping[str, Picture], folder: Path | None) -> Wanted:
@@ -436,6 +393,31 @@ def by_torch(name: str, given: argparse.Namespace) -> None:
             timed(ways, given.rounds)
 
 
+def by_node(name: str, schedules: Sequence[str], given: argparse.Namespace) -> None:
+    """Time kernels of C as WebAssembly, on one thread of Node."""
+    odd, large = images_for(name, ODD), images_for(name, (given.size, given.size))
+    for schedule in schedules:
+        plan, configuration = planned(name, "c", schedule), f"{NODE}, {schedule}, {name}"
+        artifact = compile_plan(plan)
+        with tempfile.TemporaryDirectory() as folder, alone(given):
+            small, _ = node.run(artifact, odd, Path(folder), 0)
+            picture, told = node.run(artifact, large, Path(folder), given.rounds)
+        ms = [1000 * seconds for seconds in told["taken"]]
+        tell(
+            configuration,
+            {
+                "device": f"Node {told['version']}, one thread",
+                "schedule": schedule,
+                "compile_s": told["first"] - statistics.median(told["taken"]),
+                **checked(plan, name, (small, picture), (odd, large), given.prepared),
+                "ms": statistics.median(ms),
+                "least": min(ms),
+                "most": max(ms),
+                "rounds": given.rounds,
+            },
+        )
+
+
 # ---- all of them ------------------------------------------------------------------------------------------
 
 
@@ -446,6 +428,10 @@ def tasks(given: argparse.Namespace) -> Iterator[tuple[str, str, tuple[str, ...]
         for name in way.models:
             if name in given.models:
                 yield language, name, given.schedules or way.schedules
+    if NODE in given.only:
+        for name in FLOATS:
+            if name in given.models:
+                yield NODE, name, given.schedules or ("tile:4",)
     if TORCH in given.only:
         for name in FLOATS:
             if name in given.models:
@@ -511,7 +497,7 @@ def rows(results: Results) -> str:
             language = record["configuration"].partition(", ")[0]
             found.setdefault((language, values["schedule"]), {})[name] = values
     cells = []
-    for head in sorted(found, key=lambda key: [*WAYS, TORCH].index(key[0])):
+    for head in sorted(found, key=lambda key: [*WAYS, NODE, TORCH].index(key[0])):
         of = found[head]
         share = max(values["share"] for values in of.values())
         times = [f"{of[name]['ms']:.2f}" if name in of else "" for name in MODELS]
@@ -543,7 +529,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--seconds", type=float, default=200, help="time limit of a language and network")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at a time")
-    parser.add_argument("--only", type=listed, default=(*WAYS, TORCH), help="languages")
+    parser.add_argument("--only", type=listed, default=(*GPU_WAYS, TORCH), help="languages")
     parser.add_argument("--models", type=lambda t: tuple(t.split(";")), default=tuple(MODELS), help="by ;")
     parser.add_argument("--schedules", type=listed, default=(), help="others, as tile:8")
     parser.add_argument("--prepared", type=Path, help="folder of SPIR-V and references")
@@ -555,14 +541,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         language, name, schedules = given.task
         if language == TORCH:
             by_torch(name, given)
+        elif language == NODE:
+            by_node(name, schedules.split(","), given)
         else:
             answer(language, name, schedules.split(","), given)
         return
     if given.prepare:
         prepare(given)
         return
-    if unknown := [name for name in (*given.only, *given.models) if name not in (*WAYS, TORCH, *MODELS)]:
-        rule = f"must be among {', '.join((*WAYS, TORCH, *MODELS))}"
+    known = (*WAYS, NODE, TORCH, *MODELS)
+    if unknown := [name for name in (*given.only, *given.models) if name not in known]:
+        rule = f"must be among {', '.join(known)}"
         raise InputError("language or network", unknown[0], rule, "correct it")
     results = Results.open(given.output / "gpu.json", "gpu", {"size": given.size, "rounds": given.rounds})
     start = time.monotonic()

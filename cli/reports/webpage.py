@@ -30,6 +30,7 @@ FOLDER = "templates"
 SCRIPTS = (
     "page.scene.js",
     "page.device.js",
+    "page.processor.js",
     "page.renderer.js",
     "page.reference.js",
     "page.main.js",
@@ -53,8 +54,10 @@ LEAD = (
 def build_page(animation: Animation, model: Model, fast: Model | None = None) -> str:
     """Return the page of an animation and a model; `fast` is a model for the variants of low rank."""
     from ...kernels.run.page import networks_of, page_data
+    from ...kernels.run.webassembly import compiler
 
-    return render_page(page_data(animation, networks_of(model, fast)))
+    networks = networks_of(model, fast, processor=bool(compiler()) and not model.is_whole)
+    return render_page(page_data(animation, networks))
 
 
 def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Path | None) -> str:

@@ -204,6 +204,19 @@ BODIES = {
 """What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
 
 
+def glue_of(kernel: Kernel, header: str) -> str:
+    """Return the text with the function that is called, around a kernel's source in a file."""
+    schedule = kernel.manifest["schedule"] if is_denoiser(kernel) else {}
+    taken = kernel.interface
+    body = BODIES[taken.role].format(
+        entry=kernel.entry_point,
+        arrays=", ".join(f"arrays[{place}]" for place in range(len(taken.arrays))),
+        columns=schedule.get("pixels", 1),
+        rows=schedule.get("rows", 1),
+    )
+    return GLUE.format(header=header, body=body)
+
+
 @dataclass(frozen=True)
 class _Prepared:
     """The function of a loaded kernel, what the kernel takes, its weights, and the rows of a call."""
@@ -273,16 +286,13 @@ class CExecutor(Executor):
         return {"options": self._options, "lanes": int(lanes), "bytes": byte_products == "1"}
 
     def _prepare(self, kernel: Kernel) -> _Prepared:
-        columns, rows, weights = 1, 1, None
+        rows, weights = 1, None
         if is_denoiser(kernel):
             self._check_stack(kernel.manifest["private_bytes"])
-            columns, rows = kernel.manifest["schedule"]["pixels"], kernel.manifest["schedule"].get("rows", 1)
+            rows = kernel.manifest["schedule"].get("rows", 1)
             weights = np.ascontiguousarray(kernel.weights)
         taken = kernel.interface
-        arrays = ", ".join(f"arrays[{place}]" for place in range(len(taken.arrays)))
-        names = {"entry": kernel.entry_point, "arrays": arrays, "columns": columns, "rows": rows}
-        body = BODIES[taken.role].format(**names)
-        function = self._library(kernel, GLUE.format(header=_header(kernel), body=body))
+        function = self._library(kernel, glue_of(kernel, _header(kernel)))
         function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
         return _Prepared(function, taken, weights, rows)
 

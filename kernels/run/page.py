@@ -5,7 +5,8 @@
    Features that do not fit into its colour buffers have a kernel of their own, which ends at the first hit
    [`drawn_together`].
 2. The encoding of the features is split where they are more than colour buffers [`encoders`].
-3. Each variant of the network is one or two passes, with its bound [`variant`].
+3. Each variant of the network is one or two passes, with its bound [`variant`]. One of them is no shader
+   but a module of WebAssembly, several times as fast as shaders that run on a processor.
 4. A page cannot trust its compiler (GLSL ES 3.00 has no `precise`): it carries a small picture's features,
    and for each variant the reference's output in float64 with a bound for each number [`check`]; of a network
    of integers, whose bits every device has, the SHA-256 of the output too.
@@ -53,9 +54,10 @@ from ...refimpl.network import factored
 from ...refimpl.network.dataset import FEATURES, feature_image
 from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
+from . import webassembly
 from .denoise_on import bound_of, products_of
 
-SCHEMA = "wamnet-page-4"
+SCHEMA = "wamnet-page-5"
 """Name and version of the form of a page's data."""
 
 TARGET = "glsl-es"
@@ -73,6 +75,9 @@ WHOLE = "whole8"
 
 MANY, FEW = "packed", "inlined"
 """Schedules: four weights a texel, however many there are; constants of the source where they are few."""
+
+PROCESSOR = "c", f"tile:{webassembly.LANES}"
+"""Target and schedule of the variant for processors."""
 
 CHECK_PX = 32
 """Side of the picture that a page checks itself with: the window fits in, all four borders are seen."""
@@ -107,15 +112,19 @@ class Network:
     model: Model
     rank: int = 0
     schedule: str = MANY
+    target: str = TARGET
 
     def is_like(self, other: Network) -> bool:
         """Return whether both are one function, in two schedules."""
         return self.model is other.model and self.rank == other.rank
 
 
-def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tuple[Network, ...]:
+def networks_of(
+    model: Model, fast: Model | None = None, rank: int = RANK, processor: bool = False
+) -> tuple[Network, ...]:
     """Return a page's variants: the full network, one of low rank with its weights in either way, integers.
 
+    `processor`: the full network as a module of WebAssembly too, which takes Zig to build.
     `fast`: what is cut to the rank, if it is another model, such as one that was trained on in this form.
     A network of integers is the only one: a rank rounds (WHO-11). A network that cannot be rounded has no
     variant in integers.
@@ -133,6 +142,7 @@ def networks_of(model: Model, fast: Model | None = None, rank: int = RANK) -> tu
         Network("fast", cut, most, FEW),
         Network("fast-texture", cut, most),
         *_integers_of(model),
+        *[Network("processor", model, 0, PROCESSOR[1], PROCESSOR[0])][: int(processor)],
     )
 
 
@@ -325,7 +335,7 @@ def variant(
     """
     model, rank = network.model, network.rank
     program = lower(model)
-    plan = plan_program(program, TARGET, profile, network.schedule, rank)
+    plan = plan_program(program, network.target, profile, network.schedule, rank)
     artifact = compile_plan(plan)
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
     held = held or plan.expected(mine)
@@ -359,11 +369,15 @@ def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
 
 
 def _pass(kernel: Artifact) -> dict[str, Any]:
-    """Return one fragment pass."""
+    """Return one fragment pass, or what does its work on the processor."""
+    kind, text = "source", kernel.source
+    if kernel.target != TARGET:
+        kind, text = "module", base64.b64encode(webassembly.module_of(kernel)).decode()
     return {
-        "source": kernel.source,
+        kind: text,
         "weights": _weights(kernel.weights),
         "reads": [image.name for image in kernel_gather(kernel.program).images],
+        "channels": [image.channels for image in kernel_gather(kernel.program).images],
         "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
         "buffers": -(-output_channels(kernel.program) // 4),
     }

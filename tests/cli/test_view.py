@@ -16,6 +16,7 @@ import pytest
 
 from wamnet.cli.commands import view
 from wamnet.cli.reports import webpage
+from wamnet.kernels.run.webassembly import compiler
 from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 
@@ -40,7 +41,13 @@ def test_a_page_is_written(wamnet, here):
     text = (here / "page.html").read_text(encoding="utf-8")
     data = data_of(text)
     assert (data["scene"], data["times"]) == ("lone_light", [0.5 / webpage.FPS])
-    assert [one["name"] for one in data["variants"]] == ["full", "fast", "fast-texture", "whole"]
+    assert [one["name"] for one in data["variants"]] == [
+        "full",
+        "fast",
+        "fast-texture",
+        "whole",
+        *["processor"] * bool(compiler()),
+    ]
     assert not re.search(r"(src|href)=\"(?!data:)", text), "nothing is fetched"
     assert wamnet("view", "model.safetensors", "--scene", "lone_light", "-o", "again.html").status == 0
     assert (here / "again.html").read_text(encoding="utf-8") == text, "a page is a function of its inputs"

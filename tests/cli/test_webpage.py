@@ -82,6 +82,13 @@ def still(chromium, path):
         yield tab
 
 
+def test_where_shaders_run_on_the_processor_a_page_begins_with_the_module(chromium, path):
+    with chromium.tab(path, **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        assert tab.state("variant") == "processor"
+        assert tab.page.locator("#variant option:checked").text_content() == "full, on the processor"
+
+
 # ---- pixels ----------------------------------------------------------------------------------------------
 
 
@@ -168,13 +175,13 @@ def test_the_features_keep_the_bound_of_the_encoding(still, model):
         assert np.all(np.abs(read(still, name)[..., :3] - expected) <= errors[name]), name
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", [0, 1, 2, 4])
 def test_the_pictures_keep_their_bound(still, model, data, number):
     """Every number of the picture, at the features that the page has read, for each variant."""
-    network = P.networks_of(model, rank=4)[number]
+    network = P.networks_of(model, rank=4, processor=True)[number]
     draw(still, frame=FRAME, seed=SEED, variant=network.name)
     images = {name: read(still, name)[..., :3].copy() for name in FEATURES}
-    plan = P.plan_program(P.lower(model), P.TARGET, "ieee", network.schedule, network.rank)
+    plan = P.plan_program(P.lower(model), network.target, "ieee", network.schedule, network.rank)
     held = plan.expected(images)
     value, bound = held.value, held.bound
     found = read(still, "picture")[..., :3].astype(np.float64)
@@ -300,7 +307,7 @@ def test_features_of_fewer_rays_than_learned_are_said(chromium, data, tmp_path, 
 
 
 def test_rays_are_those_of_the_model(model, data):
-    assert [one["rays"] for one in data["variants"]] == [1, 1, 1, 1]
+    assert [one["rays"] for one in data["variants"]] == [1, 1, 1, 1, 1]
     many = replace(model, info={**model.info, "trained_on_feature_spp": "16, 4"})
     animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
     assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 4

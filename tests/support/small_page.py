@@ -50,7 +50,7 @@ def make(kit: Any, folder: Path) -> SmallPage:
     network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
     model = Model(network, FEATURES, window, SCALES, {"trained_on_ranges": RANGES.to_json()})
     animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
-    data = P.page_data(animation, P.networks_of(model, rank=4), SETTINGS)
+    data = P.page_data(animation, P.networks_of(model, rank=4, processor=True), SETTINGS)
     path = folder / "page.html"
     path.write_text(webpage.render_page(data), encoding="utf-8")
     return SmallPage(model, data, path)

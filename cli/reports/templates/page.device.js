@@ -166,6 +166,24 @@ class Device {
     return values;
   }
 
+  /** Read the floats (rows from the top, RGBA) of a texture that is nobody's target just now. */
+  readTexture(texture, size) {
+    const gl = this.gl;
+    const frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    const values = this.read({ frame, size }, 0);
+    gl.deleteFramebuffer(frame);
+    return values;
+  }
+
+  /** Store floats (rows from the top, RGBA) in a texture. */
+  write(texture, size, values) {
+    const gl = this.gl;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, size, size, gl.RGBA, gl.FLOAT, values);
+  }
+
   fence() {
     const gl = this.gl;
     const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

@@ -81,7 +81,9 @@ class Page {
     canvas.addEventListener("webglcontextrestored", () => this.restored());
     find("device").textContent = this.device.name;
     if (SOFTWARE.test(this.device.name) && this.data.variants.length > 1) {
-      this.state.variant = this.data.variants[1].name; // the whole network takes a processor seconds
+      // As a shader the whole network takes a processor seconds.
+      const { variants } = this.data;
+      this.state.variant = (variants.find(({ passes }) => passes[0].module) || variants[1]).name;
     }
     find("variant").value = this.state.variant;
     requestAnimationFrame((now) => this.loop(now));
@@ -111,7 +113,7 @@ class Page {
       }
       this.preparing = null;
       this.tellVariant();
-      this.announcing = true; // it is ready when it has drawn: on a slow device that takes seconds
+      this.announced = 0; // it is ready when it has drawn: on a slow device that takes seconds
       this.dirty = true;
       this.say("Drawing the first picture.");
     } catch (error) {
@@ -300,12 +302,16 @@ class Page {
     }
   }
 
-  /** Say once that a network is ready, and how slow it is where that is seen. */
+  /** Say once that a network is ready, and with its second picture how slow it is where that is seen: the first
+   * one has waited for the driver's compiler too. */
   announce(ms) {
-    if (this.announcing && !this.preparing) {
-      this.announcing = false;
-      const slow = ms > VERY_SLOW_MS ? ` A picture takes ${(ms / 1000).toFixed(0)} s here.` : "";
-      this.say(`Ready. The animation is ${this.state.playing ? "playing" : "paused"}.${slow}`);
+    if (this.preparing || this.announced > 1) {
+      return;
+    }
+    if (++this.announced === 1) {
+      this.say(`Ready. The animation is ${this.state.playing ? "playing" : "paused"}.`);
+    } else if (ms > VERY_SLOW_MS) {
+      this.say(`A picture takes ${(ms / 1000).toFixed(0)} s here.`);
     }
   }
 
@@ -813,7 +819,8 @@ function variantText(variant) {
   if (variant.levels > 1) {
     return "integers of 8 bits";
   }
-  return variant.rank ? `fast, rank ${variant.rank}${place}` : "full";
+  const full = variant.passes[0].module ? "full, on the processor" : "full";
+  return variant.rank ? `fast, rank ${variant.rank}${place}` : full;
 }
 
 /** For tests and for the curious: draw a given moment and read its floats. */

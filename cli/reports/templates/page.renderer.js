@@ -14,7 +14,7 @@ class Strips {
     this.sync = null;
   }
 
-  /** Do passes {shader, target, textures, set}; resolve with the milliseconds from the first strip on. */
+  /** Do passes {shader, target, textures, set}, or {processor, target, textures}; resolve with the milliseconds from the first strip on. */
   run(passes) {
     return new Promise((done, failed) => this.jobs.push({ passes, at: 0, row: 0, done, failed, start: 0 }));
   }
@@ -61,7 +61,7 @@ class Strips {
     while (job.at < job.passes.length && this.guess < BATCH_MS) {
       const pass = job.passes[job.at];
       const size = pass.target.size;
-      const key = pass.key || pass.shader;
+      const key = pass.key || pass.shader || pass.processor;
       const known = this.pixelMs.has(key);
       if (!known && this.batch.size) {
         break; // drivers compile when they draw first: this row is measured alone
@@ -70,7 +70,11 @@ class Strips {
       // Devices shade squares of 2 x 2 pixels: a single row would cost as much as two.
       const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / (2 * cost))) : 1;
       const rows = Math.min(2 * fit, size - job.row);
-      this.device.draw(pass.shader, pass.target, pass.textures, pass.set, [job.row, rows]);
+      if (pass.processor) {
+        pass.processor.draw(pass.textures, pass.target, [job.row, rows]);
+      } else {
+        this.device.draw(pass.shader, pass.target, pass.textures, pass.set, [job.row, rows]);
+      }
       this.batch.add(key);
       job.row += rows;
       if (job.row === size) {
@@ -139,11 +143,11 @@ class Renderer {
   variant(name) {
     if (!this.variants.has(name)) {
       const facts = this.data.variants.find((variant) => variant.name === name);
-      const passes = facts.passes.map((pass) => ({
-        ...pass,
-        shader: this.device.compile(pass.source),
-        weights: this.weights(pass),
-      }));
+      const passes = facts.passes.map((pass) =>
+        pass.module
+          ? { ...pass, processor: new Processor(this.device, pass) }
+          : { ...pass, shader: this.device.compile(pass.source), weights: this.weights(pass) },
+      );
       this.variants.set(name, { name, facts, passes, ready: false });
     }
     return this.variants.get(name);
@@ -174,8 +178,9 @@ class Renderer {
   async prepare(name, report) {
     const variant = this.variant(name);
     const common = [this.screen, ...this.paths, ...this.encoders];
-    const waiting = variant.passes.map((pass) => pass.shader);
+    const waiting = variant.passes.flatMap((pass) => pass.shader || []);
     await this.compiled(this.ready ? waiting : [...common, ...waiting], report);
+    await Promise.all(variant.passes.map((pass) => pass.processor?.starting));
     this.ready = variant.ready = true;
   }
 
@@ -215,6 +220,9 @@ class Renderer {
       const last = number === variant.passes.length - 1;
       const target = last ? result : this.scratch(result.size, pass.buffers);
       const reads = given;
+      if (pass.processor) {
+        return { processor: pass.processor, target, textures: pass.reads.map((name) => reads[name]) };
+      }
       const textures = { weight_texture: pass.weights };
       pass.reads.forEach((name) => (textures[`image_${name}`] = reads[name]));
       given = Object.fromEntries(target.textures.map((texture, i) => [`horizontal_${i}`, texture]));

@@ -1,0 +1,64 @@
+"""A C kernel as a WebAssembly module, which a page runs where shaders would run on the processor anyway.
+
+Zig's package is a C compiler with a linker for WebAssembly (pip install ziglang). A module imports nothing,
+and exports its memory, the first byte that is free there (`__heap_base`), and `wamnet_rows` of C executors:
+pointers to the arrays, the integers, and the rows to be computed.
+"""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from ...compiler.artifact import Artifact
+from ...refimpl.errors import CompileError
+from .. import cache
+from ..devices.c_executor import glue_of
+
+LANES = 4
+"""Floats in a vector of WebAssembly."""
+
+OPTIONS = (
+    "-target", "wasm32-wasi", "-mcpu=generic+simd128", "-mexec-model=reactor", "-std=gnu99", "-O3",
+    "-ffp-contract=off", "-nostartfiles", "-Wl,--strip-all", "-Wl,--export=wamnet_rows",
+    "-Wl,--export=__heap_base",
+)  # fmt: skip
+"""No start, no file, no debugging: a page needs one function."""
+
+MOST_TOLD = 300
+"""Most letters of a compiler's complaint in a message of one line."""
+
+
+def compiler() -> list[str]:
+    """Return the words that call Zig; none where it is not there."""
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang"]
+    program = shutil.which("zig")
+    return [program] if program else []
+
+
+def module_of(artifact: Artifact) -> bytes:
+    """Return a kernel in C as a module. Raises `CompileError` where Zig does not build it."""
+    command = compiler()
+    glue = glue_of(artifact, "denoise.h")
+
+    def built() -> str:
+        with tempfile.TemporaryDirectory(prefix="wamnet-") as name:
+            folder = Path(name)
+            (folder / "denoise.h").write_text(artifact.source, encoding="utf-8")
+            (folder / "page.c").write_text(glue, encoding="utf-8")
+            done = subprocess.run(
+                [*command, "cc", *OPTIONS, "-o", "page.wasm", "page.c"],
+                cwd=folder, capture_output=True, text=True, check=False, errors="replace",
+            )  # fmt: skip
+            if done.returncode:
+                told = done.stderr.strip()[:MOST_TOLD]
+                raise CompileError(f"zig cannot build the kernel for WebAssembly: {told}; update ziglang")
+            return base64.b64encode((folder / "page.wasm").read_bytes()).decode()
+
+    return base64.b64decode(cache.kept("webassembly", [*command, *OPTIONS, artifact.source, glue], built))

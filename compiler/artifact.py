@@ -1,9 +1,8 @@
 """What the compiler hands out: source, weights and a manifest that says how to call it and what it promises.
 
-Everything is a function of program, target and profile, to the byte: no time, no path, no machine.
-[`write`] writes all files of an artifact (a denoiser's, or a scene's: path_kernel.py) under names that nobody
-else has, then gives them their own names one by one, the manifest last; it carries the hashes of the others:
-a mixture with another artifact shows.
+Everything is a function of programs, target and profile, to the byte: no time, no path, no machine.
+[`write`] writes all files of an artifact under names that nobody else has, then gives them their own names
+one by one, the manifest last; it carries the hashes of the others: a mixture with another artifact shows.
 """
 
 from __future__ import annotations
@@ -11,51 +10,73 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..models.writing import making_parents, write_together
-from .core.ir import Image, Program
+from .core.ir import Image
 from .kernel import interface
 from .kernel.interface import Interface
-
-if TYPE_CHECKING:
-    from .plan import Plan
 
 SCHEMA = "wamnet-artifact-1"
 """Name and version of the manifest's form; described in spec/kernel_interface.md."""
 
+FIRST_PASS = "horizontal."
+"""What the names of the first pass's files begin with."""
+
+WEIGHTS_NAME = "weights.bin"
+"""File of the weights: little-endian float32, nothing else."""
+
+CERTIFICATE_NAME = "denoise.certificate.json"
+"""File of the proof of the bound, beside kernels that have one [certificate.py]."""
+
+MANIFEST_NAME = "manifest.json"
+"""File of the manifest."""
+
+NONE = np.zeros(0, np.float32)
+"""The weights of a kernel that has none."""
+
 
 @dataclass(frozen=True)
 class Artifact:
-    """A compiled kernel of a plan; `program` is what was emitted, after all passes.
+    """A compiled kernel of any role.
 
-    `before`: the kernel that writes the only image of this one, of a first layer in two passes [factor.py];
+    `programs` are what was emitted, after all passes, for what interprets them; `kernel` is the same as data
+    of the kernel IR.
+    `images` are the encoded images that it reads, or writes where it reads none. A network's has a `plan`;
+    `before` is the kernel that writes the only image of this one, of a first layer in two passes [factor.py];
     `certificate`: the proof of the bound, as JSON's types.
     """
 
-    plan: Plan
     source: str
-    source_name: str
-    program: Program
-    weights: NDArray[np.float32]
     manifest: Mapping[str, Any]
+    interface: Interface
+    images: tuple[Image, ...] = ()
+    programs: Any = None
+    kernel: Any = None
+    weights: NDArray[np.float32] = field(default_factory=lambda: NONE)
+    plan: Any = None
     before: Artifact | None = None
     certificate: Mapping[str, Any] | None = None
 
     @property
     def target(self) -> str:
         """Return the name of the target."""
-        return self.plan.target.name
+        return str(self.manifest["target"])
 
     @property
     def profile(self) -> str:
         """Return the name of the profile."""
-        return self.plan.profile.name
+        return str(self.manifest["profile"]["name"])
+
+    @property
+    def role(self) -> str:
+        """Return what the kernel does."""
+        return self.interface.role
 
     @property
     def entry_point(self) -> str:
@@ -68,25 +89,25 @@ class Artifact:
         return str(self.manifest["digest"])
 
     @property
-    def images(self) -> tuple[Image, ...]:
-        """Return the images that the window is filled from, in order."""
-        assert self.program.gather is not None, "kernels have windows"
-        return self.program.gather.images
+    def source_name(self) -> str:
+        """Return the name of the source's file."""
+        files: Mapping[str, str] = self.manifest["files"]
+        return next(name for name in files if name != WEIGHTS_NAME and not name.startswith(FIRST_PASS))
+
+    @property
+    def lanes(self) -> int:
+        """Return how many paths a work item follows at once, or how many pixels of a row it computes."""
+        return int(self.manifest.get("lanes", 1))
+
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """Return what the planes of sums are that it writes or reads, in order."""
+        return tuple(self.manifest.get("planes", ()))
 
     @property
     def channels(self) -> int:
-        """Return the number of channels of the result."""
+        """Return the number of channels of a network's result."""
         return int(self.manifest["output"]["channels"])
-
-    @property
-    def interface(self) -> Interface:
-        """Return what the kernel is bound to, in its language."""
-        dialect = self.plan.target.dialect
-        assert dialect is not None, "the interpreter binds nothing"
-        size, taken = self.weights.size, dialect.integers[interface.DENOISE]
-        found = interface.denoiser(self.images, size, self.channels, dialect.home, taken)
-        memory = self.manifest["schedule"].get("memory")
-        return found.handing_on(memory) if memory else found
 
     @property
     def kernels(self) -> tuple[Artifact, ...]:
@@ -101,57 +122,13 @@ class Artifact:
 
     def contents(self) -> Mapping[str, bytes]:
         """Return all files except the manifest, by name."""
-        own = {self.source_name: self.source.encode(), WEIGHTS_NAME: weight_bytes(self)}
+        own = {self.source_name: self.source.encode()}
+        if WEIGHTS_NAME in self.manifest["files"]:
+            own[WEIGHTS_NAME] = weight_bytes(self)
         first = self.before.contents() if self.before else {}
         if self.certificate:
             own[CERTIFICATE_NAME] = (json.dumps(self.certificate, allow_nan=False) + "\n").encode()
         return {**{f"{FIRST_PASS}{name}": data for name, data in first.items()}, **own}
-
-
-FIRST_PASS = "horizontal."
-"""What the names of the first pass's files begin with."""
-
-WEIGHTS_NAME = "weights.bin"
-"""File of the weights: little-endian float32, nothing else."""
-
-CERTIFICATE_NAME = "denoise.certificate.json"
-"""File of the proof of the bound, beside kernels that have one [certificate.py]."""
-
-MANIFEST_NAME = "manifest.json"
-"""File of the manifest."""
-
-
-class OneSource:
-    """What artifacts of a manifest and one more file have in common."""
-
-    source: str
-    source_name: str
-    manifest: Mapping[str, Any]
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names this artifact: of its source."""
-        return str(self.manifest["digest"])
-
-    @property
-    def kernels(self) -> tuple[Any, ...]:
-        """Return the kernels in the order in which they run: this one."""
-        return (self,)
-
-    def contents(self) -> Mapping[str, bytes]:
-        """Return all files except the manifest, by name."""
-        return {self.source_name: self.source.encode()}
-
-
-class Files(Protocol):
-    """An artifact of any kind: a manifest, and files beside it."""
-
-    @property
-    def manifest(self) -> Mapping[str, Any]:
-        """Return what the manifest says, as JSON's types."""
-
-    def contents(self) -> Mapping[str, bytes]:
-        """Return all files except the manifest, by name."""
 
 
 def weight_bytes(artifact: Artifact) -> bytes:
@@ -165,20 +142,24 @@ def schedule_text(picked: Mapping[str, Any]) -> str:
     return f"{found} (not {picked['asked']}: {picked['reason']})" if "reason" in picked else found
 
 
-def manifest_text(artifact: Files) -> str:
+def manifest_text(artifact: Artifact) -> str:
     """Return the manifest as it is written."""
     return json.dumps(artifact.manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
-def write(artifact: Files, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+def files_of(artifact: Artifact) -> dict[str, bytes]:
+    """Return all files of an artifact by name, the manifest last."""
+    return {**artifact.contents(), MANIFEST_NAME: manifest_text(artifact).encode()}
+
+
+def write(artifact: Artifact, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Write source, weights if there are any, and manifest into `folder`; no file is ever seen half written.
 
     Others may write there at once. What fails before the first file has its name leaves the folder as it was,
     or none if there was none.
     """
     target = Path(folder)
-    contents = {**artifact.contents(), MANIFEST_NAME: manifest_text(artifact).encode()}
-    files = {target / name: content for name, content in contents.items()}
+    files = {target / name: content for name, content in files_of(artifact).items()}
     with making_parents(target):
         write_together(files)
     return tuple(files)

@@ -1,8 +1,10 @@
 """Compile a plan: header, source, weights and manifest become one artifact [`compile_plan`].
 
 1. The plan has run the passes, picked the schedule and bounded the output [plan.py].
-2. The schedule emits the source below a comment that says what the kernel is and promises [`_header`].
-3. The manifest says the same as data, and a certificate has the steps of the bound's proof [`_assemble`].
+2. A draft has what is particular to a kernel: a comment that says what it is and promises, what prints the
+   source below it, and facts of the manifest, which says the same as data [`Draft`].
+3. One function makes artifacts of drafts, for kernels of all roles [`assemble`]. A certificate has the steps
+   of the proof of a network's bound.
 """
 
 from __future__ import annotations
@@ -10,12 +12,13 @@ from __future__ import annotations
 import json
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..refimpl.errors import InputError
 from ..refimpl.reading import SIZES, parse_json
@@ -23,16 +26,20 @@ from . import artifact
 from .artifact import Artifact, schedule_text
 from .core import ir
 from .core.enclosure import round_up as round_up
-from .core.ir import OUTPUT_ENCODING, Gather, Program
+from .core.ir import OUTPUT_ENCODING, Gather, Image, Program
 from .core.passes import pipeline
-from .core.profiles import SineContract
+from .core.profiles import Profile, SineContract
 from .core.sums import is_split
+from .kernel import interface
+from .kernel.interface import DENOISE, Interface
+from .kernel.kernel import Kernel
+from .languages.dialect import Dialect
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
 from .proof.whole import has_one_zero
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
-from .schedules.schedules import PLAIN, Schedule
+from .schedules.schedules import PLAIN
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
@@ -51,8 +58,73 @@ AGAINST_WHOLE = "reference in integers, the same bits"
 WHOLE_SINE = "a polynomial of degree 5 in products and shifts of words"
 """What a header says of the sine of integers."""
 
-SUMS = "sums      over the window: a partial sum for each image and row of taps, in any order; then these"
+SUMS = "over the window: a partial sum for each image and row of taps, in any order; then these"
 """What a header says where the bound rests on partial sums [sums.py]."""
+
+WIDE = 88
+"""Characters of a line of a header's entry."""
+
+Entry = tuple[str, Sequence[str]]
+"""An entry of a header: its title and its lines."""
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What is particular to a kernel: `emit` prints its source below a header of these entries.
+
+    `programs` are kept for an interpreter, `facts` are those of its manifest. `part`: what a language calls
+    it whose hosts join it with the denoiser's other kernel. All else is what its artifact has.
+    """
+
+    title: str
+    dialect: Dialect
+    profile: Profile
+    interface: Interface
+    emit: Callable[[Sequence[str]], str]
+    entries: Sequence[Entry]
+    arguments: str
+    facts: Mapping[str, Any]
+    programs: Any
+    target: str = ""
+    kernel: Kernel | None = None
+    images: Sequence[Image] = ()
+    weights: NDArray[np.float32] | None = None
+    part: str = ""
+
+
+def assemble(draft: Draft) -> Artifact:
+    """Return a kernel with its source and its manifest."""
+    dialect, role, profile = draft.dialect, draft.interface.role, draft.profile
+    source, entry = draft.emit(header(draft.title, dialect, draft.entries)), dialect.entries[role]
+    if draft.part:
+        source, entry = dialect.apart(source, draft.part), dialect.apart(entry, draft.part)
+    files = {f"{role}{dialect.suffix}": source.encode()}
+    if draft.weights is not None:
+        files[artifact.WEIGHTS_NAME] = draft.weights.astype("<f4").tobytes()
+    manifest = {
+        "digest": ir.sha256(*files.values()),
+        "target": draft.target or dialect.target,
+        "language": dialect.language,
+        "entry_point": entry,
+        "profile": {"name": profile.name, "text": profile.text},
+        "arguments": draft.arguments,
+        "bound": None,
+        "files": {name: ir.sha256(data) for name, data in files.items()},
+        SIZES: {name: len(data) for name, data in files.items()},
+        **draft.facts,
+    }
+    manifest = json.loads(json.dumps(manifest, allow_nan=False))
+    weights = artifact.NONE if draft.weights is None else draft.weights
+    images, programs = tuple(draft.images), draft.programs
+    return Artifact(source, manifest, draft.interface, images, programs, draft.kernel, weights)
+
+
+def header(title: str, dialect: Dialect, entries: Sequence[Entry]) -> list[str]:
+    """Return the lines of the comment at the top of a source: each entry's title is before its first line."""
+    lines = [f"wamnet {title}, {dialect.language}. Generated: change the compiler, not this text."]
+    for name, texts in entries:
+        lines += [f"{'' if number else name:10}{text}" for number, text in enumerate(texts)]
+    return lines
 
 
 def compile_program(
@@ -76,15 +148,15 @@ def _of_two_passes(plan: Plan, cut: Cut) -> Artifact:
     """Return the kernel along the columns, with the one along the rows before it."""
     horizontal, vertical = plan.passes
     bound, alone = plan.bound, horizontal.bound
-    widest = plan.target.widest
+    widest = plan.target.dialect.channels_per_result
     notes = (
-        f"pass      1 of 2: sums along the rows, of a first layer of rank {cut.rank}"
-        + ("" if widest is None else f"; {widest} in each colour buffer,\n          in order"),
-        f"pass      2 of 2: sums along the columns of the first pass's image, and the layers after it; the\n"
-        f"          bound is that of both passes, against program {ir.digest(plan.analysed)[:32]}",
+        f"1 of 2: sums along the rows, of a first layer of rank {cut.rank}"
+        + ("" if widest is None else f"; {widest} in each colour buffer,\nin order"),
+        f"2 of 2: sums along the columns of the first pass's image, and the layers after it; the\n"
+        f"bound is that of both passes, against program {ir.digest(plan.analysed)[:32]}",
     )
-    before = _of_one_pass(horizontal, alone, notes[0].split("\n"), HORIZONTAL)
-    found = _of_one_pass(vertical, bound, notes[1].split("\n"))
+    before = _of_one_pass(horizontal, alone, [("pass", notes[0].split("\n"))], HORIZONTAL)
+    found = _of_one_pass(vertical, bound, [("pass", notes[1].split("\n"))])
     return replace(_joined(before, found, _report(plan, cut)), plan=plan)
 
 
@@ -122,72 +194,72 @@ def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Art
     return replace(found, manifest=manifest, before=before)
 
 
-def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[str] = (), part: str = "") -> Artifact:
-    """Return the kernel of a plan without a cut; `notes` are further lines of its header.
-
-    `part`: what a language calls it whose hosts join it with the denoiser's other kernel.
-    """
-    header = [*_header(plan, bound), *notes, *_weight_lines(plan.emitted, plan.schedule)]
+def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: str = "") -> Artifact:
+    """Return the kernel of a plan without a cut; `notes` are further entries of its header."""
+    emitted, schedule = plan.emitted, plan.schedule
+    images, dialect, weights = kernel_gather(emitted).images, schedule.dialect, schedule.pack(emitted)
+    taken = dialect.integers[DENOISE]
+    bound_to = interface.denoiser(images, weights.size, output_channels(emitted), dialect.home, taken)
+    memory = plan.picked.details.get("memory")
     # Where nothing rounds, a language need not keep the order of operations.
     is_ordered = bound.output is not None and not bound.exact
-    source, entry, dialect = (
-        plan.schedule.emit(plan.emitted, header, is_ordered),
-        plan.target.entry,
-        plan.target.dialect,
+    draft = Draft(
+        "denoiser",
+        dialect,
+        plan.profile,
+        bound_to.handing_on(memory) if memory else bound_to,
+        lambda lines: schedule.emit(emitted, lines, is_ordered),
+        [*_entries(plan, bound), *notes, _entry_of_weights(plan)],
+        schedule.arguments(emitted),
+        _facts(plan, bound, weights),
+        emitted,
+        plan.target.name,
+        images=images,
+        weights=weights,
+        part=part,
     )
-    if part and dialect is not None:
-        source, entry = dialect.apart(source, part), dialect.apart(entry, part)
-    return _assemble(plan, bound, source, entry)
+    found, proven = assemble(draft), None
+    if bound.exact:
+        proven = certificate.integers(plan.analysed, schedule, emitted, found.manifest)
+    elif bound.proof:
+        of = plan.analysed, bound.proof, plan.sine, schedule, emitted, found.manifest
+        proven = certificate.certificate(*of)
+    return replace(found, plan=plan, certificate=proven)
 
 
-def _header(plan: Plan, bound: Bound) -> list[str]:
-    """Return the lines of the comment at the top of the source."""
-    program, target, picked = plan.analysed, plan.target, plan.picked
+def _entries(plan: Plan, bound: Bound) -> list[Entry]:
+    """Return the entries of the header, but for the weights."""
+    program, picked = plan.analysed, plan.picked
     gather, channels = kernel_gather(program), output_channels(program)
     images = [
         f"{i.name}: {i.channels} channels in {i.range_text}" + (f", {i.encoding}" if i.encoding else "")
         for i in gather.images
     ]
     encoding = dict(program.info).get(OUTPUT_ENCODING)
-    arguments = _arguments(plan).split("\n")
     rows, columns = gather.rows, gather.columns
     tap = f"{rows // 2}" if rows == columns else f"({rows // 2}, {columns // 2})"
-    language = plan.language.language if plan.language else target.language
+    assumes = textwrap.wrap(plan.assumes, WIDE) if bound.output else []
     return [
-        f"wamnet denoiser, {language}. Generated: change the compiler, not this text.",
-        f"program   {ir.digest(program)[:32]}",
-        f"images    {images[0]}",
-        *(f"          {line}" for line in images[1:]),
-        f"window    {rows} x {columns} pixels, the pixel itself is tap {tap}",
-        f"border    {gather.window.border}",
-        f"output    {channels} channels" + (f", {encoding}" if encoding else ""),
-        f"profile   {plan.profile.name}: {plan.profile.text}",
-        f"sine      {WHOLE_SINE if bound.exact else plan.sine.text}",
-        f"bound     {_bound_text(bound, program)}",
-        *(_wrapped("assumes", plan.assumes) if plan.assumes and bound.output else []),
-        *([SUMS] if is_split(gather) and plan.shares_bound else []),
-        *([] if picked.schedule.name == PLAIN else [f"schedule  {schedule_text(picked.manifest())}"]),
-        f"arguments {arguments[0]}",
-        *(f"          {line}" for line in arguments[1:]),
+        ("program", [ir.digest(program)[:32]]),
+        ("images", images),
+        ("window", [f"{rows} x {columns} pixels, the pixel itself is tap {tap}"]),
+        ("border", [gather.window.border]),
+        ("output", [f"{channels} channels" + (f", {encoding}" if encoding else "")]),
+        ("profile", [f"{plan.profile.name}: {plan.profile.text}"]),
+        ("sine", [WHOLE_SINE if bound.exact else plan.sine.text]),
+        ("bound", [_bound_text(bound, program)]),
+        ("assumes", assumes),
+        ("sums", [SUMS] if is_split(gather) and plan.shares_bound else []),
+        ("schedule", [] if picked.schedule.name == PLAIN else [schedule_text(picked.manifest())]),
+        ("arguments", plan.schedule.arguments(plan.emitted).split("\n")),
     ]
 
 
-def _arguments(plan: Plan) -> str:
-    """Return how a kernel is called."""
-    return plan.schedule.arguments(plan.emitted)
-
-
-def _weight_lines(program: Program, schedule: Schedule) -> list[str]:
-    """Return the lines of the header that say where each parameter is, wrapped."""
-    places = schedule.layout(program).values()
+def _entry_of_weights(plan: Plan) -> Entry:
+    """Return the entry of the header that says where each parameter is."""
+    places = plan.schedule.layout(plan.emitted).values()
     slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
-    text = f"{', '.join(slots) or 'none'}; {schedule.order}"
-    return _wrapped("weights", text)
-
-
-def _wrapped(name: str, text: str) -> list[str]:
-    """Return the lines of a header's entry."""
-    return textwrap.wrap(text, 98, initial_indent=f"{name:10}", subsequent_indent=" " * 10)
+    return "weights", textwrap.wrap(f"{', '.join(slots) or 'none'}; {plan.schedule.order}", WIDE)
 
 
 def _bound_text(bound: Bound, program: Program) -> str:
@@ -200,24 +272,14 @@ def _bound_text(bound: Bound, program: Program) -> str:
     return f"|output - float64 reference| <= {round_up(max(bound.output)):g} for all images in these ranges"
 
 
-def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
-    """Return the artifact with its manifest."""
-    emitted, target, schedule = plan.emitted, plan.target, plan.schedule
-    gather, profile = kernel_gather(emitted), plan.profile
-    weights, slots = schedule.pack(emitted), schedule.layout(emitted).values()
-    raw = weights.astype("<f4").tobytes()
-    suffix = plan.language.suffix if plan.language else target.suffix
-    source_name = f"denoise{suffix}"
-    manifest: dict[str, Any] = {
+def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, Any]:
+    """Return what only the manifest of a network's kernel says."""
+    emitted, schedule, gather = plan.emitted, plan.schedule, kernel_gather(plan.emitted)
+    return {
         "schema": artifact.SCHEMA,
-        "digest": ir.sha256(source.encode(), raw),
         "program": ir.digest(plan.analysed),
-        "target": target.name,
-        "language": plan.language.language if plan.language else target.language,
-        "entry_point": entry,
-        "profile": {"name": profile.name, "text": profile.text},
         "sine": asdict_finite(plan.sine),
-        "passes": [*pipeline.COMMON, *profile.passes],
+        "passes": [*pipeline.COMMON, *plan.profile.passes],
         "window": _window(gather),
         "images": [image.facts for image in gather.images],
         "output": {
@@ -225,7 +287,6 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
             "channels": output_channels(emitted),
             "encoding": dict(emitted.info).get(OUTPUT_ENCODING, ""),
         },
-        "arguments": _arguments(plan),
         "bound": {
             "output": bound.output and [round_up(error) for error in bound.output],
             "against": AGAINST_WHOLE if bound.exact else AGAINST,
@@ -233,26 +294,14 @@ def _assemble(plan: Plan, bound: Bound, source: str, entry: str) -> Artifact:
         "certificate": artifact.CERTIFICATE_NAME if bound.proof or bound.exact else None,
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
-        "files": {
-            source_name: ir.sha256(source.encode()),
-            artifact.WEIGHTS_NAME: ir.sha256(raw),
-        },
-        SIZES: {source_name: len(source.encode()), artifact.WEIGHTS_NAME: len(raw)},
         "private_bytes": schedule.private_bytes(emitted),
         "schedule": plan.picked.manifest(),
         "weights": {
             "count": int(weights.size),
-            "layout": [asdict(slot) for slot in slots],
+            "layout": [asdict(slot) for slot in schedule.layout(emitted).values()],
             "order": schedule.order,
         },
     }
-    manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    proven = None
-    if bound.exact:
-        proven = certificate.integers(plan.analysed, schedule, emitted, manifest)
-    elif bound.proof:
-        proven = certificate.certificate(plan.analysed, bound.proof, plan.sine, schedule, emitted, manifest)
-    return Artifact(plan, source, source_name, emitted, weights, manifest, certificate=proven)
 
 
 def _window(gather: Gather) -> dict[str, Any]:

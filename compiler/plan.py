@@ -32,7 +32,6 @@ from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
-from .languages.dialect import Dialect
 from .proof import bounds, certificate, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
@@ -110,7 +109,7 @@ class Plan:
     @cached_property
     def sine(self) -> SineContract:
         """Return what is promised of a sine."""
-        return self.profile.sine or self.target.native_sine
+        return self.target.sine(self.profile)
 
     @cached_property
     def emitted(self) -> Program:
@@ -126,11 +125,6 @@ class Plan:
     def schedule(self) -> Schedule:
         """Return the schedule."""
         return self.picked.schedule
-
-    @property
-    def language(self) -> Dialect | None:
-        """Return the language of the source, which the interpreter has none of."""
-        return None if self.target.dialect is None else self.schedule.dialect
 
     @cached_property
     def passes(self) -> tuple[Plan, ...]:
@@ -201,7 +195,7 @@ class Plan:
     @property
     def assumes(self) -> str:
         """Return what the bound rests on that the language does not promise: nothing where nothing rounds."""
-        return "" if self.is_whole else self.target.assumes
+        return "" if self.is_whole else self.target.dialect.assumes
 
     @property
     def shares_bound(self) -> bool:
@@ -243,7 +237,7 @@ def analysed(program: Program) -> Program:
 
 def sine_contract(profile: str, target: str) -> SineContract:
     """Return what is promised of a sine under this profile on this target."""
-    return profiles.profile_named(profile).sine or target_named(target).native_sine
+    return target_named(target).sine(profiles.profile_named(profile))
 
 
 def plan_program(
@@ -257,12 +251,14 @@ def plan_program(
     if kernel_gather(program).whole and rank:
         raise CompileError(f"rank {rank}: needs a float network, not an integer one (leave it out)")
     common = analysed(program)
-    if rank and chosen.most is not None and rank > chosen.most:
+    dialect = chosen.dialect
+    if rank > dialect.max_output_channels:
         raise CompileError(
-            f"rank {rank}: the intermediate image has as many channels, and {chosen.language} "
-            f"writes at most {chosen.most}; use a smaller rank, or OpenCL or C, which have no such limit"
+            f"rank {rank}: the intermediate image has as many channels, and {dialect.language} "
+            f"writes at most {dialect.max_output_channels}; use a smaller rank, or OpenCL or C, which have "
+            "no such limit"
         )
-    cut = factor(common, rank, chosen.widest) if rank else None
+    cut = factor(common, rank, dialect.channels_per_result) if rank else None
     return Plan(common, chosen, promised, schedule, cut)
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
-from .core.profiles import SineContract
-from .kernel.interface import BLOCK, DENOISE, PATH, TABLE
+from .core.profiles import Profile, SineContract
+from .kernel.interface import BLOCK, PATH, TABLE
 from .languages.c import C
 from .languages.cuda import CUDA
 from .languages.dialect import Dialect
@@ -21,6 +21,7 @@ from .languages.glsl import GLSL, GLSLCompute
 from .languages.glsl_buffers import Compute, Vulkan
 from .languages.glsl_es import GLSLES
 from .languages.hosts import GodotDenoise, ShadertoyDenoise
+from .languages.listing import Listing
 from .languages.metal import Metal
 from .languages.opencl import LANES, OpenCL
 from .languages.wgsl import WGSL
@@ -39,37 +40,45 @@ from .schedules.schedules import (
     Tile,
 )
 
+HERE, SHOWN = "here", "shown"
+"""Whether an executor runs a target's kernels, and one that the demo and the benchmark show."""
+
 
 @dataclass(frozen=True)
 class Target:
-    """Something that runs kernels: how its source is made, and what its own sine promises.
+    """Something that runs kernels: its language, and what there is for it.
 
-    `dialect` is the language's, which the interpreter lacks; `paths` are the numbers of paths that path
-    kernels follow at once, none where there are no path kernels, and `forms` says what becomes of a scene's
-    primitives. `planes`: for how many pixels in a work item there are kernels of the
-    edge-avoiding filter; with 1 there is a history. `widest`: most channels of an image that a
-    kernel reads, `most` of all that it writes; None: any number. `assumes`: what a bound rests on that the
-    language does not promise.
+    `paths` are the numbers of paths that path kernels follow at once, none where there are no path kernels,
+    and `forms` says what becomes of a scene's primitives. `planes`: for how many pixels in a work item there
+    are kernels of the edge-avoiding filter; with 1 there is a history. `runs`: whether an executor of the
+    registry runs them, and whether the demo shows it.
     """
 
-    name: str
-    language: str
-    suffix: str
-    entry: str
-    native_sine: SineContract
+    dialect: Dialect
     schedules: tuple[Schedule, ...]
-    dialect: Dialect | None = None
     paths: tuple[int, ...] = ()
     planes: tuple[int, ...] = ()
     forms: Forms = USUAL
-    widest: int | None = None
-    most: int | None = None
-    assumes: str = ""
+    runs: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return the name."""
+        return self.dialect.target
+
+    @property
+    def language(self) -> str:
+        """Return the name of the language, for a reader."""
+        return self.dialect.language
 
     @property
     def encodes(self) -> bool:
         """Return whether there are kernels that encode features."""
-        return self.dialect is None or PATH in self.dialect.said
+        return PATH in self.dialect.said
+
+    def sine(self, profile: Profile) -> SineContract:
+        """Return what is promised of a sine under a profile."""
+        return profile.sine or self.dialect.native_sine
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
@@ -138,28 +147,17 @@ def groups(dialect: Dialect) -> tuple[Schedule, ...]:
     return tuple(found)
 
 
-def _dialect_target(dialect: Dialect, *ladder: Schedule) -> Target:
-    """Return the target whose source a dialect makes; `ladder` are its schedules after the plain one."""
-    return Target(
-        dialect.target,
-        dialect.language,
-        dialect.suffix,
-        dialect.entries[DENOISE],
-        dialect.native_sine,
-        (Plain(dialect), *ladder),
-        dialect,
-        (1,) if PATH in dialect.said else (),
-        widest=dialect.channels_per_result,
-        most=dialect.max_output_channels,
-        assumes=dialect.assumes,
-    )
+def _of(dialect: Dialect, *ladder: Schedule) -> Target:
+    """Return the target of a language; `ladder` are its schedules after the plain one."""
+    paths = (1,) if PATH in dialect.said else ()
+    return Target(dialect, (Plain(dialect), *ladder), paths)
 
 
 def processor(dialect: Dialect) -> Target:
     """Return the target of a language for processors, and for graphics processors where it has groups."""
     shared = groups(dialect) if dialect.group else ()
     spectra = ffts(dialect) if dialect.transforms else passes(dialect)
-    return _dialect_target(dialect, *tiles(dialect), *spectra, *dots(dialect), *shared)
+    return _of(dialect, *tiles(dialect), *spectra, *dots(dialect), *shared)
 
 
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
@@ -189,87 +187,51 @@ to four times slower than statements; but it compiles the statements of 100 prim
 take 8,000 operations, in 1 to 5 s, those of 300 in 9 to 60 s. A walk is slower still than a loop
 (`wamnet bench primitives --executors opengl`)."""
 
-TARGETS: Mapping[str, Target] = {
+LANGUAGES: Mapping[str, Target] = {
     target.name: target
     for target in (
-        Target(
-            "numpy",
-            "wamnet IR",
-            ".ir.txt",
-            "program",
-            SineContract("np.sin, whose documentation promises nothing", None),
-            (Printed(),),
-            paths=(1,),
-            planes=(1,),
-        ),
+        Target(Listing(), (Printed(Listing()),), paths=(1,), planes=(1,), runs=SHOWN),
+        replace(processor(OpenCL()), paths=LANES, planes=LANES, forms=Forms(trees=True), runs=SHOWN),
         replace(
-            processor(OpenCL()),
-            paths=LANES,
-            planes=LANES,
-            forms=Forms(trees=True),
-        ),
-        replace(
-            _dialect_target(
-                GLSL(),
-                Inline(GLSL()),
-                *passes(GLSLCompute(), "inlined"),
-                *groups(GLSLCompute()),
-            ),
+            _of(GLSL(), Inline(GLSL()), *passes(GLSLCompute(), "inlined"), *groups(GLSLCompute())),
             planes=(1,),
             forms=MESA,
+            runs=SHOWN,
         ),
-    )
-}
-"""The targets that the demo and the benchmark show, by the name of the executor that runs them."""
-
-DENOISERS: Mapping[str, Target] = {
-    **TARGETS,
-    "c": replace(
-        processor(C()),
-        planes=(1,),
-        forms=Forms(trees=True),
-    ),
-}
-"""All targets that an executor of the registry runs."""
-
-EXPORTED: Mapping[str, Target] = {
-    target.name: target
-    for target in (
-        replace(
-            _dialect_target(GLSLES(), Inline(GLSLES()), Packed(GLSLES())),
-            forms=MESA,
-        ),
-        processor(Compute()),
-        processor(Vulkan()),
-        processor(WGSL()),
-        processor(CUDA()),
-        processor(Metal()),
-        replace(_dialect_target(ShadertoyDenoise()), schedules=(Inline(ShadertoyDenoise()),)),
-        _dialect_target(GodotDenoise()),
+        replace(processor(C()), planes=(1,), forms=Forms(trees=True), runs=HERE),
+        replace(_of(GLSLES(), Inline(GLSLES()), Packed(GLSLES())), forms=MESA),
+        *(processor(dialect()) for dialect in (Compute, Vulkan, WGSL, CUDA, Metal)),
+        Target(ShadertoyDenoise(), (Inline(ShadertoyDenoise()),)),
+        _of(GodotDenoise()),
         *(
-            _dialect_target(language().placed(home, weight, where))
+            _of(language().placed(home, weight, where))
             for home, (where, languages) in HOMES.items()
             for language, weight in languages.items()
         ),
     )
 }
+"""All targets by name."""
+
+TARGETS = {name: target for name, target in LANGUAGES.items() if target.runs == SHOWN}
+"""The targets that the demo and the benchmark show, by the name of the executor that runs them."""
+
+DENOISERS = {name: target for name, target in LANGUAGES.items() if target.runs}
+"""All targets that an executor of the registry runs."""
+
+EXPORTED = {name: target for name, target in LANGUAGES.items() if not target.runs}
 """Targets that are written for other programs to run: kernels/export has what runs them in tests."""
+
+ALIASES = {"glsl": "opengl"}
+"""Other names of targets: those of their languages."""
 
 
 def target_named(name: str) -> Target:
     """Return the target, or say which ones there are."""
-    known = {**DENOISERS, **EXPORTED}
-    if name not in known:
-        raise CompileError(f"target {name!r}: unknown ({choice(name, known)})")
-    return known[name]
+    if (known := ALIASES.get(name, name)) not in LANGUAGES:
+        raise CompileError(f"target {name!r}: unknown ({choice(name, LANGUAGES)})")
+    return LANGUAGES[known]
 
 
 def schedule_named(target: str, name: str) -> Schedule:
     """Return the schedule of this name of a target."""
     return {schedule.name: schedule for schedule in target_named(target).schedules}[name]
-
-
-def integers_of(target: str, role: str) -> tuple[str, ...]:
-    """Return the integers that a target's kernels of a role are given."""
-    dialect = target_named(target).dialect
-    return dialect.integers[role] if dialect else ()

@@ -26,8 +26,7 @@ from ..files.outputs import check_parent, unwritable
 from .choose import Request, check_request, choose
 
 if TYPE_CHECKING:
-    from ...compiler.artifact import Artifact, Files
-    from ...compiler.scenes.path_kernel import PathArtifact
+    from ...compiler.artifact import Artifact
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -67,7 +66,7 @@ class OfScene:
         ),
     ] = None
 
-    def compiled(self, name: str, target: str, profile: str) -> PathArtifact:
+    def compiled(self, name: str, target: str, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
         from ...compiler.scenes.lower_scene import lower_scene
         from ...compiler.scenes.path_kernel import compile_path, forms_of
@@ -107,7 +106,7 @@ def compile_model(
     is measured once per device.
     """
     folder, name = output or Path(target), EXECUTOR_OF[target]
-    kernel: Files
+    kernel: Artifact
     if is_scene(model):
         of_models = given(network, "schedule", "variant") | {"--here": here or None} | given(limits)
         rule = f"{model} is a scene, whose kernels have one schedule, no variants"
@@ -121,16 +120,14 @@ def compile_model(
     _write(kernel, folder)
 
 
-def _write(kernel: Files, folder: Path) -> None:
+def _write(kernel: Artifact, folder: Path) -> None:
     """Write a kernel, and say its files, why its schedule is another one, and why it has no certificate."""
-    from ...compiler.artifact import Artifact
-
     for path in write_kernel(kernel, folder):
         say(str(path))
     picked = kernel.manifest.get("schedule", {})
     if "reason" in picked:
         say(f"schedule {picked['name']}, not {picked['asked']}: {picked['reason']}")
-    if not isinstance(kernel, Artifact):
+    if kernel.plan is None:
         say("no certificate: path kernels have none, since paths have no bound over all pixels")
     elif kernel.plan.unproven:
         say(f"no certificate: {kernel.plan.unproven}")
@@ -216,7 +213,7 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
         raise InputError("output folder", str(folder), rule, "choose another with -o")
 
 
-def write_kernel(kernel: Files, folder: Path) -> tuple[Path, ...]:
+def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
     """Write a kernel's files; what the system refuses is reported with the folder's name."""
     from ...compiler import artifact
 

@@ -67,7 +67,7 @@ def _lines(model: str, target: str, profile: str) -> list[Line]:
         path_kernel = compile_path(programs, target, profile)
         return lines_of(path_kernel.source, path_kernel.programs.parts)
     kernel = compile_program(lower(load_model(Path(model), imported=True), keep_places=True), target, profile)
-    return lines_of(kernel.source, {"": kernel.program})
+    return lines_of(kernel.source, {"": kernel.programs})
 
 
 def _reference(place: str) -> str:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.network.dataset import Normalization
-from ..core import ir, profiles
+from ..artifact import Artifact
+from ..core import profiles
 from ..core.lower import images_of
 from ..core.passes import pipeline
 from ..kernel import interface
@@ -32,7 +33,7 @@ from ..schedules.common import X, Y, lets
 from ..targets import target_named
 from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
-from .plane_kernel import Draft, PlaneArtifact, compiled, reads
+from .plane_kernel import compiled, reads
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
@@ -46,13 +47,13 @@ def compile_encode(
     planes: Sequence[str] | None = None,
     whole: bool = False,
     rays: int = 0,
-) -> PlaneArtifact:
+) -> Artifact:
     """Return the kernel that turns sums over samples into the encoded images of features.
 
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
     images are those of a network of integers. `rays`: those of features [lower_encode].
     """
-    chosen, passes = target_named(target), profiles.profile_named(profile).passes
+    chosen, promised = target_named(target), profiles.profile_named(profile)
     encoding = encoding_of(features, normalization, profile, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
@@ -66,30 +67,29 @@ def compile_encode(
         raise CompileError(
             f"target {target} has no kernels that encode features: use one that has them, such as opencl"
         )
-    if chosen.dialect and len(images) > (most := chosen.dialect.max_images):
+    if len(images) > (most := chosen.dialect.max_images):
         raise CompileError(
-            f"the kernel encodes {len(images)} features: {chosen.dialect.language} writes at most {most} "
-            "images at once; use fewer"
+            f"the kernel encodes {len(images)} features: {chosen.language} writes at most {most} images at "
+            "once; use fewer"
         )
     facts = {
         "schema": SCHEMA,
-        "program": ir.digest(program),
-        "passes": [*PASSES, *passes],
+        "passes": [*PASSES, *promised.passes],
         "planes": list(planes),
         "images": [image.facts for image in images],
     }
-    draft = Draft(
+    return compiled(
         "encoding of features",
-        [program],
-        program,
         encode_kernel(encoding, planes),
+        [program],
         facts,
         "at given sums: see the rules for each operation",
         {SUMS_ARRAY: planes},
         {"row_stride": "floats from row to row of a plane", "plane_stride": "and from plane to plane"},
+        (chosen, promised),
+        program,
         images,
     )
-    return compiled(draft, target, profile)
 
 
 def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
@@ -122,9 +122,7 @@ def encoding_of(
     return Encoding(program, images_of(features, normalization, whole))
 
 
-def error_at(
-    artifact: PlaneArtifact, sums: Mapping[str, Any], samples: int
-) -> dict[str, NDArray[np.float64]]:
+def error_at(artifact: Artifact, sums: Mapping[str, Any], samples: int) -> dict[str, NDArray[np.float64]]:
     """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
     names = planes_of([image.name for image in artifact.images])
     inputs = {name: np.asarray(sums[name], np.float64) for name in names}

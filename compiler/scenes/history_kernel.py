@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
+from ..artifact import Artifact
 from ..core import profiles
 from ..core.passes import pipeline
 from ..kernel import interface
@@ -25,6 +26,7 @@ from ..kernel.interface import FOLLOW, IMAGE, INTEGERS, MOTIONS, RESULT
 from ..kernel.interface import PAST as PAST_ARRAY
 from ..kernel.kernel import FLOAT, Array, Body, Expr, For, If, Kernel, Let, Store, apply, const, load, name
 from ..schedules.common import HEIGHT, WIDTH, X, Y, lets, loop
+from ..targets import target_named
 from .lower_history import (
     BEYOND,
     CAMERAS,
@@ -42,7 +44,7 @@ from .lower_history import (
     lower_history,
 )
 from .lower_smooth import THERE
-from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, reads, role_facts
+from .plane_kernel import check_lanes, compiled, reads
 
 SCHEMA = "wamnet-history-kernel-1"
 """Name and version of the manifest's form; described in spec/history.md."""
@@ -60,26 +62,24 @@ NOTES = {
 
 
 @lru_cache
-def compile_history(target: str, profile: str = "ieee") -> PlaneArtifact:
+def compile_history(target: str, profile: str = "ieee") -> Artifact:
     """Return the kernel that adds a picture to a history."""
-    passes = profiles.profile_named(profile).passes
-    check_lanes(target, 1, "the history", "follow pictures by refimpl/light/history.py")
-    programs = _of_profile(lower_history(), passes)
-    kernel, used = history_kernel(programs), [programs.find, programs.take, programs.blend]
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    check_lanes(chosen, 1, "the history", "follow pictures by refimpl/light/history.py")
+    programs = _of_profile(lower_history(), promised.passes)
     lists = {"first": FIRST, "past": PAST, "motion": MOTION, "cameras": CAMERAS}
-    facts = {"schema": SCHEMA, "passes": [*PASSES, *passes], **role_facts(kernel, used)}
-    facts |= {each: list(names) for each, names in lists.items()}
-    draft = Draft(
+    facts = {"schema": SCHEMA, "passes": [*PASSES, *promised.passes]}
+    return compiled(
         "history: one picture more",
-        used,
-        programs,
-        kernel,
-        facts,
+        history_kernel(programs),
+        [programs.find, programs.take, programs.blend],
+        {**facts, **{each: list(names) for each, names in lists.items()}},
         BOUND,
         {FIRST_ARRAY: FIRST, PAST_ARRAY: PAST, RESULT: PAST, MOTIONS: MOTION, CAMERAS_ARRAY: CAMERAS},
         NOTES,
+        (chosen, promised),
+        programs,
     )
-    return compiled(draft, target, profile)
 
 
 def _of_profile(programs: HistoryPrograms, passes: Sequence[str]) -> HistoryPrograms:

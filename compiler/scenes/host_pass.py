@@ -15,7 +15,7 @@ from ..languages.hosts import NO_PRECISE, GodotDenoise
 from .encode_kernel import encoding_of
 from .lower_encode import layers_of
 from .lower_scene import PathPrograms
-from .path_kernel import source_of
+from .path_kernel import renderer_of
 
 
 class _ShadertoyPath(GLSLES):
@@ -117,4 +117,4 @@ def feature_pass(
 ) -> str:
     """Return the pass that traces one sample a pixel and writes one encoded feature; `whole`: in integers."""
     encoding = encoding_of((feature,), normalization, whole=whole)
-    return source_of(programs, HOSTS[target], layers_of((feature,)), header, encoding=encoding)
+    return renderer_of(programs, HOSTS[target], layers_of((feature,)), encoding=encoding).source(header)

@@ -13,31 +13,26 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.light.scene import Scene
-from ...refimpl.reading import SIZES
-from ..artifact import OneSource
-from ..compile import asdict_finite
+from ..artifact import Artifact
+from ..compile import Draft, Entry, asdict_finite, assemble
 from ..core import ir, profiles
 from ..core.ir import Image
 from ..core.loops import Forms
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
-from ..kernel.interface import Interface
 from ..languages.dialect import Dialect
+from ..languages.listing import Listing, listed
 from ..languages.openings import IMAGES
 from ..languages.renderer import Renderer
-from ..plan import sine_contract
-from ..schedules.schedules import PRINTED
-from ..targets import integers_of, target_named
+from ..targets import target_named
 from . import emit_path
 from .emit_path import Encoding
 from .forms import as_statements
@@ -68,49 +63,14 @@ OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the numbe
 """What else is to be known where features have rays of their own."""
 
 
-@dataclass(frozen=True)
-class PathArtifact(OneSource):
-    """A compiled path kernel; `programs` are what was emitted, `planes` what it adds up, in order.
-
-    With `images` it writes these, encoded, in place of the sums.
-    """
-
-    target: str
-    profile: str
-    lanes: int
-    entry_point: str
-    source: str
-    source_name: str
-    programs: PathPrograms
-    planes: tuple[str, ...]
-    manifest: Mapping[str, Any]
-    images: tuple[Image, ...] = ()
-
-    @property
-    def interface(self) -> Interface:
-        """Return what the kernel is bound to, in its language."""
-        integers, numbers = integers_of(self.target, interface.PATH), len(self.programs.inputs)
-        return interface.paths(len(self.planes), integers, numbers, self.images)
-
-    @property
-    def scene_numbers(self) -> NDArray[np.float32]:
-        """Return the numbers (n,) of the scene that was compiled, which are inputs."""
-        return np.array(self.programs.values, np.float32)
-
-
-NO_LIMIT = 2**16
-"""Planes of a kernel without a limit of its own: far more than there are."""
-
-
 def forms_of(target: str) -> Forms:
     """Return the forms of a scene's primitives from which a target gains."""
     return target_named(target).forms
 
 
-def most_planes(target: str, lanes: int) -> int:
-    """Return how many planes a path kernel of a target adds up at most; NumPy's has no limit."""
-    chosen = target_named(target)
-    return chosen.dialect.max_planes if chosen.dialect and lanes in chosen.paths else NO_LIMIT
+def most_planes(target: str) -> int:
+    """Return how many planes a path kernel of a target adds up at most."""
+    return target_named(target).dialect.max_planes
 
 
 def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
@@ -120,7 +80,7 @@ def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> 
     scene's primitives, these do not move.
     """
     chosen = target_named(target)
-    if chosen.dialect and len(inputs.places) > chosen.dialect.most_numbers:
+    if len(inputs.places) > chosen.dialect.most_numbers:
         return False
     if not inputs.move_rows(tables):
         return True
@@ -134,7 +94,7 @@ def compile_path(
     lanes: int = 1,
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
     encoding: Encoding | None = None,
-) -> PathArtifact:
+) -> Artifact:
     """Return the kernel that follows the paths of a scene, `lanes` at once, and adds up groups of planes.
 
     With an encoding of these planes it writes its images, at their places in the whole picture.
@@ -148,53 +108,62 @@ def compile_path(
     programs = emit_path.asked(programs, groups)
     passed = {name: pipeline.run(part, promised.passes) for name, part in programs.parts.items()}
     emitted, dialect = replace(programs, parts=passed), chosen.dialect
-    planes = tuple(emit_path.planes(groups))
-    images = encoding.images if encoding else ()
+    planes, images = emit_path.planes(groups), encoding.images if encoding else ()
+    renderer = renderer_of(emitted, dialect, groups, lanes, encoding)
     written = (*(_written(images) if images else SUMS), *_notes(programs, bool(images)))
-    at_once = (dialect and dialect.at_once) or f"{lanes} {'path' if lanes == 1 else 'paths'}"
-    header = _header(programs, dialect.language if dialect else chosen.language, promised, at_once, written)
-    arguments = dialect.said[interface.PATH] if dialect else PRINTED
-    if images:
-        arguments = f"{IMAGES};\n{arguments.partition('{planes};' + chr(10))[2]}"
-    arguments = arguments.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
-    if dialect and programs.inputs:
-        arguments += f".\n{dialect.said_numbers.format(count=len(programs.inputs))}"
-    if dialect is None:
-        text, suffix, entry = _printed(emitted, header), chosen.suffix, chosen.entry
-    else:
-        first, *others = arguments.split("\n")
-        header += [f"arguments {first}", *(f"          {line}" for line in others)]
-        text = source_of(emitted, dialect, groups, header, lanes, encoding)
-        suffix, entry = dialect.suffix, dialect.entries[interface.PATH]
+    arguments = _arguments(dialect, lanes, () if images else planes, len(programs.inputs))
+    is_listed = isinstance(dialect, Listing)
+    at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
+    entries = _entries(programs, promised, at_once, written)
     facts = {
-        "target": target,
-        "language": chosen.language,
-        "entry_point": entry,
+        "schema": SCHEMA,
         "lanes": lanes,
-        "profile": {"name": promised.name, "text": promised.text},
-        "sine": asdict_finite(sine_contract(profile, target)),
+        "sine": asdict_finite(chosen.sine(promised)),
         "passes": [*PASSES, *promised.passes],
         **({"images": [image.facts for image in images]} if images else {"planes": list(planes)}),
         "sums": "; ".join(written),
-        "arguments": arguments,
+        "scene": {"name": programs.scene, "digest": programs.scene_digest},
+        "settings": programs.settings.facts(),
+        "programs": {part: ir.digest(program) for part, program in passed.items()},
         **({"numbers": numbers_of(programs)} if programs.inputs else {}),
         **({"feature_rays": asdict(programs.rays)} if programs.rays else {}),
         **({"shadow_rays": programs.shadow_rays} if "shadow" in programs.parts else {}),
     }
-    name = f"path{suffix}"
-    manifest = {**facts, **_identity(emitted, name, text)}
-    return PathArtifact(target, profile, lanes, entry, text, name, emitted, planes, manifest, images)
+    draft = Draft(
+        "path tracer",
+        dialect,
+        promised,
+        renderer.kernel.interface,
+        partial(listed, programs=list(passed.items())) if is_listed else renderer.source,
+        [*entries, ("arguments", [] if is_listed else arguments.split("\n"))],
+        arguments,
+        facts,
+        emitted,
+        kernel=renderer.kernel,
+        images=images,
+    )
+    return assemble(draft)
 
 
-def source_of(
+def _arguments(dialect: Dialect, lanes: int, planes: Sequence[str], count: int) -> str:
+    """Return how a kernel is called that writes planes, or images if there are none, of so many numbers."""
+    found = dialect.said[interface.PATH]
+    if not planes:
+        found = f"{IMAGES};\n{found.partition('{planes};' + chr(10))[2]}"
+    found = found.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
+    if count and dialect.said_numbers:
+        found += f".\n{dialect.said_numbers.format(count=count)}"
+    return found
+
+
+def renderer_of(
     programs: PathPrograms,
     dialect: Dialect,
     groups: Sequence[str],
-    header: Sequence[str],
     lanes: int = 1,
     encoding: Encoding | None = None,
-) -> str:
-    """Return the kernel's source; `header` are the lines of the comment at its top."""
+) -> Renderer:
+    """Return the kernel with what prints it, or say which limit of a language it exceeds."""
     count, language = len(emit_path.planes(groups)), dialect.language
     if count > dialect.max_planes:
         raise CompileError(
@@ -206,14 +175,13 @@ def source_of(
             f"{language}: its path kernels take at most {dialect.most_numbers} scene parameters, and "
             f"{len(programs.inputs)} move: compile for fewer times, or one"
         )
-    kernel = emit_path.path_kernel(programs, dialect.path_lanes or lanes, groups, encoding)
-    renderer = Renderer(dialect, kernel, False)
-    if kernel.interface.images and not dialect.paints:
+    if encoding and not dialect.paints:
         raise CompileError(
             f"{language}: its path kernels write sums, not encoded images: compile the encoding as a "
             "separate kernel"
         )
-    return renderer.source(header)
+    kernel = emit_path.path_kernel(programs, dialect.path_lanes or lanes, groups, encoding)
+    return Renderer(dialect, kernel, False)
 
 
 def numbers_of(programs: PathPrograms) -> list[dict[str, Any]]:
@@ -249,10 +217,8 @@ def _notes(programs: PathPrograms, encoded: bool) -> Iterator[str]:
         yield OF_RAYS.format(programs.rays.count, programs.rays.sampler)
 
 
-def _header(
-    programs: PathPrograms, language: str, profile: Profile, at_once: str, written: Sequence[str]
-) -> list[str]:
-    """Return the lines of the comment at the top of the source, up to the arguments.
+def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Sequence[str]) -> list[Entry]:
+    """Return the entries of the header, up to the arguments.
 
     `written` says what the numbers mean that are the result.
     """
@@ -263,34 +229,11 @@ def _header(
     if programs.inputs:
         fixed = f"all of the scene but {len(programs.inputs)} numbers: {interface.SCENE_NUMBERS}"
     return [
-        f"wamnet path tracer, {language}. Generated: change the compiler, not this text.",
-        f"scene     {_harmless(programs.scene)}, digest {programs.scene_digest[:32]}",
-        f"paths     {', '.join(settings)}",
-        f"schedule  {at_once} at once",
-        f"profile   {profile.name}: {profile.text}",
-        "bound     none: a path's decisions may fall differently near an edge",
-        f"fixed     {fixed}",
-        *(f"{'sums' if i == 0 else '':10}{line}" for i, line in enumerate(written)),
+        ("scene", [f"{_harmless(programs.scene)}, digest {programs.scene_digest[:32]}"]),
+        ("paths", [", ".join(settings)]),
+        ("schedule", [f"{at_once} at once"]),
+        ("profile", [f"{profile.name}: {profile.text}"]),
+        ("bound", ["none: a path's decisions may fall differently near an edge"]),
+        ("fixed", [fixed]),
+        ("sums", written),
     ]
-
-
-def _identity(programs: PathPrograms, name: str, text: str) -> dict[str, Any]:
-    """Return what the manifest says of the scene, the programs and the source file `name`."""
-    return {
-        "schema": SCHEMA,
-        "digest": ir.sha256(text.encode()),
-        "scene": {"name": programs.scene, "digest": programs.scene_digest},
-        "settings": programs.settings.facts(),
-        "programs": {part: ir.digest(program) for part, program in programs.parts.items()},
-        "bound": None,
-        "files": {name: ir.sha256(text.encode())},
-        SIZES: {name: len(text.encode())},
-    }
-
-
-def _printed(programs: PathPrograms, header: Sequence[str]) -> str:
-    """Return the programs as text, which is all that the interpreter needs."""
-    parts = [f"# {line}".rstrip() for line in header]
-    for name, program in programs.parts.items():
-        parts += [f"# {name}", ir.text(program).rstrip("\n")]
-    return "\n".join(parts) + "\n"

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...refimpl.network import smoothing
 from ...refimpl.network.dataset import Normalization
+from ..artifact import Artifact
 from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
@@ -46,6 +47,7 @@ from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
+from ..targets import target_named
 from .encode_kernel import compile_encode
 from .lower_encode import SAMPLES, channel_name
 from .lower_smooth import (
@@ -61,7 +63,7 @@ from .lower_smooth import (
     lower_smooth,
 )
 from .lower_smooth import LIGHT as LIGHT_PLANES
-from .plane_kernel import Draft, PlaneArtifact, check_lanes, compiled, reads, role_facts
+from .plane_kernel import check_lanes, compiled, reads
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""
@@ -80,21 +82,21 @@ TABLE = "SPLINE"
 class SmoothKernels:
     """What runs one after another: `guide`, `smooth` once a level, `encode`."""
 
-    guide: PlaneArtifact
-    smooth: PlaneArtifact
-    encode: PlaneArtifact
+    guide: Artifact
+    smooth: Artifact
+    encode: Artifact
 
 
 def compile_smoothing(
     normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    passes = profiles.profile_named(profile).passes
-    check_lanes(target, lanes, "the filter", "smooth by refimpl/network/smoothing.py")
-    programs = _of_profile(lower_smooth(normalization), passes)
+    chosen, promised = target_named(target), profiles.profile_named(profile)
+    check_lanes(chosen, lanes, "the filter", "smooth by refimpl/network/smoothing.py")
+    programs = _of_profile(lower_smooth(normalization), promised.passes)
     facts = {
         "schema": SCHEMA,
-        "passes": [*PASSES, *passes],
+        "passes": [*PASSES, *promised.passes],
         "layers": [layer.name for layer in LAYERS_READ],
         "guides": list(programs.guides),
         "light": list(LIGHT_PLANES),
@@ -104,18 +106,10 @@ def compile_smoothing(
     notes |= {"row_stride": "at least width" + several, "gap": "pixels between taps"}
     lists = {GUIDES: programs.guides, LIGHT: LIGHT_PLANES, RESULT: LIGHT_PLANES}
 
-    def made(kernel: Kernel, *used: Program) -> PlaneArtifact:
-        draft = Draft(
-            f"edge-avoiding filter: {TITLES[kernel.interface.role]}",
-            used,
-            programs,
-            kernel,
-            {**facts, **role_facts(kernel, used)},
-            "at given layers: see the rules for each operation",
-            lists,
-            notes,
-        )
-        return compiled(draft, target, profile)
+    def made(kernel: Kernel, *used: Program) -> Artifact:
+        title = f"edge-avoiding filter: {TITLES[kernel.interface.role]}"
+        bound = "at given layers: see the rules for each operation"
+        return compiled(title, kernel, used, facts, bound, lists, notes, (chosen, promised), programs)
 
     guide = made(guide_kernel(programs), programs.guide)
     smooth = made(smooth_kernel(programs, lanes), programs.tap, programs.mean)

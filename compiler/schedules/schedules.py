@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.network import dataset
-from ..core import ir, weights
+from ..core import weights
 from ..core.ir import Gather, Program
 from ..core.profiles import SineContract
 from ..core.weights import Slot
@@ -30,6 +30,7 @@ from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes, shared_bytes
 from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
+from ..languages.listing import listed
 from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
@@ -529,30 +530,14 @@ class Fourier(Stored):
         return direct, (products + one * transforms) / (self.tiles * s.out**2)
 
 
-PRINTED = "the program's inputs and parameters, by name"
-"""How a program is called that is not compiled."""
-
-
-class Printed(Schedule):
+class Printed(Plain):
     """The program as text, which is all that the interpreter needs."""
 
-    name = PLAIN
     idea = "one operation after another, all pixels at once"
-
-    def __init__(self) -> None:
-        """No language."""
-
-    def arguments(self, program: Program) -> str:
-        """Return how it is called."""
-        return PRINTED
 
     def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
         """Return the text, under the header as comments."""
-        return "".join(f"# {line}".rstrip() + "\n" for line in header) + ir.text(program)
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel that a language would have."""
-        return plain(program)
+        return listed(header, [("", program)])
 
 
 @dataclass(frozen=True)

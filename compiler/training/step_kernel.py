@@ -10,9 +10,11 @@ reach: sine and cosine are proven only up to their domains, and beyond them the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ...refimpl.network.activation import SINE
+from ..artifact import Artifact
+from ..compile import Draft, assemble
 from ..core import ir
 from ..core.passes import pipeline
 from ..core.profiles import PROFILES
@@ -30,15 +32,6 @@ FIRST = "W0"
 """Name of the first layer's matrix in a step."""
 
 
-@dataclass(frozen=True)
-class StepKernel:
-    """The launches of a step as data and as source; `step` is the analysed one."""
-
-    source: str
-    step: Step
-    kernel: Kernel
-
-
 def compile_step(
     widths: tuple[int, ...],
     omegas: tuple[float, float],
@@ -46,7 +39,7 @@ def compile_step(
     size: int,
     rank: int = 0,
     activation: str = SINE,
-) -> StepKernel:
+) -> Artifact:
     """Return the kernel that trains layers of `widths` on windows of `size` x `size` pixels.
 
     With a `rank` the factors of the first layer are what is trained.
@@ -55,16 +48,23 @@ def compile_step(
     return compile_lowered(replace(lower_step(widths, *omegas, batch, activation), split=split), size)
 
 
-def compile_lowered(step: Step, size: int) -> StepKernel:
-    """Return the kernel of a step; its window has `size` runs."""
-    dialect = target_named("opencl").dialect
-    assert dialect is not None
-    kernel = step_kernel(step, size)
-    header = (
-        f"wamnet training step, {dialect.language}. Generated: change the compiler, not this text.",
-        f"program   {ir.digest(step.program)[:32]}",
+def compile_lowered(step: Step, size: int) -> Artifact:
+    """Return the kernel of a step; its window has `size` runs. Its `programs` are the step, analysed."""
+    dialect, profile, digest = target_named("opencl").dialect, PROFILES["ieee"], ir.digest(step.program)
+    renderer = Renderer(dialect, step_kernel(step, size), False)
+    draft = Draft(
+        "training step",
+        dialect,
+        profile,
+        renderer.kernel.interface,
+        renderer.source,
+        [("program", [digest[:32]])],
+        "by the launches of the kernel: see spec/train_kernel.md",
+        {"program": digest, "passes": profile.passes},
+        step,
+        kernel=renderer.kernel,
     )
-    return StepKernel(Renderer(dialect, kernel, False).source(header), step, kernel)
+    return assemble(draft)
 
 
 def step_kernel(step: Step, size: int) -> Kernel:

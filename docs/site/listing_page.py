@@ -45,7 +45,7 @@ def network_listing(target: str) -> list[Line]:
     network = siren.init([12, 4, 3], 2.0, 2.0, seed=5, dtype=np.float32)
     model = denoise.Model(network, ("color",), Window(2), Normalization())
     kernel = compile_program(lower(model, keep_places=True), target, "native")
-    return lines_of(kernel.source, {"": kernel.program})
+    return lines_of(kernel.source, {"": kernel.programs})
 
 
 def scene_listing(target: str) -> list[Line]:

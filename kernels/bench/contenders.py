@@ -256,7 +256,7 @@ def _open_kernel(
 
 def _read(artifact: Artifact, given: Given) -> Images:
     """Return the images that a kernel reads: a form may see fewer features than the network."""
-    gather = kernel_gather(artifact.kernels[0].program)
+    gather = kernel_gather(artifact.kernels[0].programs)
     images = given.integers if gather.whole else given.images
     return {image.name: images[image.name] for image in gather.images}
 

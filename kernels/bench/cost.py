@@ -68,8 +68,8 @@ def sines_of(program: Program) -> int:
 
 def fused(artifact: Artifact, sines: int) -> tuple[Stage, ...]:
     """Return the stages of compiled kernels: each reads its images and writes one; the last has the sines."""
-    channels = [kernel_gather(k.program).channels + output_channels(k.program) for k in artifact.kernels]
+    channels = [kernel_gather(k.programs).channels + output_channels(k.programs) for k in artifact.kernels]
     return tuple(
-        Stage(products_of(kernel.program), sines if kernel is artifact else 0, FLOAT_BYTES * count)
+        Stage(products_of(kernel.programs), sines if kernel is artifact else 0, FLOAT_BYTES * count)
         for kernel, count in zip(artifact.kernels, channels, strict=True)
     )

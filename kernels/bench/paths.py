@@ -23,9 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.artifact import Artifact
 from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path, forms_of
 from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene, primitives
@@ -177,6 +178,6 @@ def _peer_s(name: str, scene: Scene, part: Part) -> Entry:
     return Entry(VARIANT, facts=facts, round=lambda _number: follow())
 
 
-def _compiled(executor: Executor, scene: Scene, forms: Forms) -> PathArtifact:
+def _compiled(executor: Executor, scene: Scene, forms: Forms) -> Artifact:
     """Return the kernel of a scene for an executor."""
     return compile_path(lower_scene(scene, Settings(), forms), executor.name, lanes=executor.lanes)

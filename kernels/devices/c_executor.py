@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import (
     DENOISE,
     ENCODE,
@@ -45,7 +46,7 @@ from .. import cache
 from ..folders import discard, new_temporary
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .images import widest
-from .kernel import Denoiser, Kernel, Memory, is_denoiser, words
+from .kernel import Memory, words
 
 COMPILER_VARIABLE = "CC"
 """Environment variable that names the compiler, with options if need be; else `cc`."""
@@ -204,9 +205,9 @@ BODIES = {
 """What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
 
 
-def glue_of(kernel: Kernel, header: str) -> str:
+def glue_of(kernel: Artifact, header: str) -> str:
     """Return the text with the function that is called, around a kernel's source in a file."""
-    schedule = kernel.manifest["schedule"] if is_denoiser(kernel) else {}
+    schedule = kernel.manifest["schedule"] if kernel.role == DENOISE else {}
     taken = kernel.interface
     body = BODIES[taken.role].format(
         entry=kernel.entry_point,
@@ -285,9 +286,9 @@ class CExecutor(Executor):
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
         return {"options": self._options, "lanes": int(lanes), "bytes": byte_products == "1"}
 
-    def _prepare(self, kernel: Kernel) -> _Prepared:
+    def _prepare(self, kernel: Artifact) -> _Prepared:
         rows, weights = 1, None
-        if is_denoiser(kernel):
+        if kernel.role == DENOISE:
             self._check_stack(kernel.manifest["private_bytes"])
             rows = kernel.manifest["schedule"].get("rows", 1)
             weights = np.ascontiguousarray(kernel.weights)
@@ -304,7 +305,7 @@ class CExecutor(Executor):
                 "a thread's stack; use narrower layers, or executor numpy"
             )
 
-    def _library(self, kernel: Kernel, glue: str) -> Any:
+    def _library(self, kernel: Artifact, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
         # A library that was built before may still be loaded: each has a name of its own.
         library = self._folder / f"{kernel.digest[:32]}-{next(self._count)}.so"
@@ -340,7 +341,7 @@ class CExecutor(Executor):
                 f"c: the compiler {self._command[0]!r} cannot be run ({error.strerror}); {WAY_OUT}"
             ) from None
 
-    def check_size(self, artifact: Denoiser, size: tuple[int, int]) -> None:
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images whose indices `int` does not hold."""
         most = widest(artifact)
         if size[0] * size[1] * most >= INDEX_LIMIT:
@@ -352,7 +353,7 @@ class CExecutor(Executor):
             )
 
     def _start(
-        self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         taken = prepared.interface
         held = {WEIGHTS: prepared.weights, **{name: memory.held for name, memory in arrays.items()}}
@@ -394,6 +395,6 @@ def _file_facts(command: str) -> tuple[str, ...]:
     return (path,)
 
 
-def _header(kernel: Kernel) -> str:
+def _header(kernel: Artifact) -> str:
     """Return the name of the file that holds a kernel's source."""
     return f"{kernel.digest[:32]}.h"

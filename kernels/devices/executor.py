@@ -45,12 +45,10 @@ from ...compiler.kernel.interface import (
 )
 from ...refimpl.errors import InputError
 from .images import Images, black, checked
-from .kernel import Denoiser, Kernel, Memory, Part, Size, numbers_for, plane_integers, plane_shape, shapes
+from .kernel import Memory, Part, Size, numbers_for, plane_integers, plane_shape, shapes
 
 if TYPE_CHECKING:
-    from ...compiler.scenes.path_kernel import PathArtifact
-    from ...compiler.scenes.plane_kernel import PlaneArtifact
-    from ...compiler.training.step_kernel import StepKernel
+    from ...compiler.artifact import Artifact
 
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
@@ -111,7 +109,7 @@ class Executor(ABC):
     # ---- what a device provides --------------------------------------------------------------------------
 
     @abstractmethod
-    def _prepare(self, kernel: Kernel) -> Any:
+    def _prepare(self, kernel: Artifact) -> Any:
         """Return a kernel, compiled, with its weights on the device."""
 
     def _discard(self, prepared: Any) -> None:
@@ -135,7 +133,7 @@ class Executor(ABC):
 
     @abstractmethod
     def _start(
-        self, kernel: Kernel, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         """Start a kernel: arrays by the names of its interface, and at least its integers, by name."""
 
@@ -164,14 +162,14 @@ class Executor(ABC):
         """Return the size of the run with which a driver finishes compiling for pictures of `size`."""
         return None
 
-    def sums_shape(self, kernel: PathArtifact, part: Part) -> tuple[int, int, int]:
+    def sums_shape(self, kernel: Artifact, part: Part) -> tuple[int, int, int]:
         """Return (planes, rows, columns) of the sums that a kernel writes: the part's, or more than it."""
         return len(kernel.planes), part.rows, part.width
 
-    def check_size(self, artifact: Denoiser, size: Size) -> None:
+    def check_size(self, artifact: Artifact, size: Size) -> None:
         """Refuse images of a size (height, width) that the device cannot hold."""
 
-    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+    def open_trainer(self, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
         rule = "has no compiled trainer"
         raise InputError(
@@ -187,7 +185,7 @@ class Executor(ABC):
         """Return the name of the schedule that suits one picture of `size` (height, width)."""
         return self.schedule if size[0] * size[1] >= self.schedule_pixels else PLAIN
 
-    def build(self, kernel: Kernel, size: Size = (1, 1)) -> None:
+    def build(self, kernel: Artifact, size: Size = (1, 1)) -> None:
         """Make a kernel, or both of its passes, ready to run on images of `size`; again costs nothing."""
         passes = kernel.kernels
         new = [each.digest for each in passes if each.digest not in self._built]
@@ -203,7 +201,7 @@ class Executor(ABC):
             self._drop([self._built.pop(digest) for digest in new if digest in self._built])
             raise
 
-    def _keep(self, kernel: Kernel) -> None:
+    def _keep(self, kernel: Artifact) -> None:
         """Build a kernel unless it is built, make it the newest, and drop the oldest ones."""
         built = self._built.pop(kernel.digest, None)
         if built is None:
@@ -212,7 +210,7 @@ class Executor(ABC):
         self._built[kernel.digest] = built
         self._drop([self._built.pop(next(iter(self._built))) for _ in range(len(self._built) - KEPT_KERNELS)])
 
-    def _run_once(self, kernel: Kernel, size: Size) -> None:
+    def _run_once(self, kernel: Artifact, size: Size) -> None:
         """Run a kernel once on black images."""
         role, one = kernel.interface.role, cast("Any", kernel)
         if role == PATH:
@@ -224,7 +222,7 @@ class Executor(ABC):
         else:
             self._run_planes(one, size)
 
-    def _run_planes(self, kernel: PlaneArtifact, size: Size) -> None:
+    def _run_planes(self, kernel: Artifact, size: Size) -> None:
         """Run a kernel on planes once on zeros."""
         with self._session(size), ExitStack() as made:
             integers = {**plane_integers(kernel, size), "gap": 1, PRIMITIVES: 1}
@@ -253,7 +251,7 @@ class Executor(ABC):
                 for built in dropped:
                     self._discard(built.prepared)
 
-    def run(self, artifact: Denoiser, inputs: Images) -> NDArray[np.float32]:
+    def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
         images = checked(artifact, inputs)
         self._check_target(artifact)
@@ -262,7 +260,7 @@ class Executor(ABC):
         self.build(artifact, (height, width))
         return self._run(artifact, images)
 
-    def _run(self, artifact: Denoiser, images: Images) -> NDArray[np.float32]:
+    def _run(self, artifact: Artifact, images: Images) -> NDArray[np.float32]:
         """Run a built artifact on checked images."""
         height, width = next(iter(images.values())).shape[:2]
         with self._session((height, width)), ExitStack() as made:
@@ -282,7 +280,7 @@ class Executor(ABC):
         made.callback(self._release, memory)
         return memory
 
-    def _chain(self, artifact: Denoiser, images: Mapping[str, Memory], written: Sequence[Memory]) -> None:
+    def _chain(self, artifact: Artifact, images: Mapping[str, Memory], written: Sequence[Memory]) -> None:
         """Start an artifact's kernels one after another: what one has written is the image of the next."""
         for kernel, result in zip(artifact.kernels, written, strict=True):
             arrays = {f"{IMAGE}{name}": memory for name, memory in images.items()}
@@ -292,7 +290,7 @@ class Executor(ABC):
             images = {image.name: result for image in artifact.images}
 
     def trace(
-        self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None
+        self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None
     ) -> NDArray[np.float32]:
         """Return the sums (planes, rows, width) over the samples of a part of an image.
 
@@ -304,7 +302,7 @@ class Executor(ABC):
         return self._trace(kernel, part, numbers)
 
     def _trace(
-        self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None
+        self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None
     ) -> NDArray[np.float32]:
         """Run a built kernel."""
         with self._session((part.rows, part.width)), ExitStack() as made:
@@ -312,7 +310,7 @@ class Executor(ABC):
             self._follow(kernel, part, {SUMS: sums, **self._moving(kernel, numbers, made)})
             return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
 
-    def paint(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
+    def paint(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
         """Return the encoded images (H, W, C) of a part that is the whole picture, by name."""
         self._check_target(kernel)
         if (part.first_row, part.rows) != (0, part.height):
@@ -322,7 +320,7 @@ class Executor(ABC):
         self.build(kernel)
         return self._paint(kernel, part, numbers)
 
-    def _paint(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
+    def _paint(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
         """Run a built kernel that writes images."""
         size = part.rows, part.width
         with self._session(size), ExitStack() as made:
@@ -332,7 +330,7 @@ class Executor(ABC):
             return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
 
     def _moving(
-        self, kernel: PathArtifact, numbers: NDArray[np.float32] | None, made: ExitStack
+        self, kernel: Artifact, numbers: NDArray[np.float32] | None, made: ExitStack
     ) -> dict[str, Memory]:
         """Return the memory of the scene's numbers, where they are inputs, which `made` gives back."""
         if not kernel.programs.inputs:
@@ -352,11 +350,11 @@ class Executor(ABC):
             written[image.name] = self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
         return written
 
-    def _follow(self, kernel: PathArtifact, part: Part, arrays: Mapping[str, Memory]) -> None:
+    def _follow(self, kernel: Artifact, part: Part, arrays: Mapping[str, Memory]) -> None:
         """Start a built kernel, whose sums go to memory of [`sums_shape`], or its images to theirs."""
         self._start(kernel, self._built[kernel.digest].prepared, arrays, part.integers)
 
-    def encode(self, kernel: PlaneArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+    def encode(self, kernel: Artifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
         self._check_target(kernel)
         wanted = len(kernel.planes)
@@ -370,7 +368,7 @@ class Executor(ABC):
         self.build(kernel)
         return self._encode(kernel, np.ascontiguousarray(sums), samples)
 
-    def _encode(self, kernel: PlaneArtifact, sums: NDArray[np.float32], samples: int) -> Images:
+    def _encode(self, kernel: Artifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Run a built kernel."""
         size = sums.shape[1:]
         with self._session((size[0], size[1])), ExitStack() as made:
@@ -379,7 +377,7 @@ class Executor(ABC):
             self._turn(kernel, given, written, samples)
             return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
 
-    def _turn(self, kernel: PlaneArtifact, sums: Memory, written: Mapping[str, Memory], samples: int) -> None:
+    def _turn(self, kernel: Artifact, sums: Memory, written: Mapping[str, Memory], samples: int) -> None:
         """Start a built encoding of sums that may be larger than the images."""
         height, width = next(iter(written.values())).shape[:2]
         _, rows, stride = sums.shape
@@ -388,7 +386,7 @@ class Executor(ABC):
         built = self._built[kernel.digest]
         self._start(kernel, built.prepared, arrays, {**integers, "sample_count": samples})
 
-    def _check_target(self, artifact: Kernel) -> None:
+    def _check_target(self, artifact: Artifact) -> None:
         """Refuse a kernel in another language."""
         if artifact.target not in (self.name, *(f"{self.name}:{home}" for home in self.homes)):
             raise InputError(

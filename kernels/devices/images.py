@@ -7,20 +7,20 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.core.ir import Image
 from ...refimpl.errors import InputError
-from .kernel import Denoiser
 
 Images = Mapping[str, NDArray[np.float32]]
 """Images (H, W, C) by name."""
 
 
-def images_of(artifact: Denoiser) -> tuple[Image, ...]:
+def images_of(artifact: Artifact) -> tuple[Image, ...]:
     """Return the images that a caller gives: those of the first kernel."""
     return artifact.kernels[0].images
 
 
-def checked(artifact: Denoiser, inputs: Images) -> Images:
+def checked(artifact: Artifact, inputs: Images) -> Images:
     """Return the images in the kernel's order, contiguous, or say what is wrong with them."""
     wanted = images_of(artifact)
     if sorted(inputs) != sorted(image.name for image in wanted):
@@ -44,7 +44,7 @@ def checked(artifact: Denoiser, inputs: Images) -> Images:
     return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
 
 
-def widest(artifact: Denoiser) -> int:
+def widest(artifact: Artifact) -> int:
     """Return the most channels of an image that one of the artifact's kernels reads or writes."""
     written = [kernel.channels for kernel in artifact.kernels]
     return max(*written, *(image.channels for image in images_of(artifact)))
@@ -74,6 +74,6 @@ def _check_range(image: Image, array: NDArray[np.float32]) -> None:
     )
 
 
-def black(artifact: Denoiser, size: tuple[int, int]) -> Images:
+def black(artifact: Artifact, size: tuple[int, int]) -> Images:
     """Return black images of `size` (height, width), for the run that makes drivers finish compiling."""
     return {i.name: np.zeros((*size, i.channels), np.float32) for i in images_of(artifact)}

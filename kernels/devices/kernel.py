@@ -1,80 +1,20 @@
-"""Kernels as devices see them: what each role has, parts of a render, and arrays on a device."""
+"""What kernels are given: parts of a render, integers, and arrays on a device."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.core.ir import Image
-from ...compiler.kernel.interface import DENOISE, UNSIGNED, Interface
+from ...compiler.artifact import Artifact
+from ...compiler.kernel.interface import UNSIGNED, Interface
 from ...refimpl.errors import InputError
-
-if TYPE_CHECKING:
-    from ...compiler.scenes.path_kernel import PathArtifact
-    from ...compiler.scenes.plane_kernel import PlaneArtifact
 
 Size = tuple[int, int]
 """Height and width."""
-
-
-class Kernel(Protocol):
-    """A kernel of any role, as a device sees it."""
-
-    @property
-    def target(self) -> str:
-        """Return the name of the target."""
-
-    @property
-    def digest(self) -> str:
-        """Return the hash that names the kernel."""
-
-    @property
-    def source(self) -> str:
-        """Return the source."""
-
-    @property
-    def entry_point(self) -> str:
-        """Return the name of the kernel's function."""
-
-    @property
-    def interface(self) -> Interface:
-        """Return the arrays and integers that the kernel takes."""
-
-    @property
-    def manifest(self) -> Mapping[str, Any]:
-        """Return the manifest, as JSON's types."""
-
-    @property
-    def kernels(self) -> tuple[Kernel, ...]:
-        """Return the kernels in the order in which they run: this one, or two passes."""
-
-
-class Denoiser(Kernel, Protocol):
-    """The kernel of a network: it fills windows from images, and writes so many channels."""
-
-    @property
-    def weights(self) -> NDArray[np.float32]:
-        """Return the weights in the kernel's order."""
-
-    @property
-    def images(self) -> tuple[Image, ...]:
-        """Return the images that the window is filled from, in order."""
-
-    @property
-    def channels(self) -> int:
-        """Return the number of channels of the result."""
-
-    @property
-    def kernels(self) -> tuple[Denoiser, ...]:
-        """Return the kernels in the order in which they run: this one, or two passes."""
-
-    @property
-    def launches(self) -> tuple[Kernel, ...]:
-        """Return the launches of a kernel that is several, each with its source and entry point."""
 
 
 BATCH_TILES = 128
@@ -91,11 +31,6 @@ def batches(schedule: Mapping[str, Any], size: Size) -> tuple[int, range]:
     count = -(-tiles // -(-tiles // BATCH_TILES))
     count = -(-count // whole) * whole
     return count, range(0, tiles, count)
-
-
-def is_denoiser(kernel: Kernel) -> TypeGuard[Denoiser]:
-    """Tell whether a kernel is that of a network."""
-    return kernel.interface.role == DENOISE
 
 
 @dataclass(frozen=True)
@@ -134,10 +69,10 @@ def words(kernel: Interface, given: Mapping[str, int]) -> NDArray[np.uint32]:
     return np.array([int(n) % 2**32 for n in in_order(kernel, given)], np.uint32)
 
 
-def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> NDArray[np.float32]:
+def numbers_for(kernel: Artifact, numbers: NDArray[np.float32] | None) -> NDArray[np.float32]:
     """Return the numbers (n,) of a scene for a path kernel, those of its own scene by default."""
     if numbers is None:
-        return kernel.scene_numbers
+        return np.array(kernel.programs.values, np.float32)
     wanted = len(kernel.programs.inputs)
     if numbers.dtype != np.float32 or numbers.shape != (wanted,):
         raise InputError(
@@ -149,12 +84,12 @@ def numbers_for(kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> ND
     return numbers.copy()
 
 
-def shapes(artifact: Denoiser, size: Size) -> list[tuple[int, ...]]:
+def shapes(artifact: Artifact, size: Size) -> list[tuple[int, ...]]:
     """Return the shapes (H, W, C) of what an artifact's kernels write."""
     return [(*size, kernel.channels) for kernel in artifact.kernels]
 
 
-def plane_integers(kernel: PlaneArtifact, size: Size) -> dict[str, int]:
+def plane_integers(kernel: Artifact, size: Size) -> dict[str, int]:
     """Return a kernel's integers for an image: rows of planes are whole work items."""
     height, width = size
     return {"width": width, "height": height, "row_stride": -(-width // kernel.lanes) * kernel.lanes}

@@ -12,25 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
+from ...compiler.artifact import NONE, Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS
+from ...compiler.kernel.interface import DENOISE, IMAGE, PATH, RESULT, SCENE_NUMBERS
 from ...compiler.kernel.interface import SUMS as PATH_SUMS
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
 from .executor import Executor
-from .kernel import Kernel, Memory
+from .kernel import Memory
 from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
-
-
-NONE = np.zeros(0, np.float32)
-"""The numbers of a scene that does not move."""
 
 
 class NumpyExecutor(Executor):
@@ -43,24 +37,24 @@ class NumpyExecutor(Executor):
         super().__init__()
         self.device = f"NumPy {np.__version__}"
 
-    def _prepare(self, kernel: Kernel) -> Any:
+    def _prepare(self, kernel: Artifact) -> Any:
         """Do nothing: programs are interpreted."""
 
     def _start(
-        self, kernel: Kernel, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         held = {name: memory.held for name, memory in arrays.items()}
-        if isinstance(kernel, PathArtifact):
+        if kernel.role == PATH:
             held[PATH_SUMS][:] = _traced(kernel, integers, held.get(SCENE_NUMBERS, NONE))
-        elif isinstance(kernel, PlaneArtifact):
-            INTERPRETED[kernel.role](kernel, held, integers)
-        elif isinstance(kernel, Artifact):
+        elif kernel.role == DENOISE:
             images = [held[f"{IMAGE}{image.name}"] for image in kernel.images]
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
+        else:
+            INTERPRETED[kernel.role](kernel, held, integers)
 
 
 def _traced(
-    kernel: PathArtifact, integers: Mapping[str, int], numbers: NDArray[np.float32]
+    kernel: Artifact, integers: Mapping[str, int], numbers: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return the sums (planes, rows, width) of a part, with these numbers of the scene."""
     shape = (integers["rows"], integers["width"])
@@ -93,7 +87,7 @@ def _traced(
 
 def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np.float32]) -> None:
     """Fill the output (H, W, C) of one kernel for its images, joined."""
-    gather = kernel_gather(artifact.program)
+    gather = kernel_gather(artifact.programs)
     height, width, _ = image.shape
     padded = dataset.pad(image, gather.window, gather.axes)
     rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
@@ -102,7 +96,7 @@ def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np
         # These rows and the margin around them are all that their pixels see.
         strip = padded[top : bottom + gather.rows - 1]
         windows = dataset.all_windows(strip, gather.window, gather.axes)
-        (value,) = interpret(artifact.program, {"window": windows}).values()
+        (value,) = interpret(artifact.programs, {"window": windows}).values()
         result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value
 
 

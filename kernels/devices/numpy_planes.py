@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.artifact import Artifact
 from ...compiler.core.interpret import interpret
 from ...compiler.kernel.interface import (
     CAMERAS,
@@ -29,11 +30,10 @@ from ...compiler.scenes.lower_encode import SAMPLES, channel_name
 from ...compiler.scenes.lower_history import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
 from ...compiler.scenes.lower_smooth import GUIDED, HERE, LAYERS_READ, SPLINE, SUMS, THERE, WEIGHTS
 from ...compiler.scenes.lower_smooth import LIGHT as LIGHT_PLANES
-from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...refimpl.network import smoothing
 
 
-def _guided(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+def _guided(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
     """Fill the planes of guides and light (n, H, W) for layers (H, W, C)."""
     given = {
         f"{layer.name}_{c}": held[f"{IMAGE}{layer.name}"][..., c]
@@ -45,7 +45,7 @@ def _guided(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[st
         held[array][:] = [found[name] for name in names]
 
 
-def _encoded(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+def _encoded(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
     """Fill the images (H, W, C) of sums (P, H, W)."""
     sums = dict(zip(kernel.planes, held[SUMS_ARRAY], strict=True))
     samples = np.full(held[SUMS_ARRAY].shape[1:], integers["sample_count"], np.float32)
@@ -55,7 +55,7 @@ def _encoded(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[s
         held[f"{IMAGE}{image.name}"][:] = np.stack(channels, axis=-1)
 
 
-def _smoothed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+def _smoothed(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
     """Fill the planes of light (3, H, W) after one level."""
     programs, (_, height, width) = kernel.programs, held[LIGHT].shape
     guides = dict(zip(programs.guides, held[GUIDES], strict=True))
@@ -72,7 +72,7 @@ def _smoothed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[
     held[RESULT][:] = [found[name] for name in LIGHT_PLANES]
 
 
-def _followed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+def _followed(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
     """Fill the planes (P, H, W) of a history with one picture more."""
     programs, (_, height, width) = kernel.programs, held[PAST].shape
     motions, color = held[MOTIONS], held[f"{IMAGE}color"]
@@ -101,7 +101,7 @@ def _followed(kernel: PlaneArtifact, held: Mapping[str, Any], integers: Mapping[
     held[RESULT][:] = [here[name] for name in lower_history.PAST]
 
 
-INTERPRETED: Mapping[str, Callable[[PlaneArtifact, Mapping[str, Any], Mapping[str, int]], None]] = {
+INTERPRETED: Mapping[str, Callable[[Artifact, Mapping[str, Any], Mapping[str, int]], None]] = {
     ENCODE: _encoded,
     GUIDE: _guided,
     SMOOTH: _smoothed,

@@ -20,16 +20,15 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...compiler.kernel.interface import BLOCK, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
+from ...compiler.kernel.interface import BLOCK, DENOISE, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .images import Images, widest
-from .kernel import Denoiser, Kernel, Memory, Part, Size, in_order, is_denoiser, shapes
+from .kernel import Memory, Part, Size, in_order, shapes
 
 if TYPE_CHECKING:
-    from ...compiler.scenes.path_kernel import PathArtifact
-    from ...compiler.training.step_kernel import StepKernel
+    from ...compiler.artifact import Artifact
 
 DEVICE_VARIABLE = "WAMNET_OPENCL_DEVICE"
 """Environment variable that chooses a device where the caller does not."""
@@ -133,22 +132,20 @@ class OpenCLExecutor(Executor):
         """PoCL compiles when a kernel is first enqueued."""
         return 1, 1
 
-    def _prepare(self, kernel: Kernel) -> _Prepared:
-        if is_denoiser(kernel):
+    def _prepare(self, kernel: Artifact) -> _Prepared:
+        if kernel.role == DENOISE:
             schedule = kernel.manifest["schedule"]
             local, extent = self._local_size(kernel), (schedule["pixels"], schedule.get("rows", 1))
-        elif lanes := getattr(kernel, "lanes", 0):
-            local, extent = PATH_LOCAL_SIZE[min(lanes, 2)], (lanes, 1)
         else:
-            local, extent = LOCAL_SIZE, (1, 1)
+            local, extent = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], (kernel.lanes, 1)
         function = getattr(self._compiled(kernel.source), kernel.entry_point)
         weights = None
-        if is_denoiser(kernel):
+        if kernel.role == DENOISE:
             # An empty buffer is not a buffer.
             weights = self._copied(kernel.weights if kernel.weights.size else np.zeros(1, np.float32))
         return _Prepared(function, kernel.interface, weights, local, extent)
 
-    def check_size(self, artifact: Denoiser, size: tuple[int, int]) -> None:
+    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images that do not fit one buffer of the device, or whose indices `int` does not hold."""
         height, width = size
         most = widest(artifact)
@@ -161,7 +158,7 @@ class OpenCLExecutor(Executor):
                 "split the image, or use executor numpy",
             )
 
-    def _local_size(self, artifact: Denoiser) -> tuple[int, int]:
+    def _local_size(self, artifact: Artifact) -> tuple[int, int]:
         """Return the size of a group: smaller on a processor for kernels with large arrays."""
         if group := artifact.manifest["schedule"].get("group"):
             self._check_group(artifact.manifest)
@@ -212,7 +209,7 @@ class OpenCLExecutor(Executor):
             ) from None
 
     def _start(
-        self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         taken, (columns, rows) = prepared.interface, prepared.extent
         items = (-(-integers["width"] // columns), -(-integers[taken.rows] // rows))
@@ -220,7 +217,7 @@ class OpenCLExecutor(Executor):
         arguments = [*(held[array.name] for array in taken.arrays), *in_order(taken, integers)]
         prepared.kernel(self._queue, _whole(items, prepared.local), prepared.local, *arguments)
 
-    def sums_shape(self, kernel: PathArtifact, part: Part) -> tuple[int, int, int]:
+    def sums_shape(self, kernel: Artifact, part: Part) -> tuple[int, int, int]:
         """Return the shape of whole groups of whole vectors; numbers beyond the part mean nothing."""
         items = (-(-part.width // kernel.lanes), part.rows)
         columns, rows = _whole(items, PATH_LOCAL_SIZE[min(kernel.lanes, 2)])
@@ -285,7 +282,7 @@ class OpenCLExecutor(Executor):
         self._kept = None
 
     def kernel_seconds(
-        self, artifact: Denoiser, images: Images, clock: Callable[[], float] = time.perf_counter
+        self, artifact: Artifact, images: Images, clock: Callable[[], float] = time.perf_counter
     ) -> float:
         """Return the time of only a built artifact's kernels: images and result stay on the device."""
         size = next(iter(images.values())).shape[:2]
@@ -302,7 +299,7 @@ class OpenCLExecutor(Executor):
         self._queue.finish()
         return clock() - start
 
-    def open_trainer(self, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]) -> Any:
+    def open_trainer(self, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Build the step's kernels, and copy pictures and targets to the device: a processor."""
         if not self.trains:
             raise InputError(

@@ -17,12 +17,12 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.core.passes.gradient import TRANSPOSED
 from ...compiler.kernel.kernel import Kernel, Launch, const, substituted
 from ...compiler.kernel.sizes import integer
 from ...compiler.training.derivatives import TILE
 from ...compiler.training.step import SQUARES
-from ...compiler.training.step_kernel import StepKernel
 from ...compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from ...refimpl.errors import InputError
 
@@ -44,10 +44,10 @@ class OpenCLTrainer:
     """One training run on a device; `program` is the built source of `kernel`."""
 
     def __init__(
-        self, queue: Any, program: Any, kernel: StepKernel, values: NDArray[Any], targets: NDArray[Any]
+        self, queue: Any, program: Any, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]
     ) -> None:
-        self._queue, self._context, self._split = queue, queue.context, kernel.step.split
-        self._places, self._copies = slots(kernel.step), transposed_slots(kernel.step)
+        self._queue, self._context, self._split = queue, queue.context, kernel.programs.split
+        self._places, self._copies = slots(kernel.programs), transposed_slots(kernel.programs)
         device = queue.device
         if values.size >= INDEX_LIMIT or values.nbytes > device.max_mem_alloc_size:
             raise InputError(
@@ -56,7 +56,7 @@ class OpenCLTrainer:
                 f"the device takes fewer than {INDEX_LIMIT}, in at most {device.max_mem_alloc_size} bytes",
                 "train on fewer or smaller frames, or with executor numpy",
             )
-        self._groups = min(max(LEAST_GROUPS, device.max_compute_units), -(-kernel.step.batch // TILE))
+        self._groups = min(max(LEAST_GROUPS, device.max_compute_units), -(-kernel.programs.batch // TILE))
         self._trained = {name: slot for name, slot in self._places.items() if name != SQUARES}
         shared, sizes = [each for each in kernel.kernel.interface.both if each.name != "losses"], {}
         for array in shared:

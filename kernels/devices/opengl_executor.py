@@ -19,13 +19,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.kernel.interface import PLANES, READ, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
+from ...compiler.artifact import Artifact
+from ...compiler.kernel.interface import DENOISE, PLANES, READ, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
 from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
 from .executor import Executor
-from .kernel import Denoiser, Kernel, Memory, Size, batches, is_denoiser
+from .kernel import Memory, Size, batches
 from .registry import CONTEXT_VARIABLE
 
 CORNERS = """\
@@ -145,10 +146,10 @@ class OpenGLExecutor(Executor):
         height, width = size
         return 3 if height & (height - 1) else 2, 3 if width & (width - 1) else 2
 
-    def _prepare(self, kernel: Kernel) -> _Prepared:
+    def _prepare(self, kernel: Artifact) -> _Prepared:
         with ExitStack() as made:
             weights = None
-            if is_denoiser(kernel):
+            if kernel.role == DENOISE:
                 self._check_promise(kernel)
                 self._check_loops(kernel)
                 if {"group", "launches"} & set(kernel.manifest["schedule"]):
@@ -159,7 +160,7 @@ class OpenGLExecutor(Executor):
             made.pop_all()
             return _Prepared(program, triangle, weights, kernel.interface)
 
-    def _check_promise(self, artifact: Denoiser) -> None:
+    def _check_promise(self, artifact: Artifact) -> None:
         """Refuse a bound that the device cannot keep."""
         rounds = any(artifact.manifest["bound"]["output"] or ())
         if rounds and ORDER_EXTENSION not in self._context.extensions:
@@ -168,7 +169,7 @@ class OpenGLExecutor(Executor):
                 "profile native, which then has no bound, or executor opencl or numpy"
             )
 
-    def _check_loops(self, artifact: Denoiser) -> None:
+    def _check_loops(self, artifact: Artifact) -> None:
         """Refuse loops that Mesa's software renderer ends too early."""
         count = llvmpipe.iterations(artifact.source) if llvmpipe.NAME in self.device else 0
         if count > llvmpipe.MOST_ITERATIONS:
@@ -183,7 +184,7 @@ class OpenGLExecutor(Executor):
             if thing is not None:
                 thing.release()
 
-    def _compile_compute(self, artifact: Denoiser) -> _Prepared:
+    def _compile_compute(self, artifact: Artifact) -> _Prepared:
         """Compile a compute shader, and put the weights into a storage buffer."""
         schedule = artifact.manifest["schedule"]
         if self._context.version_code < SHADER_VERSION:
@@ -225,7 +226,7 @@ class OpenGLExecutor(Executor):
         made.callback(program.release)
         return program, self._context.vertex_array(program, [])
 
-    def _weights(self, artifact: Denoiser) -> Any:
+    def _weights(self, artifact: Artifact) -> Any:
         """Return the weights as a texture of whole rows."""
         texel = artifact.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1)
         rows = max(1, -(-artifact.weights.size // (WEIGHT_TEXTURE_WIDTH * texel)))
@@ -285,7 +286,7 @@ class OpenGLExecutor(Executor):
         self._context.finish()
 
     def _start(
-        self, kernel: Kernel, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         written = [arrays[array.name] for array in prepared.interface.arrays if array.access == WRITE]
         targets = [texture for memory in written for texture in memory.held]

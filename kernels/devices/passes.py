@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.plane_kernel import PlaneArtifact
 from .executor import Executor
 from .images import images_of
-from .kernel import Denoiser, Memory, Part, Size, numbers_for, shapes
+from .kernel import Memory, Part, Size, numbers_for, shapes
 
 PICTURE = "picture"
 """Name under which the result is read."""
@@ -29,7 +28,7 @@ PICTURE = "picture"
 class Passes:
     """Kernels with their images on a device; a context manager that gives the images back."""
 
-    def __init__(self, executor: Executor, encode: PlaneArtifact, denoise: Denoiser, size: Size) -> None:
+    def __init__(self, executor: Executor, encode: Artifact, denoise: Artifact, size: Size) -> None:
         """Keep images of `size` (height, width) on the device for these kernels."""
         for artifact in (encode, denoise):
             executor._check_target(artifact)
@@ -42,7 +41,7 @@ class Passes:
             self._written = [executor._made(RESULT, shape, made) for shape in shapes(denoise, size)]
             self._giving_back = made.pop_all()
 
-    def trace(self, kernel: PathArtifact, part: Part, numbers: NDArray[np.float32] | None = None) -> None:
+    def trace(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> None:
         """Start the paths of a part that is the whole picture, by a kernel with the encoder's planes.
 
         One that writes encoded images leaves nothing to encode. `numbers` (n,): those of the scene that are
@@ -62,7 +61,7 @@ class Passes:
                 self._sums = executor._memory(SUMS, shape)
             executor._follow(kernel, part, {SUMS: self._sums, **self._moving(kernel, numbers)})
 
-    def _moving(self, kernel: PathArtifact, numbers: NDArray[np.float32] | None) -> dict[str, Memory]:
+    def _moving(self, kernel: Artifact, numbers: NDArray[np.float32] | None) -> dict[str, Memory]:
         """Return the memory of the scene's numbers, where they are inputs; the same are not written again."""
         if not kernel.programs.inputs:
             return {}

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import GUIDES, IMAGE, LIGHT, PAST, RESULT
-from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
 from ...refimpl.network.dataset import known
 from ...refimpl.network.smoothing import LEVELS
@@ -64,7 +64,7 @@ def smoothed(
 
 
 def followed(
-    executor: Executor, kernel: PlaneArtifact, arrays: Mapping[str, NDArray[np.float32]]
+    executor: Executor, kernel: Artifact, arrays: Mapping[str, NDArray[np.float32]]
 ) -> NDArray[np.float32]:
     """Return the planes (P, H, W) that an image leaves for the next one (refimpl/light/history.py).
 
@@ -85,7 +85,7 @@ def followed(
 
 
 def _start(
-    executor: Executor, kernel: PlaneArtifact, arrays: Mapping[str, Memory], integers: Mapping[str, Any]
+    executor: Executor, kernel: Artifact, arrays: Mapping[str, Memory], integers: Mapping[str, Any]
 ) -> None:
     """Start a built kernel."""
     executor._start(kernel, executor._built[kernel.digest].prepared, arrays, integers)

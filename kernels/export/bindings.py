@@ -11,13 +11,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...compiler.artifact import MANIFEST_NAME, Artifact, manifest_text
+from ...compiler.artifact import Artifact, files_of
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
-from ...compiler.kernel.interface import BLOCK, PATH, READ, SCENE_NUMBERS, SUMS, WEIGHTS, WRITE, Interface
+from ...compiler.kernel.interface import (
+    BLOCK,
+    DENOISE,
+    PATH,
+    READ,
+    SCENE_NUMBERS,
+    SUMS,
+    WEIGHTS,
+    WRITE,
+    Interface,
+)
 from ...compiler.scenes.history_kernel import compile_history
-from ...compiler.scenes.path_kernel import PathArtifact
-from ...compiler.scenes.plane_kernel import PlaneArtifact
 from ...compiler.scenes.smooth_kernel import compile_smoothing
 from ...compiler.targets import target_named
 from ...refimpl.frame import HISTORY
@@ -45,8 +53,8 @@ def encoding(model: Model) -> str:
 def kernels(
     row: Row,
     denoiser: Artifact,
-    path: PathArtifact | None,
-    encoder: PlaneArtifact | None,
+    path: Artifact | None,
+    encoder: Artifact | None,
     passes: Mapping[str, str],
 ) -> list[dict[str, Any]]:
     """Return what a manifest says about each kernel, in the order in which they run."""
@@ -75,7 +83,7 @@ def _bound(interface: Interface) -> list[Binding]:
     ]
 
 
-def _kernel(row: Row, role: str, kernel: Artifact | PathArtifact | PlaneArtifact) -> dict[str, Any]:
+def _kernel(row: Row, role: str, kernel: Artifact) -> dict[str, Any]:
     """Return what a manifest says about one kernel."""
     files = sorted(row.files("denoise" if role == "horizontal" else role, kernel.source))
     return {
@@ -84,7 +92,7 @@ def _kernel(row: Row, role: str, kernel: Artifact | PathArtifact | PlaneArtifact
         "entry_point": row.entry or kernel.entry_point,
         "bindings": SLOTS[row.slots](kernel.interface),
         "arguments": kernel.manifest["arguments"],
-        **({"schedule": kernel.manifest["schedule"]} if isinstance(kernel, Artifact) else {}),
+        **({"schedule": kernel.manifest["schedule"]} if kernel.role == DENOISE else {}),
     }
 
 
@@ -190,7 +198,7 @@ GAPS = ", ".join(str(2**level) for level in range(LEVELS))
 class Input:
     """A kernel, its folder's name, what it does, and the features whose images it is for."""
 
-    kernel: PlaneArtifact
+    kernel: Artifact
     name: str
     does: str
     features: tuple[str, ...]
@@ -219,11 +227,7 @@ def inputs_written(inputs: Sequence[Input]) -> dict[str, bytes]:
     """Return the files of these kernels by path."""
     files: dict[str, bytes] = {}
     for each in inputs:
-        held = {
-            **each.kernel.contents(),
-            MANIFEST_NAME: manifest_text(each.kernel).encode(),
-        }
-        files |= {f"{FOLDER}/{each.name}/{name}": data for name, data in held.items()}
+        files |= {f"{FOLDER}/{each.name}/{name}": data for name, data in files_of(each.kernel).items()}
     return files
 
 

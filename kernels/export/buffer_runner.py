@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import BATCH, BLOCK, WEIGHTS, Interface
+from ...compiler.kernel.interface import BATCH, BLOCK, DENOISE, WEIGHTS, Interface
 from ...compiler.languages.glsl_buffers import GROUP
 from ..devices.executor import Executor
-from ..devices.kernel import Kernel, Memory, batches, plane_shape, words
+from ..devices.kernel import Memory, batches, plane_shape, words
 
 
 @dataclass(frozen=True)
@@ -62,22 +62,22 @@ class BufferRunner(Executor):
         self._handed_on: dict[str, Memory] = {}
 
     @abstractmethod
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         """Return a kernel, built; `group`: the threads (x, y) that wait for each other, if any do."""
 
     @abstractmethod
     def _launch(self, built: Any, launch: Launch) -> None:
         """Start a kernel."""
 
-    def _prepare(self, kernel: Kernel) -> Prepared:
+    def _prepare(self, kernel: Artifact) -> Prepared:
         schedule, weights = {}, None
-        if isinstance(kernel, Artifact):
+        if kernel.role == DENOISE:
             schedule = kernel.manifest["schedule"]
             whole = -kernel.weights.size % 4 or 4 * (not kernel.weights.size)
             weights = self._store(WEIGHTS, np.pad(kernel.weights, (0, whole)))
         group = schedule.get("group")
         waiting = None if group is None else (int(group[0]), int(group[1]))
-        launches = kernel.launches if isinstance(kernel, Artifact) else ()
+        launches = kernel.launches
         built = tuple(self._build(each, waiting) for each in launches or [kernel])
         return Prepared(built, kernel.interface, weights, schedule)
 
@@ -86,7 +86,7 @@ class BufferRunner(Executor):
             self._release(prepared.weights)
 
     def _start(
-        self, kernel: Kernel, prepared: Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
         taken, picked = prepared.interface, prepared.schedule
         held = {**arrays, WEIGHTS: prepared.weights} if prepared.weights else arrays

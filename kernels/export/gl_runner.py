@@ -16,11 +16,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK
 from ...compiler.languages.glsl import SHADER_VERSION
 from ...compiler.languages.glsl_es import VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.kernel import Kernel, Memory, Size
+from ..devices.kernel import Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor
 from .buffer_runner import BufferRunner, Launch, Prepared
 
@@ -54,7 +55,7 @@ class ComputeRunner(BufferRunner):
         with self._context:
             yield
 
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         try:
             return self._context.compute_shader(kernel.source)
         except moderngl.Error as error:

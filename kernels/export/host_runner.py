@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK, BOTH, PATH, TABLE, UNSIGNED, Array, Interface
 from ...compiler.languages.c import whole
 from ...refimpl.errors import ExecutorUnavailable
-from ..devices.kernel import Kernel
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 
@@ -165,11 +165,11 @@ class HostRunner(BufferRunner):
             raise
         self.device = " ".join(told.split()[:4])
 
-    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
         """Return the text that is compiled, with a function `wamnet_call`."""
         raise NotImplementedError
 
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
         folder.mkdir()
@@ -217,7 +217,7 @@ class CRunner(HostRunner):
     suffix = ".c"
     options = ("-std=c99",)
 
-    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
         arrays, integers = _arrays(kernel.interface), _integers(kernel.interface)
         call = f"{whole(kernel.entry_point)}({', '.join([*arrays, *integers])});"
         if kernel.interface.role == PATH:
@@ -235,7 +235,7 @@ class CUDARunner(HostRunner):
 
     name = "cuda"
 
-    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
         arguments = [*_arrays(kernel.interface), *_integers(kernel.interface)]
         call = f"{kernel.entry_point}({', '.join(arguments)});"
         if group is None:
@@ -253,7 +253,7 @@ class MetalRunner(HostRunner):
     name = "metal"
     options = ("-std=c++20", "-pthread", "-Wno-attributes")
 
-    def _glue(self, kernel: Kernel, group: tuple[int, int] | None, folder: Path) -> str:
+    def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
         (folder / "metal_stdlib").write_text(METAL_SHIM, encoding="utf-8")
         arrays = _arrays(kernel.interface, kernel.interface.by_number())
         arguments = ["*(const Size *)sizes", *arrays]

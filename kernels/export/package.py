@@ -31,8 +31,7 @@ from ...compiler.scenes.encode_kernel import compile_encode
 from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
-from ...compiler.scenes.plane_kernel import PlaneArtifact
+from ...compiler.scenes.path_kernel import compile_path, forms_of
 from ...compiler.schedules.names import remedy
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError, choice
@@ -98,8 +97,8 @@ class Export:
     files: Mapping[str, bytes]
     manifest: Mapping[str, Any]
     denoiser: Artifact | None
-    path: PathArtifact | None
-    encoder: PlaneArtifact | None
+    path: Artifact | None
+    encoder: Artifact | None
     passes: Mapping[str, str]
     pair: check_pair.Pair
 
@@ -231,8 +230,8 @@ def _finished(
     facts: Mapping[str, Any],
     files: Mapping[str, bytes],
     denoiser: Artifact | None,
-    path: PathArtifact | None,
-    encoder: PlaneArtifact | None,
+    path: Artifact | None,
+    encoder: Artifact | None,
     passes: Mapping[str, str],
     pair: check_pair.Pair,
 ) -> Export:
@@ -371,7 +370,7 @@ def _limits(request: Request, row: Row, place: Place, denoiser: Artifact) -> lis
     """Return the limits that an export keeps, or refuse it."""
     found = []
     for kernel in denoiser.kernels:
-        count = sum(array.size for array in weight_layout.weights(kernel.program).values())
+        count = sum(array.size for array in weight_layout.weights(kernel.programs).values())
         found += _check(place.limit, place.each * count, row.name)
         picked = kernel.manifest["schedule"]
         if "reason" in picked and request.schedule:
@@ -380,7 +379,7 @@ def _limits(request: Request, row: Row, place: Place, denoiser: Artifact) -> lis
         if picked["name"] not in place.schedules:
             rule = f"is not possible for this model: {picked['reason']}"
             raise InputError("--weights", "inline", rule, "choose another with --weights")
-        gather = kernel.program.gather
+        gather = kernel.programs.gather
         assert gather is not None, "kernels have windows"
         found += _check(row.most_images, len(gather.images), row.name)
         found += _check(row.source, len(kernel.source), row.name)
@@ -396,10 +395,9 @@ def _folders(denoiser: Artifact) -> list[tuple[Artifact, str]]:
     return [*first, (denoiser, "denoise")]
 
 
-def _written(kernel: artifacts.Files, folder: str) -> dict[str, bytes]:
+def _written(kernel: Artifact, folder: str) -> dict[str, bytes]:
     """Return the files that `wamnet compile` would write, in a folder."""
-    held = {**kernel.contents(), artifacts.MANIFEST_NAME: artifacts.manifest_text(kernel).encode()}
-    return {f"{folder}/{name}": data for name, data in held.items()}
+    return {f"{folder}/{name}": data for name, data in artifacts.files_of(kernel).items()}
 
 
 def _programs(request: Request, row: Row) -> PathPrograms | None:
@@ -425,7 +423,7 @@ def _usual(row: Row) -> str:
 
 def _of_scene(
     request: Request, row: Row, programs: PathPrograms | None
-) -> tuple[PathArtifact | None, PlaneArtifact | None, Mapping[str, str]]:
+) -> tuple[Artifact | None, Artifact | None, Mapping[str, str]]:
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}

@@ -105,7 +105,7 @@ def _row(name: str, target: str, made: Artifact) -> str:
         name,
         f"[{target}]({name}/{target}/{made.source_name})",
         f"{len(made.source.encode()) / 1000:.1f} kB",
-        f"{products_of(made.program):,}",
+        f"{products_of(made.programs):,}",
         schedule,
         f"[{max(made.certificate['bound']['output']):g}]({name}/{target}/{CERTIFICATE_NAME})",
         f"yes, as {made.manifest['language'].partition(',')[0]}" if is_read(made.manifest) else "no",

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.kernel import Kernel
 from .buffer_runner import BufferRunner, Launch
 from .wgpu_runner import UNIFORM_BYTES, declared
 
@@ -215,7 +215,7 @@ class TintRunner(BufferRunner):
             raise CompileError(f"{self.device} rejects the kernel: {' '.join(told['error'].split())}")
         return told
 
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         built = {
             "source": kernel.source,
             "entry": kernel.entry_point,

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK, WEIGHTS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from ..devices.kernel import Kernel, Memory
+from ..devices.kernel import Memory
 from . import tools
 from .buffer_runner import BufferRunner, Launch
 
@@ -48,7 +49,7 @@ def declared(source: str) -> dict[int, str]:
     return {int(m[1] or m[3]): KINDS[m[2] or m[4]] for m in DECLARED.finditer(source)}
 
 
-def bound(kernel: Kernel) -> dict[int, str]:
+def bound(kernel: Artifact) -> dict[int, str]:
     """Return the kinds of the buffers that are bound: of one of several launches those of its own arrays."""
     kinds = declared(kernel.source)
     arrays = kernel.manifest.get("schedule", {}).get("arrays")
@@ -83,7 +84,7 @@ class WgpuRunner(BufferRunner):
         self.device = f"{adapter.info['device']}, {adapter.info['backend_type']}"
         self._translate = translate
 
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         code, kinds = self._translate(kernel.source), bound(kernel)
         try:
             module = self._device.create_shader_module(code=code)

@@ -25,11 +25,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.proof import ranges
 from ...compiler.proof.ranges import Arithmetic, Range
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path, forms_of
 from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
@@ -59,7 +60,7 @@ PATHS_AT_ONCE = 1 << 13
 State = dict[str, NDArray[Any]]
 """Values of paths (P,) by the names of programs, and `alive`."""
 
-Build = Callable[[PathPrograms, Executor], PathArtifact]
+Build = Callable[[PathPrograms, Executor], Artifact]
 """Makes the kernel that reports the states; tests put a wrong one in its place."""
 
 
@@ -146,7 +147,7 @@ class PathReport:
 # ---- paths ------------------------------------------------------------------------------------------------
 
 
-def kernel_of_states(programs: PathPrograms, executor: Executor) -> PathArtifact:
+def kernel_of_states(programs: PathPrograms, executor: Executor) -> Artifact:
     """Return the kernel that follows paths to the programs' depth and tells their state."""
     return compile_path(programs, executor.name, "ieee", executor.lanes, tuple(END))
 

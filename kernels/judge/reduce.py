@@ -36,9 +36,6 @@ MOST_RUNS = 80
 MOST_FAILURES = 16
 """The same for kernels that crash, or never answer: each costs a process."""
 
-MOST_NEURONS = 32
-"""Neurons of a stage in one kernel where a target's images have any number of channels."""
-
 
 @dataclass(frozen=True)
 class Box:
@@ -177,7 +174,7 @@ def first_stage(
     compiled: Compile = compile_plan,
 ) -> tuple[Stage, Verdict] | None:
     """Return the first stage whose kernel deviates on images (H, W, C), or None if none does by itself."""
-    most = target_named(runner.target).most or MOST_NEURONS
+    most = target_named(runner.target).dialect.max_output_channels
     size = next(iter(images.values())).shape[:2]
     for stage in stages(model.siren, most):
         program = stage_program(model, stage)

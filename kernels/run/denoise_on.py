@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import schedule_text
+from ...compiler.artifact import Artifact, schedule_text
 from ...compiler.kernel.interface import FULL, PLAIN
 from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
@@ -30,7 +30,6 @@ from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
 from ..devices.executor import Executor
 from ..devices.images import Images
-from ..devices.kernel import Denoiser as Kernel
 from ..devices.kernel import Size
 from ..devices.planes import smoothed
 from ..memory import keep_freed_memory
@@ -38,7 +37,6 @@ from .kept import kept_kernels
 from .tune import Subject, pick
 
 if TYPE_CHECKING:
-    from ...compiler.artifact import Artifact
     from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
     from ...compiler.scenes.smooth_kernel import SmoothKernels
@@ -168,7 +166,7 @@ class Denoiser:
     model: Model = field(init=False)
     plan: Plan | None = field(init=False, default=None)
     seconds_planned: float = field(init=False)
-    ready: dict[Size, tuple[Kernel, str]] = field(init=False, default_factory=dict)
+    ready: dict[Size, tuple[Artifact, str]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Plan the network where a variant changes it, or its plan is needed."""
@@ -186,7 +184,7 @@ class Denoiser:
         plan = plan_model(self.full, self.executor.name, self.profile, self.schedule or PLAIN, self.variant)
         return replace(plan, proves=not self.keeps)
 
-    def kernel(self, size: Size) -> tuple[Kernel, str]:
+    def kernel(self, size: Size) -> tuple[Artifact, str]:
         """Return the kernel for frames of `size` (height, width), built, and why it has this schedule."""
         if size not in self.ready:
             self.ready[size] = self._kernel(size)
@@ -195,7 +193,7 @@ class Denoiser:
         self.executor.build(kernel, size)
         return kernel, reason
 
-    def _kernel(self, size: Size) -> tuple[Kernel, str]:
+    def _kernel(self, size: Size) -> tuple[Artifact, str]:
         """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
@@ -207,7 +205,7 @@ class Denoiser:
         parts = (digest, self.executor.name, self.profile, self.variant, name)
         return kept_kernels("kernel", parts, lambda: self._compiled(name))[0], reason
 
-    def _compiled(self, schedule: str) -> Sequence[Kernel]:
+    def _compiled(self, schedule: str) -> Sequence[Artifact]:
         """Return the kernel, compiled."""
         from ...compiler.compile import compile_plan
 
@@ -273,7 +271,7 @@ def bound_of(artifact: Artifact) -> float | None:
     return max(output) if output else None
 
 
-def _text_of(artifact: Kernel) -> str:
+def _text_of(artifact: Artifact) -> str:
     """Return what a manifest says about a variant, for a reader; nothing where it is all of the network."""
     if (found := artifact.manifest.get("variant")) is None:
         return ""

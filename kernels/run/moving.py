@@ -20,12 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.scenes.path_kernel import PathArtifact, can_move
+from ...compiler.artifact import Artifact
+from ...compiler.scenes.path_kernel import can_move
 from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 
-Compiler = Callable[[Scene, SceneInputs], PathArtifact]
+Compiler = Callable[[Scene, SceneInputs], Artifact]
 """(scene, its numbers that are inputs) -> the kernel."""
 
 
@@ -33,7 +34,7 @@ Compiler = Callable[[Scene, SceneInputs], PathArtifact]
 class Moment:
     """A kernel that draws a scene, and the scene's numbers (n,) that it is given."""
 
-    kernel: PathArtifact
+    kernel: Artifact
     numbers: NDArray[np.float32]
 
 
@@ -47,7 +48,7 @@ class _Family:
     scene: Scene
     tables: Tables
     inputs: SceneInputs
-    kernel: PathArtifact | None = None
+    kernel: Artifact | None = None
     moves: bool | None = None
 
 

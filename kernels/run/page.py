@@ -36,7 +36,7 @@ from ...compiler.plan import Expected, plan_program
 from ...compiler.scenes.encode_kernel import compile_encode
 from ...compiler.scenes.lower_encode import feature_rays, layers_of, learned_rays, planes_of, sees
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path
+from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...compiler.schedules.common import kernel_gather, output_channels
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
@@ -243,7 +243,7 @@ def path_kernel(
     profile: str,
     rays: FeatureRays | None,
     shadows: int = 0,
-) -> PathArtifact:
+) -> Artifact:
     """Return the kernel that adds up the planes of some features."""
     more = {"seen": sees(features), "rays": rays, "shadow_rays": shadows}
     programs = lower_scene(scene, settings, STATEMENTS, inputs, **more)  # type: ignore[arg-type]
@@ -293,7 +293,7 @@ def _lights(scene: Scene) -> list[dict[str, Any]]:
 
 
 def encoders(
-    features: Sequence[str], levels: int, model: Model, path: PathArtifact, profile: str
+    features: Sequence[str], levels: int, model: Model, path: Artifact, profile: str
 ) -> list[dict[str, Any]]:
     """Return the encoding as passes of at most as many features as there are colour buffers."""
     rays = path.programs.rays
@@ -349,7 +349,7 @@ def variant(
         "program": digest(program),
         "trained": {key: model.info[key] for key in TOLD if key in model.info},
         "weights": sum(kernel.weights.size for kernel in artifact.kernels),
-        "products": sum(products_of(kernel.program) for kernel in artifact.kernels),
+        "products": sum(products_of(kernel.programs) for kernel in artifact.kernels),
         "bound": bound_of(artifact),
         "passes": [_pass(kernel) for kernel in artifact.kernels],
         "check": {
@@ -376,10 +376,10 @@ def _pass(kernel: Artifact) -> dict[str, Any]:
     return {
         kind: text,
         "weights": _weights(kernel.weights),
-        "reads": [image.name for image in kernel_gather(kernel.program).images],
-        "channels": [image.channels for image in kernel_gather(kernel.program).images],
+        "reads": [image.name for image in kernel_gather(kernel.programs).images],
+        "channels": [image.channels for image in kernel_gather(kernel.programs).images],
         "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
-        "buffers": -(-output_channels(kernel.program) // 4),
+        "buffers": -(-output_channels(kernel.programs) // 4),
     }
 
 

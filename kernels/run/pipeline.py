@@ -23,12 +23,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
-from ...compiler.scenes.emit_path import FRAME_GROUPS
+from ...compiler.scenes.emit_path import FRAME_GROUPS, planes
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
 from ...compiler.scenes.lower_encode import layers_of, sees
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path, forms_of
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import NO_VALUE, InputError
@@ -128,7 +129,8 @@ class Pipeline:
             if painted
             else None
         )
-        self._whole = whole
+        groups = layers_of(self._features)
+        self._groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
         self._paths = MovingPaths(executor.name, self._compiled, self._settings, moving)
         self.set_scene(scene)
         self.encode = compile_encode(
@@ -136,7 +138,7 @@ class Pipeline:
             model.normalization,
             executor.name,
             profile,
-            self.path.planes,
+            planes(self._groups),
             model.is_whole,
             self._ray_count,
         )
@@ -149,17 +151,15 @@ class Pipeline:
         """Return the number of the features' own camera rays; 0: there are none."""
         return self._rays.count if self._rays else 0
 
-    def _compiled(self, scene: Scene, inputs: SceneInputs) -> PathArtifact:
+    def _compiled(self, scene: Scene, inputs: SceneInputs) -> Artifact:
         """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
         executor, profile = self._executor, self._profile
         seen = sees(self._features)
         forms = forms_of(executor.name)
         more = {"seen": seen, "rays": self._rays, "shadow_rays": self._shadow_rays}
         programs = lower_scene(scene, self._settings, forms, inputs, **more)  # type: ignore[arg-type]
-        groups = layers_of(self._features)
-        if self._whole:
-            groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups)))
-        kernel = compile_path(programs, executor.name, profile, executor.lanes, groups, self._encoding)
+        lanes, groups = executor.lanes, self._groups
+        kernel = compile_path(programs, executor.name, profile, lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel
 
@@ -173,7 +173,7 @@ class Pipeline:
         self.moment = self._paths.of(scene)
 
     @property
-    def path(self) -> PathArtifact:
+    def path(self) -> Artifact:
         """Return the path kernel."""
         return self.moment.kernel
 

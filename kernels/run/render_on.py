@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of, most_planes
+from ...compiler.scenes.path_kernel import compile_path, forms_of, most_planes
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import DIRECT, SEEN, Frame
@@ -78,7 +79,7 @@ class Frames:
         if key not in self._paths:
             target, lanes = executor.name, executor.lanes
 
-            def compiled(scene: Scene, inputs: SceneInputs) -> PathArtifact:
+            def compiled(scene: Scene, inputs: SceneInputs) -> Artifact:
                 programs = lower_scene(
                     scene, settings, forms_of(target), inputs, seen=job.seen, shadow_rays=job.shadow_rays
                 )
@@ -115,7 +116,7 @@ def render_on(
     if feature_job(job) is not None:
         options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
-    if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name, executor.lanes):
+    if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name):
         # The same paths twice, for layers that no kernel of this device writes at once.
         again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
         color = again(replace(job, seen=False, shadow_rays=0), on_progress=on_progress)
@@ -185,7 +186,7 @@ class Totals:
     planes: NDArray[np.float64]
 
 
-def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
+def merge(kernel: Artifact, a: Totals, b: Totals) -> Totals:
     """Return the totals over the samples of both; a may have none."""
     if not a.samples:
         return b
@@ -199,7 +200,7 @@ def merge(kernel: PathArtifact, a: Totals, b: Totals) -> Totals:
     return Totals(a.samples + b.samples, planes)
 
 
-def _render(kernel: PathArtifact, totals: Totals, names: Sequence[str], info: dict[str, str]) -> Render:
+def _render(kernel: Artifact, totals: Totals, names: Sequence[str], info: dict[str, str]) -> Render:
     """Return the means as a frame of these layers, and the variance of one sample."""
     means = dict(zip(kernel.planes, totals.planes / totals.samples, strict=True))
     layers: dict[str, Any] = {}

@@ -26,7 +26,7 @@ from ...compiler.core.profiles import profile_named
 from ...compiler.core.trace import trace
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import PathArtifact, compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path, forms_of
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, target_named
 from ...kernels.devices.executor import Executor
@@ -101,7 +101,7 @@ class OnExecutor:
             rows.append(state)
         return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
 
-    def _compile_path(self, scene: str, settings: str, profile: str) -> PathArtifact:
+    def _compile_path(self, scene: str, settings: str, profile: str) -> Artifact:
         """Return the kernel that reports the last vertex of paths."""
         stopped = Settings(**json.loads(settings))
         programs = replace(self._programs(scene, replace(stopped, max_depth=0)), settings=stopped)

@@ -36,7 +36,7 @@ def reference(place: str) -> str:
 
 def kernel_lines(profile: str, target: str = "opencl") -> list[Line]:
     kernel = compile_program(lower(MODEL, keep_places=True), target, profile)
-    return lines_of(kernel.source, {"": kernel.program})
+    return lines_of(kernel.source, {"": kernel.programs})
 
 
 def lines_under(lines: list[Line], reference_text: str) -> list[str]:

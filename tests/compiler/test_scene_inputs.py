@@ -187,7 +187,7 @@ def test_the_manifest_lists_the_numbers():
     for each in listed:
         for place in each["places"]:
             assert np.float32(each["value"]) == tables[place["table"]].reshape(-1)[place["index"]]
-    assert made.scene_numbers.tobytes() == inputs.values(scene).tobytes()
+    assert np.array(made.programs.values, np.float32).tobytes() == inputs.values(scene).tobytes()
     assert f"scene_numbers: {len(listed)} floats" in made.manifest["arguments"]
     assert f"all of the scene but {len(listed)} numbers" in made.source
     assert "numbers" not in compile_path(lower_scene(scene, SETTINGS), "c").manifest

@@ -80,7 +80,7 @@ def test_golden_source_of_factors(golden: Any) -> None:
 
 def test_factors_lie_before_the_squares() -> None:
     """Rows (dy, r) of neurons, rows k of ranks; the matrix keeps its place, and has no transposed copy."""
-    places = slots(compile_step((2 * 2 * 3, 20, 3), (1.0, 10.0), 4, 2, 5).step)
+    places = slots(compile_step((2 * 2 * 3, 20, 3), (1.0, 10.0), 4, 2, 5).programs)
     vertical, horizontal = (places[name] for name in step.factor_names("W0"))
     assert (vertical.rows, vertical.width, horizontal.rows, horizontal.width) == (2 * 5, 20, 6, 5)
     assert list(places)[-3:] == [vertical.name, horizontal.name, step.SQUARES]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.scenes.path_kernel import PathArtifact
+from wamnet.compiler.kernel.interface import PATH
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels import Pipeline, render_on
 from wamnet.kernels.run.render_on import Frames
@@ -44,7 +44,7 @@ def built(executor, monkeypatch):
     found, prepare = [], executor._prepare
 
     def prepared(kernel):
-        if isinstance(kernel, PathArtifact):
+        if kernel.role == PATH:
             found.append(kernel)
         return prepare(kernel)
 

@@ -67,8 +67,8 @@ void wamnet_run(void (*kernel)({types}), {arguments}, int across, int down)
 @pytest.fixture
 def language(monkeypatch):
     """Give the target, which is one line."""
-    target = targets._dialect_target(Items())
-    monkeypatch.setitem(targets.EXPORTED, "items", target)
+    target = targets._of(Items())
+    monkeypatch.setitem(targets.LANGUAGES, "items", target)
     return target
 
 

@@ -419,7 +419,7 @@ def test_the_first_picture_waits_for_no_proof(executor_named, model_of):
     proven = compile_plan(replace(made.plan, proves=True))
     assert proven.certificate is not None
     assert all(0 < error < 1 / 255 for error in made.manifest["bound"]["output"])
-    assert ir.digest(made.kernels[0].program) == ir.digest(proven.kernels[0].program)
+    assert ir.digest(made.kernels[0].programs) == ir.digest(proven.kernels[0].programs)
 
 
 def test_seed_samples_and_first_sample(executor, model_of):
@@ -453,7 +453,7 @@ def test_the_kernel_of_whole_frames(executor, model_of):
     kinds = {}
     for whole in (False, True):
         with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS, whole=whole) as pipeline:
-            kinds[whole] = pipeline.path.planes, pipeline.run(3, 2)
+            kinds[whole] = pipeline.encode.planes, pipeline.run(3, 2)
     assert len(kinds[False][0]) == 4
     assert set(kinds[True][0]) > set(kinds[False][0])
     same = np.all(np.abs(kinds[True][1] - kinds[False][1]) <= 1e-5, axis=-1)  # 168 u: rounding, not faults

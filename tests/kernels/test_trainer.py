@@ -18,11 +18,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statistical import SIGNIFICANCE, welch_p
 
+from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
 from wamnet.compiler.training import lower_step, step, step_kernel
-from wamnet.compiler.training.step_kernel import StepKernel, compile_step
+from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.kernels.devices.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.run import trainer
 from wamnet.kernels.run.trainer import train_on
@@ -92,7 +93,7 @@ def tensors(state: TrainState) -> list[bytes]:
     return [array.tobytes() for array in train.state_to_arrays(state)[0].values()]
 
 
-def kernel_of(recipe: Recipe) -> StepKernel:
+def kernel_of(recipe: Recipe) -> Artifact:
     omegas = recipe.omega_0_first, recipe.omega_0_hidden
     size, rank, activation = recipe.window.size, recipe.rank, recipe.activation
     return compile_step(recipe.layer_widths, omegas, recipe.batch, size, rank, activation)
@@ -102,7 +103,7 @@ def data_of(recipe: Recipe, pairs: Any = PAIRS) -> Dataset:
     return dataset.build(pairs, recipe.features, recipe.window, dataset.Normalization())
 
 
-def begin(opencl: Any, recipe: Recipe, kernel: StepKernel, state: TrainState, data: Dataset) -> Any:
+def begin(opencl: Any, recipe: Recipe, kernel: Artifact, state: TrainState, data: Dataset) -> Any:
     """Return a trainer with the state on it, and a run that draws and hands out steps."""
     device = opencl.open_trainer(kernel, data.values, data.targets)
     trainer.load(device, state)
@@ -116,9 +117,7 @@ def examples(recipe: Recipe, data: Dataset, number: int) -> tuple[Any, Any]:
 # ---- derivatives -----------------------------------------------------------------------------------------
 
 
-def gradient_excess(
-    opencl: Any, recipe: Recipe, kernel: StepKernel | None = None, pairs: Any = PAIRS
-) -> float:
+def gradient_excess(opencl: Any, recipe: Recipe, kernel: Artifact | None = None, pairs: Any = PAIRS) -> float:
     """Return the excess of the first step's sums over the bound at its examples."""
     data = data_of(recipe, pairs)
     state = train.start(recipe, dataset.Normalization(), data.digest)
@@ -126,7 +125,7 @@ def gradient_excess(
     run.enqueue(run.draw(0, 1))
     loss = run.settle()
     found = run.device.sums()
-    right = kernel_of(recipe).step
+    right = kernel_of(recipe).programs
     named = trainer.named(state.siren.weights + state.siren.biases)
     at = step.with_parameters(right, named)
     windows, targets = examples(recipe, data, 0)
@@ -193,7 +192,7 @@ def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
 # ---- Adam ------------------------------------------------------------------------------------------------
 
 
-def adam_excess(opencl: Any, kernel: StepKernel | None = None, recipe: Recipe = SMALL) -> float:
+def adam_excess(opencl: Any, kernel: Artifact | None = None, recipe: Recipe = SMALL) -> float:
     """Return the largest excess in 20 steps, each from the device's own state before it.
 
     The derivatives lie in a box around the float64 ones, as wide as their bound; the moved numbers of the
@@ -202,7 +201,7 @@ def adam_excess(opencl: Any, kernel: StepKernel | None = None, recipe: Recipe = 
     data = data_of(recipe)
     state = train.start(recipe, dataset.Normalization(), data.digest)
     run = begin(opencl, recipe, kernel or kernel_of(recipe), state, data)
-    right, program = kernel_of(recipe).step, lower_step.lower_adam()
+    right, program = kernel_of(recipe).programs, lower_step.lower_adam()
     worst, bounded = 0.0, []
     for number in range(recipe.steps):
         before = [trainer.named(arrays) for arrays in _groups(run.state(number))]

@@ -37,8 +37,8 @@ def random_step(rank=0):
     values, targets = random.uniform(-1, 1, 230), random.uniform(0, 1, (40, 3))
     target, trained, copies = (
         random.integers(0, 40, BATCH),
-        trained_of(compiled.step),
-        transposed_slots(compiled.step),
+        trained_of(compiled.programs),
+        transposed_slots(compiled.programs),
     )
     theta, m, v = (
         {key: random.uniform(low, 1, (slot.width, slot.rows)) for key, slot in trained.items()}
@@ -83,7 +83,7 @@ def factors_of(arrays):
 
 def wrong_in(compiled, arrays, examples, left):
     """Return what a step has left that is beyond its bounds, or has other bits than Adam's."""
-    traced, trained = compiled.step, trained_of(compiled.step)
+    traced, trained = compiled.programs, trained_of(compiled.programs)
     sums, places, first = summed(traced, left["sums"]), slots(traced), left["sums"].reshape(GROUPS, -1)[0]
     before, after = (
         [unpack(trained, part) for part in state.reshape(3, -1)] for state in (arrays["old"], left["moved"])

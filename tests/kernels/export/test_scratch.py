@@ -74,7 +74,7 @@ def written(folder, schedule):
 @pytest.mark.parametrize("schedule", SCHEDULES)
 def test_a_thread_of_128_kib_denoises_in_scratch_memory(tmp_path, schedule):
     made = written(tmp_path, schedule)
-    images = ["image"] * len(made.denoiser.program.gather.images)
+    images = ["image"] * len(made.denoiser.programs.gather.images)
     arguments = ", ".join([*images, "weights", "result", "WIDTH", "HEIGHT"])
     (tmp_path / "caller.c").write_text(f"#define ARGUMENTS {arguments}\n{CALLER}")
     warned = ("-Wall", "-Wextra", "-Werror", "-Wno-unused-function")

@@ -18,10 +18,8 @@ from wamnet.refimpl.light.scene import Scene
 SLACK = 2e-3
 """How far a mean may be off without a statistical reason, in the answer's largest channel: half floats of a
 picture round by 2**-11 = 5e-4; rays that leave a surface at a distance, and the curvature of an answer over a
-view of a degree, are below 1e-3 in every scene."""
-
-DISPLAY_SLACK = 0.6 / 255
-"""The same for display-encoded levels: half a level of 8 bits, and a tenth for tables of encoders."""
+view of a degree, are below 1e-3 in every scene. That of display-encoded levels is 0.6 / 255: half a level of
+8 bits, and a tenth for tables of encoders."""
 
 SIZE = 8
 """Pixels along each side of a picture: a few thousand of its paths are a mean that is nearly normal."""

@@ -51,7 +51,7 @@ def layer(name, change):
 
 def along_view(picture):
     """Return the picture with distances along the view, of the scene of layers."""
-    from wamnet_verify.layer_cases import CAMERA
+    from wamnet_verify.cases import CAMERA
 
     forward = camera.camera_basis(CAMERA).forward
     cosine = np.sum(picture["direction"] * forward, axis=-1, keepdims=True)

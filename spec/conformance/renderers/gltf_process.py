@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from . import write_blender
+from .parts import script
 
 
 def program(arguments: Sequence[str]) -> str:
@@ -26,7 +26,7 @@ def program(arguments: Sequence[str]) -> str:
         "background((0.0, 0.0, 0.0))",
         f"settings({int(size)}, {int(spp)}, {int(depth)}, True)",
     ]
-    return write_blender.HEAD + "\n".join(lines) + "\n" + write_blender.TAIL
+    return script("blender", lines)
 
 
 if __name__ == "__main__":

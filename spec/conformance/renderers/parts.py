@@ -10,8 +10,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,8 @@ from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
 from wamnet.refimpl.light.shapes.quad import light_radiance
 from wamnet.refimpl.light.shapes.shape import Vector
 
+from .case import Shot
+
 Array = NDArray[np.float64]
 
 MATTE, MIRROR, METAL, GLASS = "matte", "mirror", "metal", "glass"
@@ -30,6 +34,9 @@ MATTE, MIRROR, METAL, GLASS = "matte", "mirror", "metal", "glass"
 RINGS, SEGMENTS = 128, 256
 """Bands of a sphere of triangles from pole to pole, and around: what is between corners is at most 1.5e-4 of
 the radius below the sphere, a tenth of the slack of an answer."""
+
+APART = 1e-4
+"""Distance of the two sides of what emits on both, in its shorter edge."""
 
 FAR = 4.0
 """Half of the edges of a sky that is a surface, in the largest coordinate of what it surrounds."""
@@ -72,6 +79,21 @@ class Sheet:
         """The corners (4, 3), counter-clockwise as seen from the front."""
         u, v = self.edge_u, self.edge_v
         return np.stack([self.corner, self.corner + u, self.corner + u + v, self.corner + v])
+
+    @property
+    def normal(self) -> Array:
+        """The unit normal of the front."""
+        normal: Array = np.cross(self.edge_u, self.edge_v)
+        return normal / np.linalg.norm(normal)
+
+    @property
+    def sides(self) -> list[Sheet]:
+        """The sheet, or two of them back to back where it emits on both: for formats with a front only."""
+        if not self.look.emits or self.front:
+            return [self]
+        u, v = self.edge_u, self.edge_v
+        apart = self.normal * (0.5 * APART * min(np.linalg.norm(u), np.linalg.norm(v)))
+        return [Sheet(self.corner + apart, u, v, self.look), Sheet(self.corner - apart, v, u, self.look)]
 
 
 @dataclass(frozen=True)
@@ -138,20 +160,19 @@ def look_of(part: Any) -> Look:
 
 
 def _look(reflectance: Vector, emission: Vector, material: Material | None) -> Look:
-    """Return the look of a surface."""
+    """Return the look of a surface; no format has a mirror, metal or glass that emits."""
+    kind = KINDS.get(type(material), MATTE)
+    if any(emission) and kind != MATTE:
+        raise NotExpressed(f"{kind} that emits")
     number = 0.0 if material is None or material.parameter is None else material.parameter
-    return Look(KINDS.get(type(material), MATTE), reflectance, emission, float(number))
+    return Look(kind, reflectance, emission, float(number))
 
 
 def meshes_of(parts: Parts) -> list[Mesh]:
-    """Return all surfaces as triangles: sheets, boxes, spheres; what emits and is not matte is refused."""
+    """Return all surfaces as triangles: sheets, boxes, spheres."""
     found = [_sheet_mesh(sheet) for sheet in parts.sheets]
     found += [_box_mesh(box, look) for box, look in parts.boxes]
-    found += [_sphere_mesh(ball, look) for ball, look in parts.spheres]
-    for mesh in found:
-        if mesh.look.emits and mesh.look.kind != MATTE:
-            raise NotExpressed(f"{mesh.look.kind} that emits")
-    return found
+    return found + [_sphere_mesh(ball, look) for ball, look in parts.spheres]
 
 
 def sky_of(scene: Scene, meshes: Iterable[Mesh]) -> list[Mesh]:
@@ -171,8 +192,7 @@ def sky_of(scene: Scene, meshes: Iterable[Mesh]) -> list[Mesh]:
 
 def _sheet_mesh(sheet: Sheet) -> Mesh:
     """Return two triangles."""
-    normal = np.cross(sheet.edge_u, sheet.edge_v)
-    normals = np.tile(normal / np.linalg.norm(normal), (4, 1))
+    normals = np.tile(sheet.normal, (4, 1))
     return _mesh(sheet.corners, normals, [(0, 1, 2), (0, 2, 3)], sheet.look, sheet.front)
 
 
@@ -243,6 +263,30 @@ def frame_of(camera: Camera) -> Array:
     right = np.cross(forward, camera.up)
     right = right / np.linalg.norm(right)
     return np.column_stack([right, np.cross(right, forward), -forward, camera.position])
+
+
+def matrix_of(camera: Camera) -> list[float]:
+    """Return right, up, back and position of a camera, the four columns of its matrix one after another."""
+    return [float(value) for value in np.vstack([frame_of(camera), (0.0, 0.0, 0.0, 1.0)]).T.ravel()]
+
+
+def request_of(shot: Shot, seed: int) -> dict[str, int]:
+    """Return what formats without words for it keep as extra data."""
+    return {"width": shot.size, "height": shot.size, "samples": shot.spp, "depth": shot.depth, "seed": seed}
+
+
+def physical(look: Look) -> tuple[float, float]:
+    """Return roughness and metalness, as materials of game engines have them; glass may have no tint."""
+    if look.kind == GLASS and any(channel != 1.0 for channel in look.reflectance):
+        raise NotExpressed("tinted glass")
+    rough = {METAL: math.sqrt(look.number), MATTE: 1.0}.get(look.kind, 0.0)
+    return rough, 1.0 if look.kind in (METAL, MIRROR) else 0.0
+
+
+def script(name: str, lines: Iterable[str]) -> str:
+    """Return a script of the folder `scripts` with the lines of a scene."""
+    whole = (Path(__file__).parent / "scripts" / f"{name}.txt").read_text(encoding="utf-8")
+    return whole.replace("# scene\n", "".join(f"{line}\n" for line in lines), 1)
 
 
 def text(values: Iterable[float], between: str = ", ") -> str:

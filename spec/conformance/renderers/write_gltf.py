@@ -23,22 +23,19 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
-
 from wamnet.refimpl.light.scene import Camera
 
 from .case import Shot
 from .parts import (
     GLASS,
     MATTE,
-    METAL,
-    MIRROR,
-    Look,
     Mesh,
     NotExpressed,
-    frame_of,
+    matrix_of,
     meshes_of,
     parts_of,
+    physical,
+    request_of,
     sky_of,
 )
 
@@ -54,9 +51,6 @@ VERTICES, CORNERS = 34962, 34963
 NEAR = 1e-4
 """Distance of the near plane; there is no far one."""
 
-WHITE = (1.0, 1.0, 1.0)
-"""Reflectance of clear glass."""
-
 
 def write(shot: Shot, seed: int) -> str:
     """Return the file of a shot for a seed; raises NotExpressed."""
@@ -67,13 +61,14 @@ def write(shot: Shot, seed: int) -> str:
     meshes += sky_of(scene, meshes)
     materials = [_material(mesh) for mesh in meshes]
     used = sorted({name for material in materials for name in material["extensions"]})
-    asked = {"width": shot.size, "height": shot.size, "samples": shot.spp, "depth": shot.depth, "seed": seed}
-    named = {"name": "camera", "camera": 0, "matrix": _matrix(scene.camera)}
+    named = {"name": "camera", "camera": 0, "matrix": matrix_of(scene.camera)}
     data = {
         "asset": {"version": "2.0", "generator": "wamnet"},
         "extensionsUsed": used,
         "scene": 0,
-        "scenes": [{"name": shot.name, "nodes": list(range(len(meshes) + 1)), "extras": asked}],
+        "scenes": [
+            {"name": shot.name, "nodes": list(range(len(meshes) + 1)), "extras": request_of(shot, seed)}
+        ],
         "nodes": [{"name": f"part {i}", "mesh": i} for i in range(len(meshes))] + [named],
         "cameras": [_camera(scene.camera)],
         "meshes": [_primitives(i) for i in range(len(meshes))],
@@ -88,11 +83,6 @@ def _camera(camera: Camera) -> dict[str, Any]:
     """Return the camera's angle of view; it looks along its own -z."""
     angle = math.radians(camera.vertical_fov_deg)
     return {"type": "perspective", "perspective": {"yfov": angle, "aspectRatio": 1.0, "znear": NEAR}}
-
-
-def _matrix(camera: Camera) -> list[float]:
-    """Return right, up, back and position, a column each."""
-    return [float(value) for value in np.vstack([frame_of(camera), (0.0, 0.0, 0.0, 1.0)]).T.ravel()]
 
 
 def _primitives(number: int) -> dict[str, Any]:
@@ -133,11 +123,11 @@ def _each(meshes: Sequence[Mesh]) -> Iterator[tuple[str, Any]]:
 def _material(mesh: Mesh) -> dict[str, Any]:
     """Return a material; a body of glass says how thick it is."""
     look = mesh.look
-    rough = {METAL: math.sqrt(look.number), MATTE: 1.0}.get(look.kind, 0.0)
+    rough, metallic = physical(look)
     found: dict[str, Any] = {
         "pbrMetallicRoughness": {
             "baseColorFactor": [*map(float, look.reflectance), 1.0],
-            "metallicFactor": 1.0 if look.kind in (METAL, MIRROR) else 0.0,
+            "metallicFactor": metallic,
             "roughnessFactor": rough,
         },
         "doubleSided": not mesh.front,
@@ -146,21 +136,15 @@ def _material(mesh: Mesh) -> dict[str, Any]:
     if look.kind == MATTE:
         found["extensions"]["KHR_materials_specular"] = {"specularFactor": 0.0}
     if look.kind == GLASS:
-        found["extensions"] |= _glass(look, mesh.thick)
+        # Without a thickness it would be a film.
+        found["extensions"] |= {
+            "KHR_materials_transmission": {"transmissionFactor": 1.0},
+            "KHR_materials_ior": {"ior": look.number},
+            "KHR_materials_volume": {"thicknessFactor": mesh.thick},
+        }
     if look.emits:
         strength = max(1.0, *look.emission)
         found["emissiveFactor"] = [channel / strength for channel in look.emission]
         if strength > 1.0:
             found["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
     return found
-
-
-def _glass(look: Look, thick: float) -> dict[str, Any]:
-    """Return what makes a body refract; without a thickness it would be a film."""
-    if tuple(look.reflectance) != WHITE:
-        raise NotExpressed("tinted glass")
-    return {
-        "KHR_materials_transmission": {"transmissionFactor": 1.0},
-        "KHR_materials_ior": {"ior": look.number},
-        "KHR_materials_volume": {"thicknessFactor": thick},
-    }

@@ -17,26 +17,10 @@ import numpy as np
 from wamnet.refimpl.light.scene import Camera
 
 from .case import Shot
-from .parts import (
-    GLASS,
-    MATTE,
-    METAL,
-    MIRROR,
-    Array,
-    Look,
-    NotExpressed,
-    Parts,
-    Sheet,
-    axes_of,
-    parts_of,
-    text,
-)
+from .parts import GLASS, MATTE, METAL, MIRROR, Array, Look, Parts, Sheet, axes_of, parts_of, text
 
 SUFFIX = ".xml"
 """Of the file's name."""
-
-APART = 1e-4
-"""Distance of the two sides of what emits on both, in its shorter edge."""
 
 LAYERS = "albedo:albedo,normal:sh_normal,depth:depth,position:position"
 """Names and kinds of arbitrary output variables."""
@@ -44,7 +28,7 @@ LAYERS = "albedo:albedo,normal:sh_normal,depth:depth,position:position"
 
 def write(shot: Shot, seed: int) -> str:
     """Return the scene file of a shot for a seed; raises NotExpressed."""
-    lines = ['<scene version="3.0.0">', *_integrator(shot), *_sensor(shot, seed)]
+    lines = ['<scene version="3.0.0">', *_integrator(shot), _sensor(shot, seed)]
     if any(shot.scene.background):
         lines += ['<emitter type="constant">', _rgb("radiance", shot.scene.background), "</emitter>"]
     lines += _shapes(parts_of(shot.scene))
@@ -53,47 +37,43 @@ def write(shot: Shot, seed: int) -> str:
 
 def _integrator(shot: Shot) -> list[str]:
     """Return how light is gathered."""
-    path = [
-        '<integrator type="path" name="image">',
-        f'<integer name="max_depth" value="{shot.depth + 1}"/>',
-        f'<integer name="rr_depth" value="{shot.depth + 2}"/>',
-        "</integrator>",
-    ]
+    path = f"""\
+<integrator type="path" name="image">
+<integer name="max_depth" value="{shot.depth + 1}"/>
+<integer name="rr_depth" value="{shot.depth + 2}"/>
+</integrator>"""
     if not shot.layers:
-        return path
-    return ['<integrator type="aov">', f'<string name="aovs" value="{LAYERS}"/>', *path, "</integrator>"]
+        return [path]
+    return ['<integrator type="aov">', f'<string name="aovs" value="{LAYERS}"/>', path, "</integrator>"]
 
 
-def _sensor(shot: Shot, seed: int) -> list[str]:
+def _sensor(shot: Shot, seed: int) -> str:
     """Return camera, film and random numbers."""
     camera: Camera = shot.scene.camera
     place = f'origin="{text(camera.position)}" target="{text(camera.look_at)}" up="{text(camera.up)}"'
-    return [
-        '<sensor type="perspective">',
-        '<string name="fov_axis" value="y"/>',
-        f'<float name="fov" value="{camera.vertical_fov_deg!r}"/>',
-        '<float name="near_clip" value="1e-4"/>',
-        f'<transform name="to_world"><lookat {place}/></transform>',
-        '<sampler type="independent">',
-        f'<integer name="sample_count" value="{shot.spp}"/>',
-        f'<integer name="seed" value="{seed}"/>',
-        "</sampler>",
-        '<film type="hdrfilm">',
-        f'<integer name="width" value="{shot.size}"/>',
-        f'<integer name="height" value="{shot.size}"/>',
-        '<string name="pixel_format" value="rgb"/>',
-        '<string name="component_format" value="float32"/>',
-        '<rfilter type="box"/>',
-        "</film>",
-        "</sensor>",
-    ]
+    return f"""\
+<sensor type="perspective">
+<string name="fov_axis" value="y"/>
+<float name="fov" value="{camera.vertical_fov_deg!r}"/>
+<float name="near_clip" value="1e-4"/>
+<transform name="to_world"><lookat {place}/></transform>
+<sampler type="independent">
+<integer name="sample_count" value="{shot.spp}"/>
+<integer name="seed" value="{seed}"/>
+</sampler>
+<film type="hdrfilm">
+<integer name="width" value="{shot.size}"/>
+<integer name="height" value="{shot.size}"/>
+<string name="pixel_format" value="rgb"/>
+<string name="component_format" value="float32"/>
+<rfilter type="box"/>
+</film>
+</sensor>"""
 
 
 def _shapes(parts: Parts) -> list[str]:
     """Return all surfaces."""
-    lines: list[str] = []
-    for sheet in parts.sheets:
-        lines += _sheet(sheet)
+    lines = [line for sheet in parts.sheets for side in sheet.sides for line in _rectangle(side)]
     for box, look in parts.boxes:
         lines += ['<shape type="cube">', _matrix(axes_of(box)), *_look(look, closed=True), "</shape>"]
     for ball, look in parts.spheres:
@@ -108,24 +88,11 @@ def _shapes(parts: Parts) -> list[str]:
     return lines
 
 
-def _sheet(sheet: Sheet) -> list[str]:
-    """Return a parallelogram, or two of them where it emits on both sides."""
-    if not sheet.look.emits or sheet.front:
-        return _rectangle(sheet.corner, sheet.edge_u, sheet.edge_v, sheet.look)
-    u, v = sheet.edge_u, sheet.edge_v
-    normal = np.cross(u, v)
-    normal = normal / np.linalg.norm(normal)
-    apart = normal * (0.5 * APART * min(np.linalg.norm(u), np.linalg.norm(v)))
-    front = _rectangle(sheet.corner + apart, u, v, sheet.look)
-    return front + _rectangle(sheet.corner - apart, v, u, sheet.look)
-
-
-def _rectangle(corner: Array, edge_u: Array, edge_v: Array, look: Look) -> list[str]:
+def _rectangle(sheet: Sheet) -> list[str]:
     """Return a parallelogram that faces the side of edge_u x edge_v; Mitsuba's is [-1, 1]^2 at z = 0."""
-    u, v = 0.5 * edge_u, 0.5 * edge_v
-    normal = np.cross(u, v)
-    columns = np.column_stack([u, v, normal / np.linalg.norm(normal), corner + u + v])
-    return ['<shape type="rectangle">', _matrix(columns), *_look(look, closed=False), "</shape>"]
+    u, v = 0.5 * sheet.edge_u, 0.5 * sheet.edge_v
+    columns = np.column_stack([u, v, sheet.normal, sheet.corner + u + v])
+    return ['<shape type="rectangle">', _matrix(columns), *_look(sheet.look, closed=False), "</shape>"]
 
 
 def _matrix(columns: Array) -> str:
@@ -136,8 +103,6 @@ def _matrix(columns: Array) -> str:
 
 def _look(look: Look, closed: bool) -> list[str]:
     """Return material and emitter of a shape."""
-    if look.emits and look.kind != MATTE:
-        raise NotExpressed(f"{look.kind} that emits")
     bsdf = _BSDFS[look.kind](look)
     if not closed and not look.emits:
         bsdf = ['<bsdf type="twosided">', *bsdf, "</bsdf>"]

@@ -18,7 +18,6 @@ Source: three.js' manual of ObjectLoader, MeshPhysicalMaterial, PerspectiveCamer
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -28,7 +27,18 @@ from wamnet.refimpl.encoding import LEVELS, srgb_decode
 from wamnet.refimpl.light.scene import Camera
 
 from .case import Shot
-from .parts import GLASS, MATTE, METAL, MIRROR, Look, Mesh, NotExpressed, frame_of, meshes_of, parts_of
+from .parts import (
+    GLASS,
+    MATTE,
+    Look,
+    Mesh,
+    NotExpressed,
+    matrix_of,
+    meshes_of,
+    parts_of,
+    physical,
+    request_of,
+)
 
 SUFFIX = ".json"
 """Of the file's name."""
@@ -58,7 +68,7 @@ PLANES = {"near": 1e-4, "far": 1e4}
 def write(shot: Shot, seed: int) -> str:
     """Return the file of a shot for a seed; raises NotExpressed."""
     meshes = meshes_of(parts_of(shot.scene))
-    asked = {"width": shot.size, "height": shot.size, "samples": shot.spp, "depth": shot.depth, "seed": seed}
+    asked = request_of(shot, seed)
     scene: dict[str, Any] = {"uuid": "scene", "type": "Scene", "name": shot.name, "userData": asked}
     data: dict[str, Any] = {
         "metadata": {"version": 4.6, "type": "Object", "generator": "wamnet"},
@@ -78,9 +88,8 @@ def write(shot: Shot, seed: int) -> str:
 
 def _camera(camera: Camera) -> dict[str, Any]:
     """Return the camera: right, up, back and position are the columns of its matrix."""
-    matrix = np.vstack([frame_of(camera), (0.0, 0.0, 0.0, 1.0)]).T.ravel()
     view = {"fov": camera.vertical_fov_deg, "aspect": 1.0, "zoom": 1.0, **PLANES}
-    return {"uuid": "camera", "type": "PerspectiveCamera", **view, "matrix": matrix.tolist()}
+    return {"uuid": "camera", "type": "PerspectiveCamera", **view, "matrix": matrix_of(camera)}
 
 
 def _sky(radiance: Sequence[float]) -> dict[str, Any]:
@@ -123,13 +132,14 @@ def _material(number: int, mesh: Mesh) -> dict[str, Any]:
     """Return a material, all of whose numbers that are not three's own are said."""
     look = mesh.look
     emissive, intensity = levels_of(look.emission)
+    rough, metallic = physical(look)
     found = {
         "uuid": f"material {number}",
         "type": "MeshPhysicalMaterial",
         "color": WHITE_LEVELS,
         "vertexColors": True,
-        "roughness": {METAL: math.sqrt(look.number), MATTE: 1.0}.get(look.kind, 0.0),
-        "metalness": 1.0 if look.kind in (METAL, MIRROR) else 0.0,
+        "roughness": rough,
+        "metalness": metallic,
         "emissive": emissive,
         "emissiveIntensity": intensity,
         "specularIntensity": 0.0 if look.kind == MATTE else 1.0,
@@ -140,8 +150,6 @@ def _material(number: int, mesh: Mesh) -> dict[str, Any]:
 
 def _glass(look: Look, thick: float) -> dict[str, Any]:
     """Return what makes a body refract."""
-    if any(channel != 1.0 for channel in look.reflectance):
-        raise NotExpressed("tinted glass")
     if look.number > LARGEST_IOR:
         raise NotExpressed(f"index above {LARGEST_IOR:.4g}")
     reflectivity = 2.5 * (look.number - 1.0) / (look.number + 1.0)

@@ -5,13 +5,15 @@
 2. A [`Shot`] is a scene and how to render it. Its camera sees so little, or its radiance is so even, that all
    pixels of a block have one expected value.
 3. A [`Question`] asks for the mean of a block of a layer; several may be about one shot. `intents` are the
-   answers of renderers that deviate on purpose, by the name of a [`Profile`].
+   answers of renderers that deviate on purpose, by profile [`PROFILES`].
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from wamnet.refimpl.light.scene import Scene
 
@@ -36,91 +38,13 @@ class Rule:
     suspects: str
 
 
-RULES: Mapping[str, Rule] = {
-    "finite": Rule("Every number of a picture is finite.", "a division by a cosine or a density of 0"),
-    "radiance": Rule(
-        "A picture holds linear radiance, neither scaled nor clipped.",
-        "display encoding or exposure in the file, a clamp, a factor pi in what a lamp emits",
-    ),
-    "display": Rule(
-        "A picture for a screen is clipped to [0, 1] and encoded by sRGB's transfer function.",
-        "a power of 2.2, encoding twice or never, a film's response curve",
-    ),
-    "one-sided": Rule("A lamp emits from its front only.", "a normal that is not compared, mesh winding"),
-    "misses": Rule(
-        "Layers are 0 where nothing is hit.", "distances of 1e10 or infinity, normals that look on"
-    ),
-    "albedo": Rule(
-        "Albedo is the surface's reflectance, of matte surfaces, metal, mirrors and glass.",
-        "only the diffuse part is written: 0 for metal and glass",
-    ),
-    "normals": Rule(
-        "Normals are unit vectors of world space on the side of the ray.",
-        "camera space, a mapping to [0, 1], the mesh's own side",
-    ),
-    "depth": Rule("Depth is the distance along the ray.", "distance along the view, 1 / z, normalised depth"),
-    "position": Rule("Position is the first hit in world space.", "camera space"),
-    "matte": Rule(
-        "A convex matte body shows its reflectance under a white sky.",
-        "a factor pi or a cosine that is lost or twice there",
-    ),
-    "direct": Rule(
-        "Direct light is reflectance / pi times the irradiance, which has a closed form.",
-        "a lost cosine or distance squared, lights that are counted twice, wrong choice between lamps",
-    ),
-    "shadow": Rule("What is hidden sends no light.", "shadow rays that end too late or too early"),
-    "mirror": Rule(
-        "A mirror shows what is in the mirrored direction, times its reflectance.",
-        "a mirrored direction about the wrong normal, too few bounces",
-    ),
-    "metal": Rule(
-        "Rough metal shows a white sky as its microscopic mirrors do.",
-        "roughness that is squared or not, another masking, compensated losses",
-    ),
-    "fresnel": Rule("Glass mirrors the share that Fresnel's equations give.", "Schlick's approximation"),
-    "snell": Rule(
-        "Glass refracts by Snell's law, and mirrors all beyond the critical angle.", "an inverse index"
-    ),
-    "glass": Rule(
-        "Clear glass loses nothing under a white sky.", "too few bounces, absorption, a lost factor"
-    ),
-    "series": Rule(
-        "In a closed room that emits 1 and reflects a, radiance is 1 / (1 - a).",
-        "too few bounces, roulette without weights, energy that is lost or made",
-    ),
-    "bright": Rule("The same holds for any unit of radiance.", "a clamp of indirect light"),
-    "caustic": Rule("Light reaches matte surfaces through glass.", "caustics that are left out"),
-    "equilibrium": Rule(
-        "Bodies that absorb nothing cannot be seen in a closed room of even radiance.",
-        "a mirror or glass that gains or loses",
-    ),
-}
+_TEXTS = json.loads(Path(__file__).with_name("rules.json").read_text(encoding="utf-8"))
+
+RULES: Mapping[str, Rule] = {name: Rule(*texts) for name, texts in _TEXTS["rules"].items()}
 """All rules by name: a later one's cases are made of what earlier ones are about."""
 
-
-@dataclass(frozen=True)
-class Profile:
-    """A deviation by intent: its name is that of answers in [`Question.intents`]."""
-
-    sentence: str
-
-
-PROFILES: Mapping[str, Profile] = {
-    "clamps": Profile("Indirect light is clamped."),
-    "no-caustics": Profile("Light that glass or mirrors bring to matte surfaces is left out."),
-    "separable-masking": Profile("Masking of rough metal is the product of both directions' own."),
-    "compensates": Profile("Rough metal gets back what single scattering loses."),
-    "schlick-metals": Profile(
-        "Colours of metal and mirrors fade to white at grazing angles by Schlick's formula."
-    ),
-    "two-sided-lamps": Profile("Lamps emit from both sides."),
-    "far-misses": Profile("Depth is at least 1e9 where nothing is hit."),
-    "depth-along-view": Profile("Depth is the distance along the view."),
-    "camera-normals": Profile("Normals are those of camera space."),
-    "white-albedo": Profile("Albedo of mirrors, metal and glass is 1."),
-    "diffuse-albedo": Profile("Albedo is that of the diffuse part: 0 of mirrors, metal and glass."),
-}
-"""Deviations by intent, by name."""
+PROFILES: Mapping[str, str] = _TEXTS["profiles"]
+"""Deviations by intent in a sentence, by the names of answers in [`Question.intents`]."""
 
 
 @dataclass(frozen=True)

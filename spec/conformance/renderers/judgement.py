@@ -249,7 +249,7 @@ def sentence_of(verdict: Verdict) -> str:
     found = f"{_numbers(verdict.mean)} and not {_numbers(verdict.answer)}"
     text = f"{verdict.question.name}: {found}. {rule.sentence}"
     if verdict.profile:
-        return f"{text} It is what profile {verdict.profile} expects: {PROFILES[verdict.profile].sentence}"
+        return f"{text} It is what profile {verdict.profile} expects: {PROFILES[verdict.profile]}"
     return f"{text} Usual reasons: {rule.suspects}."
 
 

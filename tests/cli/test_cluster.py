@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import signal
 import socket
@@ -12,7 +13,6 @@ import types
 from functools import partial
 from operator import neg
 
-import distributed
 import pytest
 
 from wamnet.cli.common import cluster
@@ -148,7 +148,7 @@ def test_a_worker_that_is_being_started_keeps_no_cluster_open(monkeypatch) -> No
     monkeypatch.setattr("distributed.Client", contextlib.nullcontext)
     with pytest.raises(InputError, match="fewer"), cluster.open_client(2, None):
         raise InputError("cluster", 2, "rule", "use fewer")
-    assert opened[0].status == distributed.Status.closed
+    assert opened[0].status == importlib.import_module("distributed").Status.closed
 
 
 def test_a_worker_without_the_package(monkeypatch) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
+from statistical import stats
 
 from wamnet.models.data import draws
 from wamnet.refimpl.errors import InputError

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
-from statistical import assert_all_plausible, chi_square_p
+from statistical import assert_all_plausible, chi_square_p, stats
 
 from wamnet.refimpl import rng
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import integrate
-from statistical import SIGNIFICANCE, chi_square_p, sidak
+from statistical import SIGNIFICANCE, chi_square_p, integrate, sidak
 
 from wamnet.refimpl import rng, vectors
 from wamnet.refimpl.light import sampling

@@ -11,9 +11,14 @@ t-test", JCGT 9(2), 2020. SciPy's distributions are the oracle of kernels/judge/
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from packages import Late
 
 from wamnet.kernels.judge.welch import sidak as sidak
+from wamnet.refimpl.light.render import Job, Render, render
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.transport import Settings
+
+stats, integrate = Late("scipy.stats", "scipy"), Late("scipy.integrate", "scipy")
 
 SIGNIFICANCE = 0.01
 """Chance of a false alarm of one test function, over all its comparisons."""
@@ -74,3 +79,49 @@ def assert_all_plausible(p_values: np.ndarray, significance: float = SIGNIFICANC
     level = sidak(significance, p_values.size)
     worst = np.min(p_values)
     assert worst >= level, f"least p-value {worst:.3g} of {p_values.size} is below {level:.3g}"
+
+
+# ---- images ----------------------------------------------------------------------------------------------
+
+BLOCK_PX = 8
+"""Side of the blocks of an image that are compared: many pixels of few samples take less than few of many."""
+
+
+def of_blocks(values: np.ndarray) -> np.ndarray:
+    """Return the means (B,) of an image's (H, W, C) blocks, over their pixels and channels."""
+    height, width = (side // BLOCK_PX for side in values.shape[:2])
+    cut = values[: height * BLOCK_PX, : width * BLOCK_PX].astype(np.float64)
+    return cut.reshape(height, BLOCK_PX, width, BLOCK_PX, -1).mean(axis=(1, 3, 4)).ravel()
+
+
+def assert_same_image(a: Render, b: Render) -> None:
+    """Fail unless two renders have the same mean: Welch's test on blocks, and a z-test on the whole image.
+
+    The variance of the channels' mean is at most the mean of their variances. Blocks that show a light, or
+    nothing, have none. The image as one number shows a bias too small for a block.
+    """
+    means, variances = ([of_blocks(x) for x in pair] for pair in zip(*map(_moments, (a, b)), strict=True))
+    counts = [BLOCK_PX**2 * int(r.frame.info["spp"]) for r in (a, b)]
+    noisy = (variances[0] > 1e-12) & (variances[1] > 1e-12)
+    assert noisy.sum() >= 12
+    parts = [x[noisy] for pair in zip(means, variances, strict=True) for x in pair]
+    assert_all_plausible(welch_p(*parts[:2], counts[0], *parts[2:], counts[1]))
+    error = np.sqrt(sum(v.mean() / n for v, n in zip(variances, counts, strict=True)) / means[0].size)
+    assert z_p(np.array(means[0].mean() - means[1].mean()), error) >= SIGNIFICANCE
+
+
+def _moments(r: Render) -> tuple[np.ndarray, np.ndarray]:
+    return r.frame["color"], r.color_variance
+
+
+STRATEGIES = (("light", "power"), ("bsdf", "power"), ("mis", "balance"))
+"""Strategies and heuristics besides the default ones."""
+
+
+def assert_strategies_agree(scene: Scene, depth: int, size: int = 64, spp: int = 8) -> None:
+    """Fail unless light samples, BSDF samples and both give the image of the default (other seeds, and
+    four times as many samples: those of the BSDF alone are rarely on a small light)."""
+    combined = render(scene, Job(size, size, spp, 3, Settings(depth)))
+    for ways in STRATEGIES:
+        other = render(scene, Job(size, size, 4 * spp, 4, Settings(depth, None, *ways)))
+        assert_same_image(combined, other)

@@ -29,6 +29,7 @@ from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path, trained_scene, unlike_training
+from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
 from ..files.alone import working_in
@@ -64,39 +65,39 @@ class Shot:
     origin: str
 
 
-SceneToShow = Annotated[
-    str | None,
-    typer.Option(
-        help="Canonical scene, or scene file (.json), which is static.",
-        show_default="the model's training scene",
-    ),
-]
-Rays = Annotated[
-    int | None,
-    typer.Option(
+@dataclass(frozen=True)
+class Film:
+    """What is rendered: times, a size, samples of the reference (0: none), and rays of the features."""
+
+    start: float = option(0.0, "Start time of the animation, in seconds.")
+    seconds: float = option(8.0, "Duration in seconds; minicubes rotate in 8 s.")
+    fps: float = option(10.0, "Frames per second.")
+    size: int = option(128, "Width and height of each image, in pixels.")
+    reference_spp: int = option(0, "Paths per pixel of a reference image shown alongside; 0 for none.")
+    seed: options.Seed = 0
+    feature_spp: int | None = option(
+        None,
+        "Stratified camera rays per pixel for the features.",
         metavar="N",
-        help="Stratified camera rays per pixel for the features.",
         show_default="equivalent to those in training",
-    ),
-]
-Output = Annotated[Path, options.output("PATH", "Output: animation (.mp4, .gif) or folder of images.")]
+    )
 
 
 def animate(
     model: options.ModelFile,
-    scene: SceneToShow = None,
-    output: Output = Path("animation"),
-    start: Annotated[float, typer.Option(help="Start time of the animation, in seconds.")] = 0.0,
-    seconds: Annotated[float, typer.Option(help="Duration in seconds; minicubes rotate in 8 s.")] = 8.0,
-    fps: Annotated[float, typer.Option(help="Frames per second.")] = 10.0,
-    size: Annotated[int, typer.Option(help="Width and height of each image, in pixels.")] = 128,
-    reference_spp: Annotated[
-        int, typer.Option(help="Paths per pixel of a reference image shown alongside; 0 for none.")
-    ] = 0,
-    seed: options.Seed = 0,
-    feature_spp: Rays = None,
-    parameters: options.Parameters = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help="Canonical scene, or scene file (.json), which is static.",
+            show_default="the model's training scene",
+        ),
+    ] = None,
+    output: Annotated[
+        Path, options.output("PATH", "Output: animation (.mp4, .gif) or folder of images.")
+    ] = Path("animation"),
     *,
+    wanted: Film,
+    parameters: options.Parameters = None,
     view: options.View,
     executor: options.Executor = "auto",
     renderer: options.Renderer = "auto",
@@ -107,22 +108,15 @@ def animate(
 
     After an interruption, the same command resumes where it stopped.
     """
-    from ...compiler.scenes.lower_encode import feature_rays
-    from ...models.data.frame_plan import animation_times
-    from ...refimpl.network.denoise import learned_shadow_rays
-
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
-    _check_names(output, model, fps)
+    _check_names(output, model, wanted.fps)
     model = model_path(model)
     network = load_model(model)
     by = chosen(executor), chosen(renderer, work="renderer")
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
-    rays = feature_rays(network) if feature_spp is None else feature_spp
     named = scene or scene_of(network), _parameters(parameters), view
-    times = animation_times(start, seconds, fps)
-    numbers = size, reference_spp, seed, rays, learned_shadow_rays(network)
-    shots = plan_shots(folder, named, times, numbers, facts, network.features)
+    shots = plan_shots(folder, named, wanted, network, facts)
     if is_film:
         check_real_folder(folder)
     missing(folder, shots)
@@ -133,7 +127,7 @@ def animate(
     ):
         made, watch = _draw(shots, folder, network, by, rank)
         if is_film:
-            _join(output, shots, fps)
+            _join(output, shots, wanted.fps)
     if is_film:
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
@@ -245,28 +239,27 @@ def cut_facts(network: Model, rank: int) -> list[str]:
 def plan_shots(
     folder: Path,
     named: tuple[str, dict[str, Any], options.View],
-    times: Sequence[float],
-    numbers: tuple[int, int, int, int, int],
+    film: Film,
+    network: Model,
     facts: Sequence[str],
-    features: Sequence[str],
 ) -> list[Shot]:
-    """Return the pictures of an animation at some times.
-
-    `named` are the scene's name, parameters and view; numbers are size, samples of the reference (or 0), seed
-    and, or 0, camera rays of the features and shadow rays of each.
-    """
-    from ...compiler.scenes.lower_encode import sees
+    """Return the pictures of an animation; `named` are the scene's name, parameters and view."""
+    from ...compiler.scenes.lower_encode import feature_rays, sees
+    from ...models.data.frame_plan import animation_times
     from ...models.data.scene_source import scene_source
     from ...refimpl.light.render import Job
     from ...refimpl.light.scene import scene_digest
+    from ...refimpl.network.denoise import learned_shadow_rays
 
-    (name, parameters, view), (size, spp, seed, rays, shadow_rays) = named, numbers
+    (name, parameters, view), size, spp = named, film.size, film.reference_spp
     source, shots = scene_source(name, parameters), []
-    features_of = {"feature_spp": rays, "seen": sees(features), "shadow_rays": shadow_rays}
-    for index, time in enumerate(times):
+    rays = feature_rays(network) if film.feature_spp is None else film.feature_spp
+    seen, shadow_rays = sees(network.features), learned_shadow_rays(network)
+    for index, time in enumerate(animation_times(film.start, film.seconds, film.fps)):
         scene = view.of(source.at(time))
-        noisy = Job(size, size, 1, seed + 2 * index, **features_of)  # type: ignore[arg-type]
-        reference = Job(size, size, spp, seed + 2 * index + 1) if spp else None
+        seed = film.seed + 2 * index
+        noisy = Job(size, size, 1, seed, feature_spp=rays, seen=seen, shadow_rays=shadow_rays)
+        reference = Job(size, size, spp, seed + 1) if spp else None
         made_from = [scene_digest(scene), noisy.facts(), reference and reference.facts(), *facts]
         text = json.dumps([*made_from, machine.versions()["wamnet"]])
         origin = hashlib.sha256(text.encode()).hexdigest()

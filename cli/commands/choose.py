@@ -9,11 +9,10 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ...refimpl.errors import NO_VALUE, InputError
+from ..common.options import option
 from ..common.request import given
 from ..common.terminal import progress, say
 
@@ -31,48 +30,35 @@ SMALLEST_PX, LARGEST_PX = 16, 4096
 class Request:
     """What a choice is asked to keep, and where its curve comes from; None for what is not given."""
 
-    max_error: Annotated[
-        float | None,
-        typer.Option(
-            metavar="E",
-            help="Choose the fastest variant whose measured error is at most E: the largest difference "
-            "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
-            show_default="no limit",
-        ),
-    ] = None
-    max_ms: Annotated[
-        float | None,
-        typer.Option(
-            metavar="T",
-            help="Choose the most accurate variant that takes at most T milliseconds on this machine.",
-            show_default="no limit",
-        ),
-    ] = None
-    max_loss_db: Annotated[
-        float | None,
-        typer.Option(
-            metavar="D",
-            help="Choose the fastest variant whose PSNR over the frames is at most D dB below the full "
-            "network's.",
-            show_default="no limit",
-        ),
-    ] = None
-    curve: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Choose from the measured points in this file (.json).",
-            show_default="measured and cached",
-        ),
-    ] = None
-    frames: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Data set; errors are measured on its test frames."),
-    ] = None
-    size: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Frame size for the times: N x N pixels.", show_default="1024"),
-    ] = None
+    max_error: float | None = option(
+        None,
+        "Choose the fastest variant whose measured error is at most E: the largest difference "
+        "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
+        metavar="E",
+        show_default="no limit",
+    )
+    max_ms: float | None = option(
+        None,
+        "Choose the most accurate variant that takes at most T milliseconds on this machine.",
+        metavar="T",
+        show_default="no limit",
+    )
+    max_loss_db: float | None = option(
+        None,
+        "Choose the fastest variant whose PSNR over the frames is at most D dB below the full network's.",
+        metavar="D",
+        show_default="no limit",
+    )
+    curve: Path | None = option(
+        None,
+        "Choose from the measured points in this file (.json).",
+        metavar="FILE",
+        show_default="measured and cached",
+    )
+    frames: Path | None = option(None, "Data set; errors are measured on its test frames.", metavar="FOLDER")
+    size: int | None = option(
+        None, "Frame size for the times: N x N pixels.", metavar="N", show_default="1024"
+    )
 
     @property
     def limited(self) -> bool:

@@ -19,7 +19,7 @@ from ...refimpl.reading import parse_json, read_file
 from ..common import options
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
-from ..common.options import Sampler, Target
+from ..common.options import Sampler, Target, option
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_parent, unwritable
@@ -53,18 +53,13 @@ class OfScene:
 
     time: options.Time = None
     parameters: options.Parameters = None
-    max_depth: Annotated[
-        int | None, typer.Option(help="Maximum number of bounces per path (scenes only).", show_default="5")
-    ] = None
-    sampler: Annotated[Sampler | None, typer.Option(help="Sampler (scenes only).", show_default="pcg4d")] = (
-        None
+    max_depth: int | None = option(
+        None, "Maximum number of bounces per path (scenes only).", show_default="5"
     )
-    lanes: Annotated[
-        int | None,
-        typer.Option(
-            help="Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
-        ),
-    ] = None
+    sampler: Sampler | None = option(None, "Sampler (scenes only).", show_default="pcg4d")
+    lanes: int | None = option(
+        None, "Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
+    )
 
     def compiled(self, name: str, target: str, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""

@@ -6,13 +6,16 @@ import math
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from ...refimpl.errors import NO_VALUE, InputError, choice
 from ..common import options
+from ..common.options import option
+from ..common.request import given
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_output, write_text
 
@@ -36,55 +39,54 @@ REFERENCE = "reference"
 """Name that stands for the reference among the executors."""
 
 
-Program = Annotated[str | None, typer.Option(metavar="CMD", help="Command that runs the program under test.")]
-Executor = Annotated[
-    str | None,
-    typer.Option(
+@dataclass(frozen=True)
+class Tested:
+    """The program under test, and what it is asked."""
+
+    program: str | None = option(None, "Command that runs the program under test.", metavar="CMD")
+    executor: str | None = option(
+        None,
+        "Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
         metavar="NAME",
-        help="Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
-    ),
-]
-Words = Annotated[
-    list[str] | None,
-    typer.Option(
+    )
+    profile: options.Profile = "ieee"
+    words: list[str] | None = option(
+        None,
+        "Run only cases whose ID contains this word, or that have this clause or flag. Repeatable.",
         "-k",
         metavar="WORD",
-        help="Run only cases whose ID contains this word, or that have this clause or flag. Repeatable.",
-    ),
-]
-Vectors = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Folder with the test vectors.", show_default="the bundled vectors"),
-]
-Track = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Store the verdicts in this file, show the differences from the last run, and fail "
+    )
+    vectors: Path | None = option(
+        None, "Folder with the test vectors.", metavar="DIR", show_default="the bundled vectors"
+    )
+    track: Path | None = option(
+        None,
+        "Store the verdicts in this file, show the differences from the last run, and fail "
         "only on regressions.",
-    ),
-]
-Timeout = Annotated[float, typer.Option(help="Timeout per answer, in seconds.")]
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write a JSON report.")]
-Junit = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a JUnit report.")]
-Write = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Regenerate the vectors from the reference and exit."),
-]
+        metavar="FILE",
+    )
+    timeout: float = option(60.0, "Timeout per answer, in seconds.")
+
+    @property
+    def again(self) -> str:
+        """Return the command that asks again; a case's id is to be added."""
+        asked = given(self, "program", "executor", "profile", "vectors", "timeout")
+        words = [
+            f"{word:g}" if isinstance(word, float) else str(word) for pair in asked.items() for word in pair
+        ]
+        return shlex.join(["wamnet", "conformance", *words, "-k"])
 
 
-def conformance(
-    program: Program = None,
-    executor: Executor = None,
-    profile: options.Profile = "ieee",
-    words: Words = None,
-    vectors: Vectors = None,
-    track: Track = None,
-    timeout: Timeout = 60.0,
-    as_json: Json = None,
-    junit: Junit = None,
-    write: Write = None,
-) -> None:
+@dataclass(frozen=True)
+class Reports:
+    """What is written of it."""
+
+    as_json: Path | None = option(None, "Write a JSON report.", "--json", metavar="FILE")
+    junit: Path | None = option(None, "Write a JUnit report.", metavar="FILE")
+    write: Path | None = option(None, "Regenerate the vectors from the reference and exit.", metavar="DIR")
+
+
+def conformance(*, tested: Tested, reports: Reports) -> None:
     """Test a program against the spec's vectors and their error bounds.
 
     The program reads one JSON request per line and writes one answer per line; spec/conformance.md has
@@ -95,23 +97,25 @@ def conformance(
     from ...spec.conformance import vectors as all_vectors
     from ...spec.conformance.case import FOLDER
 
-    if write is not None:
-        _refuse_others(write, program, executor)
-        say(f"wrote {all_vectors.write(write)} files to {write}")
+    if reports.write is not None:
+        if given(tested, "program", "executor"):
+            rule = "it makes vectors and asks nobody"
+            raise InputError("--write", str(reports.write), rule, "leave --program and --executor out")
+        say(f"wrote {all_vectors.write(reports.write)} files to {reports.write}")
         return
+    profile, track, words = tested.profile, tested.track, tested.words or ()
     profile_named(profile)
-    command = _command(program, executor)
-    _check_options(timeout, [path for path in (track, as_json, junit) if path is not None])
-    cases = run.chosen(run.read_vectors(vectors or FOLDER), words or ())
-    _check_words(cases, words or ())
+    command = _command(tested.program, tested.executor)
+    _check_options(tested.timeout, [path for path in (track, reports.as_json, reports.junit) if path])
+    cases = run.chosen(run.read_vectors(tested.vectors or FOLDER), words)
+    _check_words(cases, words)
     before = None if track is None else report.read_track(track)
-    verdicts = _asked(command, cases, profile, timeout)
-    name = program or f"executor {executor}"
-    again = _again(program, executor, profile, vectors, timeout)
-    if as_json is not None:
-        write_text(as_json, report.to_json(name, profile, verdicts, again))
-    if junit is not None:
-        write_text(junit, report.to_junit(name, verdicts, again))
+    verdicts = _asked(command, cases, profile, tested.timeout)
+    name = tested.program or f"executor {tested.executor}"
+    if reports.as_json is not None:
+        write_text(reports.as_json, report.to_json(name, profile, verdicts, tested.again))
+    if reports.junit is not None:
+        write_text(reports.junit, report.to_junit(name, verdicts, tested.again))
     _print_counts(name, profile, verdicts)
     failed = [verdict for verdict in verdicts if verdict.failed]
     if track is not None and before is not None:
@@ -120,18 +124,11 @@ def conformance(
         for change in changed:
             say(str(change))
         say(f"{len(changed)} verdicts changed since {track} was written, {len(failed)} for the worse")
-    _print_failures(failed, cases, again)
+    _print_failures(failed, cases, tested.again)
     if track is not None and (before is None or not failed):
         write_text(track, report.track_text(before, verdicts))
     if failed:
         raise typer.Exit(STATUS_FAILED)
-
-
-def _refuse_others(write: Path, program: str | None, executor: str | None) -> None:
-    """Refuse to write vectors and to ask a program in one command."""
-    if program is not None or executor is not None:
-        rule = "it makes vectors and asks nobody"
-        raise InputError("--write", str(write), rule, "leave --program and --executor out")
 
 
 def _command(program: str | None, executor: str | None) -> list[str]:
@@ -183,17 +180,6 @@ def _asked(
     total = sum(map(len, cases.values()))
     with Session(command, timeout) as session, progress("testing", total, "cases") as advance:
         return list(run.run(session, cases, profile, advance))
-
-
-def _again(
-    program: str | None, executor: str | None, profile: str, vectors: Path | None, timeout: float
-) -> str:
-    """Return the command that asks again; a case's id is to be added."""
-    who = ["--program", program] if program is not None else ["--executor", str(executor)]
-    more = ["--profile", profile] if profile != "ieee" else []
-    more += ["--vectors", str(vectors)] if vectors is not None else []
-    more += ["--timeout", f"{timeout:g}"] if timeout != 60.0 else []
-    return shlex.join(["wamnet", "conformance", *who, *more, "-k"])
 
 
 def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:

@@ -25,7 +25,7 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
-from ..common.request import option_of
+from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
@@ -72,26 +72,19 @@ FromBlender = Annotated[
 class Frames:
     """The fields of a request that mean the same for a scene and for a Blender file."""
 
-    frames: Annotated[int, typer.Option(help="Number of training frames.")] = 8
-    test_frames: Annotated[
-        int, typer.Option("--test", help="Number of test frames, sampled separately within the same ranges.")
-    ] = 2
-    outside_frames: Annotated[
-        int,
-        typer.Option(
-            "--outside",
-            help="Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
-            "--yaw, or beyond --saturation.",
-        ),
-    ] = 0
-    spp: Annotated[int, typer.Option(help="Paths per pixel of each target; noisy frames have 1.")] = 64
-    test_spp: Annotated[
-        int, typer.Option(help="Paths per pixel of each test target.", show_default="same as --spp")
-    ] = 0
-    arc_s: Annotated[
-        float,
-        typer.Option("--arc", help="Seconds at the end of the animation to hold out from training."),
-    ] = 0.0
+    frames: int = option(8, "Number of training frames.")
+    test_frames: int = option(
+        2, "Number of test frames, sampled separately within the same ranges.", "--test"
+    )
+    outside_frames: int = option(
+        0,
+        "Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
+        "--yaw, or beyond --saturation.",
+        "--outside",
+    )
+    spp: int = option(64, "Paths per pixel of each target; noisy frames have 1.")
+    test_spp: int = option(0, "Paths per pixel of each test target.", show_default="same as --spp")
+    arc_s: float = option(0.0, "Seconds at the end of the animation to hold out from training.", "--arc")
     seed: options.Seed = 0
 
 
@@ -99,39 +92,26 @@ class Frames:
 class Ranges:
     """What frames of a scene draw their cameras and lights from, as texts."""
 
-    yaw_deg: Annotated[
-        str, typer.Option("--yaw", metavar=LIMITS, help="Range of camera orbit angles, in degrees.")
-    ] = "0:0"
-    pitch_deg: Annotated[
-        str, typer.Option("--pitch", metavar=LIMITS, help="Range of camera elevation angles, in degrees.")
-    ] = "0:0"
-    distance: Annotated[
-        str,
-        typer.Option("--distance", metavar=LIMITS, help="Range of factors applied to the camera distance."),
-    ] = "1:1"
-    saturation: Annotated[
-        str | None,
-        typer.Option(
-            "--saturation",
-            metavar=LIMITS,
-            help="Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
-            show_default="the scene's colours",
-        ),
-    ] = None
-    power: Annotated[
-        str | None,
-        typer.Option(
-            "--power",
-            metavar=LIMITS,
-            help="Range of factors applied to each light's power.",
-            show_default="the scene's powers",
-        ),
-    ] = None
+    yaw_deg: str = option("0:0", "Range of camera orbit angles, in degrees.", "--yaw", metavar=LIMITS)
+    pitch_deg: str = option("0:0", "Range of camera elevation angles, in degrees.", "--pitch", metavar=LIMITS)
+    distance: str = option("1:1", "Range of factors applied to the camera distance.", metavar=LIMITS)
+    saturation: str | None = option(
+        None,
+        "Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
+        metavar=LIMITS,
+        show_default="the scene's colours",
+    )
+    power: str | None = option(
+        None,
+        "Range of factors applied to each light's power.",
+        metavar=LIMITS,
+        show_default="the scene's powers",
+    )
 
     def limits(self) -> dict[str, tuple[float, float] | None]:
         """Return the ranges by field; None for the scene's own colours and powers."""
         return {
-            name: None if text is None else options.parse_limits(option_of(Ranges, name), text)
+            name: None if text is None else options.parse_limits(f"--{name.removesuffix('_deg')}", text)
             for name, text in vars(self).items()
         }
 
@@ -140,22 +120,18 @@ class Ranges:
 class OfScene:
     """Further fields of a request that only a scene has."""
 
-    size_px: Annotated[int, typer.Option("--size", help="Width and height in pixels.")] = 64
+    size_px: int = option(64, "Width and height in pixels.", "--size")
     feature_spp: options.FeatureSpp = 0
     seen: options.Seen = False
     shadow_rays: options.ShadowRays = 0
-    start_s: Annotated[float, typer.Option("--start", help="Start time of the animation, in seconds.")] = 0.0
-    seconds: Annotated[
-        float, typer.Option(help="Duration of the animation, in seconds; minicubes rotate in 8 s.")
-    ] = 8.0
-    before: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
-        ),
-    ] = 0
-    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5
+    start_s: float = option(0.0, "Start time of the animation, in seconds.", "--start")
+    seconds: float = option(8.0, "Duration of the animation, in seconds; minicubes rotate in 8 s.")
+    before: int = option(
+        0,
+        "Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
+        metavar="N",
+    )
+    max_depth: int = option(5, "Maximum number of bounces per path.")
     executor: options.Renderer = "auto"
     sampler: options.SamplerName = "pcg4d"
 
@@ -164,22 +140,17 @@ class OfScene:
 class OfBlender:
     """What means nothing without --from-blender."""
 
-    noisy_spp: Annotated[int, typer.Option(help="Paths per pixel of a noisy Blender frame.")] = 1
-    percent: Annotated[int, typer.Option(help="Percentage of the Blender file's render resolution.")] = 100
-    view_layer: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME", help="View layer of the Blender file to render.", show_default="the only one"
-        ),
-    ] = ""
-    blender: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PROGRAM",
-            help="Path of the Blender program.",
-            show_default="the bpy package, or blender on the PATH",
-        ),
-    ] = None
+    noisy_spp: int = option(1, "Paths per pixel of a noisy Blender frame.")
+    percent: int = option(100, "Percentage of the Blender file's render resolution.")
+    view_layer: str = option(
+        "", "View layer of the Blender file to render.", metavar="NAME", show_default="the only one"
+    )
+    blender: str | None = option(
+        None,
+        "Path of the Blender program.",
+        metavar="PROGRAM",
+        show_default="the bpy package, or blender on the PATH",
+    )
 
 
 OF_SCHEDULER = "the scheduler's workers may have no other"

@@ -23,7 +23,7 @@ from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
-from ..common.options import ExecutorName
+from ..common.options import ExecutorName, option
 from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
@@ -51,26 +51,20 @@ EXECUTORS_EXAMPLES = """Example:
 wamnet executors"""
 """Shown below the help of `wamnet executors`."""
 
-KeepLayers = Annotated[
-    bool,
-    typer.Option(
-        "--keep-layers", help="Also copy all layers of FRAME, and write the result as layer wamnet."
-    ),
-]
-ViewLayer = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME", help="View, part or view layer of FRAME to denoise.", show_default="the first view"
-    ),
-]
-Output = Annotated[
-    Path,
-    options.output(
-        "FILE",
-        "Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
-        "folder or a pattern with %04d for the frame number.",
-    ),
-]
+
+@dataclass(frozen=True)
+class Layers:
+    """What of a frame is read and kept."""
+
+    anyway: bool = option(
+        False, "Denoise frames of other programs even if they lie outside the training domain.", "--anyway"
+    )
+    keep_layers: bool = option(
+        False, "Also copy all layers of FRAME, and write the result as layer wamnet.", "--keep-layers"
+    )
+    view_layer: str = option(
+        "", "View, part or view layer of FRAME to denoise.", metavar="NAME", show_default="the first view"
+    )
 
 
 @dataclass
@@ -97,20 +91,18 @@ class Job:
 
     denoiser: Denoiser
     notes: Notes
-    anyway: bool
-    keep_layers: bool
-    view_layer: str
+    layers: Layers
 
     def read(self, path: Path) -> tuple[Frame, Images]:
         """Return a frame and its encoded features, or refuse it."""
         from ..files import exr
 
         model = self.denoiser.full
-        noisy = exr.read_frame(path, False, self.notes.add, self.view_layer)
+        noisy = exr.read_frame(path, False, self.notes.add, self.layers.view_layer)
         because, remedy = "the model was trained with it", "render or export that layer too"
-        exr.need_layers(path, noisy, model.features, because, remedy, self.view_layer)
+        exr.need_layers(path, noisy, model.features, because, remedy, self.layers.view_layer)
         _note_what_is_no_number(path, noisy, model, self.notes)
-        check_domain(path, noisy, model, self.anyway, self.notes.add)
+        check_domain(path, noisy, model, self.layers.anyway, self.notes.add)
         return noisy, self.denoiser.images(noisy)
 
     def write(self, output: Path, source: Path, encoded: Any, origin: str) -> None:
@@ -123,7 +115,9 @@ class Job:
             return
         linear = from_display(encoded, self.denoiser.full.normalization.exposure_stops)
         facts = {"denoised": "true", **({exr.ORIGIN: origin} if origin else {})}
-        layer = exr.write_denoised(output, source, linear, self.view_layer, self.keep_layers, **facts)
+        layer = exr.write_denoised(
+            output, source, linear, self.layers.view_layer, self.layers.keep_layers, **facts
+        )
         if layer:
             self.notes.add(f"{output}: layer {layer} is the denoised image")
 
@@ -138,19 +132,19 @@ def denoise(
             "shot.%04d.exr are sequences.",
         ),
     ],
-    output: Output = Path("denoised.png"),
+    output: Annotated[
+        Path,
+        options.output(
+            "FILE",
+            "Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
+            "folder or a pattern with %04d for the frame number.",
+        ),
+    ] = Path("denoised.png"),
     executor: options.Executor = "auto",
     *,
     kernel: KernelRequest,
     rank: options.CutRank = 0,
-    anyway: Annotated[
-        bool,
-        typer.Option(
-            "--anyway", help="Denoise frames of other programs even if they lie outside the training domain."
-        ),
-    ] = False,
-    keep_layers: KeepLayers = False,
-    view_layer: ViewLayer = "",
+    layers: Layers,
     context: options.OpenGLContext = None,
 ) -> None:
     """Denoise frames with a trained model.
@@ -165,21 +159,20 @@ def denoise(
 
     paths = frames_of(frames)
     outputs = outputs_of(paths, output)
-    many, suffixes = is_many(paths, output), (".exr",) if keep_layers else (".exr", ".png")
+    many, suffixes = is_many(paths, output), (".exr",) if layers.keep_layers else (".exr", ".png")
     if many:
         outputs[0].parent.mkdir(parents=True, exist_ok=True)
     for result in outputs:
         check_output(result, suffixes, [model, *paths])
     network, notes = load_model(model), Notes()
-    cut, name = kernel.network(rank), chosen(executor)
-    profile, schedule = kernel.profile, kernel.schedule
+    how = kernel.profile, kernel.schedule, kernel.network(rank)
+    name = chosen(executor)
     with open_executor(name) as runner:
-        denoiser = Denoiser(runner, network, profile, schedule, cut, len(paths), keeps=True)
-        job = Job(denoiser, notes, anyway, keep_layers, view_layer)
+        job = Job(Denoiser(runner, network, *how, len(paths), keeps=True), notes, layers)
         if many:
-            how = [name, profile, schedule, cut, keep_layers, view_layer]
+            made_by = [name, *how, layers.keep_layers, layers.view_layer]
             content = hashlib.sha256(model_path(model).read_bytes()).hexdigest()
-            _denoise_all(job, paths, outputs, output, _digest(content, *how))
+            _denoise_all(job, paths, outputs, output, _digest(content, *made_by))
         else:
             _denoise_one(job, paths[0], output)
 

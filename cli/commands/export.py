@@ -11,6 +11,7 @@ import typer
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.inputs import load_model, load_scene
+from ..common.options import option
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_new_folder, making_folder
@@ -48,9 +49,6 @@ HOSTS = (
 HTML, PAGE_NAME = "html", "index.html"
 """The target that is a web page, and its file."""
 
-DEPTH = 5
-"""Bounces of a path, if nobody asks for another number."""
-
 SECONDS, FPS = 8.0, 10.0
 """Length of a table of times, and times a second, if nobody asks for others."""
 
@@ -58,74 +56,48 @@ STATUS_WRONG = 1
 """Exit status when an export was written, and what runs it here finds it off, or refuses it."""
 
 
-Checked = Annotated[
-    bool,
-    typer.Option(
-        "--check", help="Compile and run the export here, and compare its output with the reference."
-    ),
-]
-Measured = Annotated[
-    bool,
-    typer.Option("--measure", help="Measure the time per frame on this machine and report it in the README."),
-]
-
-
 @dataclass(frozen=True)
 class Kernel(KernelRequest):
     """How the denoiser is compiled, for another machine than this one."""
 
-    schedule: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
-            show_default="the fastest for this target and model",
-        ),
-    ] = None
-    weights: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PLACE",
-            help="Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
-            show_default="the target's default",
-        ),
-    ] = None
+    schedule: str | None = option(
+        None,
+        "Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
+        metavar="NAME",
+        show_default="the fastest for this target and model",
+    )
+    weights: str | None = option(
+        None,
+        "Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
+        metavar="PLACE",
+        show_default="the target's default",
+    )
 
 
 @dataclass(frozen=True)
 class Shown:
     """The scene whose path tracer comes along, and what of it moves."""
 
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SCENE",
-            help="Also export the path tracer for this scene: a canonical scene or a file (.json).",
-            show_default="denoiser only",
-        ),
-    ] = None
+    scene: str | None = option(
+        None,
+        "Also export the path tracer for this scene: a canonical scene or a file (.json).",
+        metavar="SCENE",
+        show_default="denoiser only",
+    )
     time: options.Time = None
     parameters: options.Parameters = None
-    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = DEPTH
+    max_depth: int = option(5, "Maximum number of bounces per path.")
     sampler: options.SamplerName = "pcg4d"
-    moving: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LIST",
-            help="Scene parameters to pass at run time instead of baking in: time, camera, lights, "
-            "positions.",
-            show_default="none: the scene is baked in",
-        ),
-    ] = None
-    seconds: Annotated[
-        float | None,
-        typer.Option(
-            help="Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"
-        ),
-    ] = None
-    fps: Annotated[float | None, typer.Option(help="Table entries per second.", show_default=f"{FPS:g}")] = (
-        None
+    moving: str | None = option(
+        None,
+        "Scene parameters to pass at run time instead of baking in: time, camera, lights, positions.",
+        metavar="LIST",
+        show_default="none: the scene is baked in",
     )
+    seconds: float | None = option(
+        None, "Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"
+    )
+    fps: float | None = option(None, "Table entries per second.", show_default=f"{FPS:g}")
 
     def check(self) -> None:
         """Refuse options that mean nothing without others."""
@@ -161,26 +133,50 @@ class Shown:
         return Motion(tuple(times), tuple(map(self.at, times)), kinds)
 
 
+@dataclass(frozen=True)
+class Into:
+    """What is exported for; one of the two is needed."""
+
+    target: str | None = option(
+        None, f"Target language or format: {TARGETS}.", metavar="NAME", show_default="the host's target"
+    )
+    host: str | None = option(
+        None, f"Complete host program to generate: {HOSTS}.", metavar="NAME", show_default="none"
+    )
+
+    @property
+    def language(self) -> str:
+        """Return the target that is named, or that of a host."""
+        if self.host is not None:
+            from ...kernels.export.hosts.table import host_named
+
+            return self.target or host_named(self.host).target
+        if self.target is None:
+            rule = "one of them is needed"
+            raise InputError("--target or --host", NO_VALUE, rule, "--help lists their values")
+        return self.target
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What is done with an export here."""
+
+    check: bool = option(
+        False, "Compile and run the export here, and compare its output with the reference.", "--check"
+    )
+    measure: bool = option(
+        False, "Measure the time per frame on this machine and report it in the README.", "--measure"
+    )
+
+
 def export(
     model: options.ModelFile,
-    target: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help=f"Target language or format: {TARGETS}.", show_default="the host's target"
-        ),
-    ] = None,
-    host: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help=f"Complete host program to generate: {HOSTS}.", show_default="none"
-        ),
-    ] = None,
-    output: Annotated[Path | None, options.output("FOLDER", "New output folder.", "HOST or TARGET")] = None,
     *,
+    into: Into,
+    output: Annotated[Path | None, options.output("FOLDER", "New output folder.", "HOST or TARGET")] = None,
     shown: Shown,
     kernel: Kernel,
-    check: Checked = False,
-    measure: Measured = False,
+    tried: Tried,
 ) -> None:
     """Export a denoiser for another program: kernels, a manifest, a README and a reference test image.
 
@@ -190,35 +186,22 @@ def export(
     in the manifest. --scene also exports the path tracer and its feature encoding; --target html writes
     a web page with all of them.
     """
-    target = _target(target, host)
+    target, host = into.language, into.host
     folder = output or Path(host or target)
     if target == HTML:
         of_kernels = given(kernel, "weights", "variant", "schedule")
-        of_kernels |= given(shown, "time", "moving", "seconds", "fps")
-        of_kernels |= {"--check": check or None, "--measure": measure or None}
+        of_kernels |= given(shown, "time", "moving", "seconds", "fps") | given(tried)
         refuse(of_kernels, "a web page has its own")
         page = webpage.page_of(model, shown.scene, shown.parameters or [], None)
         _write(folder, {PAGE_NAME: page.encode()})
         return
     check_new_folder(folder)
     shown.check()
-    made = _export(model, target, host or "", shown, kernel, measure)
+    made = _export(model, target, host or "", shown, kernel, tried.measure)
     _write(folder, made.contents())
     _tell(made)
-    if check:
+    if tried.check:
         _checked(made)
-
-
-def _target(target: str | None, host: str | None) -> str:
-    """Return the target that is named, or that of a host."""
-    if host is not None:
-        from ...kernels.export.hosts.table import host_named
-
-        return target or host_named(host).target
-    if target is None:
-        rule = "one of them is needed"
-        raise InputError("--target or --host", NO_VALUE, rule, "--help lists their values")
-    return target
 
 
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:

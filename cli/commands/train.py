@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -16,7 +16,8 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
 from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK, load_model
-from ..common.options import Preset
+from ..common.options import Preset, option
+from ..common.request import given
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files.alone import alone_at
 from ..files.outputs import check_output
@@ -44,93 +45,99 @@ CHECKPOINT_INTERVAL_S = 30.0
 """Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
 
 
-Inputs = Annotated[
-    list[Path] | None, typer.Option("-i", "--input", metavar="FILE", help="Noisy frame (.exr). Repeatable.")
-]
-Targets = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "-t", "--target", metavar="FILE", help="Reference of each noisy frame, in the same order. Repeatable."
-    ),
-]
-DataSet = Annotated[
-    Path | None, typer.Option(metavar="FOLDER", help="Data set to train on, instead of single frames.")
-]
-Rank = Annotated[
-    int | None,
-    typer.Option(
-        help="Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank.",
-        show_default="the preset's",
-    ),
-]
-Begin = Annotated[
-    Path | None,
-    typer.Option(
-        "--from",
-        metavar="MODEL",
-        help="Start from this model's weights, reduced to --rank or --variant, instead of random ones.",
-    ),
-]
-Cut = Annotated[
-    str | None,
-    typer.Option(
-        "--variant",
-        metavar="NAME",
-        help="Fine-tune this variant of the model given by --from, for example window8+rank16. "
-        "whole8 and whole10 round the weights to integers at the end; with --from and without "
-        "--steps they only round.",
-    ),
-]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume", help="Resume from the checkpoint next to the model, with the checkpoint's recipe."
-    ),
-]
-Restart = Annotated[
-    bool, typer.Option("--restart", help="Start again and overwrite the checkpoint of an earlier run.")
-]
-Integers = Annotated[
-    bool, typer.Option("--whole", help="Short for --variant whole8: an 8-bit integer network.")
-]
-PresetName = Annotated[
-    Preset | None,
-    typer.Option(
-        help="Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
+@dataclass(frozen=True)
+class Pairs:
+    """What is trained on: single frames, or a data set."""
+
+    inputs: list[Path] | None = option(
+        None, "Noisy frame (.exr). Repeatable.", "-i", "--input", metavar="FILE"
+    )
+    targets: list[Path] | None = option(
+        None,
+        "Reference of each noisy frame, in the same order. Repeatable.",
+        "-t",
+        "--target",
+        metavar="FILE",
+    )
+    dataset: Path | None = option(None, "Data set to train on, instead of single frames.", metavar="FOLDER")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The recipe; None for what the preset, or the checkpoint, has."""
+
+    preset: Preset | None = option(
+        None,
+        "Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
         "sky (under an environment).",
         show_default="best",
-    ),
-]
+    )
+    features: str | None = option(
+        None,
+        "Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ...",
+        show_default="the preset's",
+    )
+    rank: int | None = option(
+        None,
+        "Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank.",
+        show_default="the preset's",
+    )
+    begin: Path | None = option(
+        None,
+        "Start from this model's weights, reduced to --rank or --variant, instead of random ones.",
+        "--from",
+        metavar="MODEL",
+    )
+    variant: str | None = option(
+        None,
+        "Fine-tune this variant of the model given by --from, for example window8+rank16. "
+        "whole8 and whole10 round the weights to integers at the end; with --from and without "
+        "--steps they only round.",
+        metavar="NAME",
+    )
+    whole: bool = option(False, "Short for --variant whole8: an 8-bit integer network.", "--whole")
+    activation: options.ActivationName = None
+    steps: int | None = option(None, "Number of training steps.", show_default="the preset's")
+    seed: int | None = option(None, "Random seed of the initial weights and of sampling.")
+
+    def recipe(self, state: TrainState | None) -> Recipe:
+        """Return the recipe, checked."""
+        from ...refimpl.network.train import check_recipe, with_activation
+
+        names = None if self.features is None else options.parse_names(self.features)
+        choices = {"features": names, "steps": self.steps, "seed": self.seed, "rank": self.rank}
+        recipe = choose_recipe(self.preset or "best", state, choices)
+        if self.activation is not None:
+            recipe = with_activation(recipe, self.activation)
+        check_recipe(recipe)
+        return recipe
+
+    def network(self, state: TrainState | None) -> str | None:
+        """Return the name of the variant, if one is named; a resumed run has its own."""
+        if self.variant is not None and self.whole:
+            raise InputError("--variant", self.variant, "--whole is short for whole8", "give one of them")
+        name = WHOLE if self.whole else self.variant
+        if name is not None and state is not None:
+            raise InputError("--variant", name, "a resumed run keeps the checkpoint's", "leave it out")
+        return name
 
 
 def train(
-    inputs: Inputs = None,
-    targets: Targets = None,
-    dataset: DataSet = None,
+    *,
+    pairs: Pairs,
     output: Annotated[Path, options.output("FILE", "Model to write (.safetensors).")] = Path(
         "model.safetensors"
     ),
-    preset: PresetName = None,
-    features: Annotated[
-        str | None,
+    wanted: Wanted,
+    resume: Annotated[
+        bool,
         typer.Option(
-            help="Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ...",
-            show_default="the preset's",
+            "--resume", help="Resume from the checkpoint next to the model, with the checkpoint's recipe."
         ),
-    ] = None,
-    rank: Rank = None,
-    begin: Begin = None,
-    variant: Cut = None,
-    whole: Integers = False,
-    activation: options.ActivationName = None,
-    steps: Annotated[
-        int | None, typer.Option(help="Number of training steps.", show_default="the preset's")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Random seed of the initial weights and of sampling.")
-    ] = None,
-    resume: Resume = False,
-    restart: Restart = False,
+    ] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Start again and overwrite the checkpoint of an earlier run.")
+    ] = False,
     executor: options.Trainer = "auto",
 ) -> None:
     """Train a network on noisy frames and their references, or on a data set.
@@ -141,57 +148,26 @@ def train(
     """
     from ...models.model_file import load_checkpoint
 
-    inputs, targets = inputs or [], targets or []
+    inputs, targets, begin = pairs.inputs or [], pairs.targets or [], wanted.begin
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
     saved = checkpoint_path(output)
     # Two runs would leave a model of one and a checkpoint of the other.
     with alone_at(output, "training a model"), alone_at(saved, "training a model"):
-        check_begin(saved, preset, resume, restart)
+        check_begin(saved, wanted.preset, resume, restart)
         state = load_checkpoint(saved) if resume else None
-        recipe = _wanted(preset, state, features, steps, seed, rank, activation)
-        network = _first_network(begin, state)
-        name = _variant_named(variant, whole, state)
+        recipe, network = wanted.recipe(state), _first_network(begin, state)
+        name = wanted.network(state)
         if name is not None:
-            others = {"--rank": rank, "--features": features, "--activation": activation}
-            recipe, network = _of_variant(recipe, begin, name, others)
-        pairs = read_training(dataset, inputs, targets, recipe.features)
-        if begin is not None and name is not None and whole_bits(name) and steps is None:
-            _round_only(begin, pairs, output, recipe)
+            recipe, network = _of_variant(
+                recipe, begin, name, given(wanted, "rank", "features", "activation")
+            )
+        frames = read_training(pairs.dataset, inputs, targets, recipe.features)
+        if begin is not None and name is not None and whole_bits(name) and wanted.steps is None:
+            _round_only(begin, frames, output, recipe)
             return
-        state = _fit_to_the_end(recipe, pairs, output, state, network, chosen(executor, trains=True))
+        state = _fit_to_the_end(recipe, frames, output, state, network, chosen(executor, trains=True))
         _say_what_there_is(output, state.step)
-
-
-def _wanted(
-    preset: Preset | None,
-    state: TrainState | None,
-    features: str | None,
-    steps: int | None,
-    seed: int | None,
-    rank: int | None,
-    activation: str | None,
-) -> Recipe:
-    """Return the recipe that the options ask for, checked."""
-    from ...refimpl.network.train import check_recipe, with_activation
-
-    names = None if features is None else options.parse_names(features)
-    choices = {"features": names, "steps": steps, "seed": seed, "rank": rank}
-    recipe = choose_recipe(preset or "best", state, choices)
-    if activation is not None:
-        recipe = with_activation(recipe, activation)
-    check_recipe(recipe)
-    return recipe
-
-
-def _variant_named(variant: str | None, whole: bool, state: TrainState | None) -> str | None:
-    """Return the name of the variant that the options ask for; a resumed run has its own."""
-    if variant is not None and whole:
-        raise InputError("--variant", variant, "--whole is short for whole8", "give one of them")
-    name = WHOLE if whole else variant
-    if name is not None and state is not None:
-        raise InputError("--variant", name, "a resumed run keeps the checkpoint's", "leave it out")
-    return name
 
 
 def whole_bits(name: str) -> int | None:
@@ -203,7 +179,7 @@ def whole_bits(name: str) -> int | None:
 
 
 def _of_variant(
-    recipe: Recipe, begin: Path | None, name: str, chosen: dict[str, Any]
+    recipe: Recipe, begin: Path | None, name: str, others: Mapping[str, object]
 ) -> tuple[Recipe, Siren | None]:
     """Return recipe and first network of a variant; integers by themselves need no model to begin with."""
     from ...compiler.variants import amplitude_of
@@ -214,9 +190,8 @@ def _of_variant(
         found = replace(recipe, whole=amplitude_of(bits))
         check_recipe(found)
         return found, None
-    for option, value in chosen.items():
-        if value is not None:
-            raise InputError("--variant", name, f"it chooses what {option} does", f"leave out {option}")
+    for each in others:
+        raise InputError("--variant", name, f"it chooses what {each} does", f"leave out {each}")
     if begin is None:
         raise InputError("--variant", name, "is derived from a trained model", "name one with --from")
     return varied(recipe, load_model(begin), name)

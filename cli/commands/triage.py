@@ -24,6 +24,7 @@ from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
 from ..common.inputs import load_model, model_path
+from ..common.options import option
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
@@ -53,30 +54,28 @@ SCHEMA = "wamnet-triage-1"
 REPORT, README, MODEL, FRAME = "report.json", "README.md", "model.safetensors", "frame.exr"
 """Files of a reproducer."""
 
-Executors = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--executor",
+
+@dataclass(frozen=True)
+class Chosen:
+    """The kernels that run."""
+
+    executor: list[str] | None = option(
+        None,
+        "Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable.",
         metavar="NAME",
-        help="Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable.",
         show_default="all available",
-    ),
-]
-Schedules = Annotated[
-    str,
-    typer.Option(
+    )
+    profile: options.Profile = "ieee"
+    schedules: str = option(
+        "picked",
+        "Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
         metavar="NAME",
-        help="Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
-    ),
-]
-KeptKernel = Annotated[
-    Path | None,
-    typer.Option(
-        "--kernel",
+    )
+    kernel: Path | None = option(
+        None,
+        "Run this kernel's files instead of compiling for its target and schedule.",
         metavar="FOLDER",
-        help="Run this kernel's files instead of compiling for its target and schedule.",
-    ),
-]
+    )
 
 
 def triage(
@@ -84,10 +83,8 @@ def triage(
     frame: Annotated[
         Path, typer.Argument(metavar="FRAME", help="Frame with the layers that the model reads (.exr).")
     ],
-    executor: Executors = None,
-    profile: options.Profile = "ieee",
-    schedules: Schedules = "picked",
-    kernel: KeptKernel = None,
+    *,
+    chosen: Chosen,
     output: Annotated[
         Path, options.output("FOLDER", "Output folder for the reproducer, if a kernel deviates.")
     ] = Path("triage"),
@@ -103,18 +100,18 @@ def triage(
     from ..files import exr
 
     check_new_folder(output)
-    profile_named(profile)
+    profile_named(chosen.profile)
     model = model_path(model)
     network, noisy = load_model(model), exr.read_frame(frame, finite=False, tell=say)
     exr.need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
-    kept = kept_kernel(kernel, network, profile) if kernel else None
-    task = Task(network, noisy, images_of(network, noisy), profile, schedules, kept)
+    kept = kept_kernel(chosen.kernel, network, chosen.profile) if chosen.kernel else None
+    task = Task(network, noisy, images_of(network, noisy), chosen.profile, chosen.schedules, kept)
     with ExitStack() as opened:
-        runners = open_runners(executor or [], opened)
+        runners = open_runners(chosen.executor or [], opened)
         verdicts = _judged(task, runners)
-        _print(f"{model} on {frame}, {noisy.width}x{noisy.height}, profile {profile}", verdicts)
+        _print(f"{model} on {frame}, {noisy.width}x{noisy.height}, profile {task.profile}", verdicts)
         found = _concluded(task, verdicts)
     if found is None:
         return

@@ -9,7 +9,7 @@ import colorsys
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -95,6 +95,11 @@ Sampler = Literal["pcg4d", "sobol"]
 
 Preset = Literal["best", "mirrors", "shadows", "paper", "short", "sky"]
 """Training protocols by name; equal to the registry in refimpl."""
+
+
+def option(default: Any, text: str, *names: str, **how: Any) -> Any:
+    """Return a field of a request [`request.spread`]: an option, called as the field unless it has names."""
+    return field(default=default, metadata={"option": typer.Option(*names, help=text, **how)})
 
 
 def output(metavar: str, what: str, default: str | bool = True) -> Any:
@@ -285,30 +290,21 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
 class View:
     """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
 
-    yaw_deg: Annotated[
-        float, typer.Option("--yaw", metavar="DEG", help="Orbit the camera around its target, in degrees.")
-    ] = 0.0
-    pitch_deg: Annotated[
-        float,
-        typer.Option(
-            "--pitch",
-            metavar="DEG",
-            help="Raise the camera around its target, in degrees (negative: lower it).",
-        ),
-    ] = 0.0
-    distance: Annotated[
-        float, typer.Option(metavar="X", help="Scale the camera distance; 2 moves it twice as far away.")
-    ] = 1.0
-    lights: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--light",
-            metavar="N=R,G,B",
-            help="Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. "
-            "Repeatable.",
-            show_default="as in the scene",
-        ),
-    ] = None
+    yaw_deg: float = option(0.0, "Orbit the camera around its target, in degrees.", "--yaw", metavar="DEG")
+    pitch_deg: float = option(
+        0.0,
+        "Raise the camera around its target, in degrees (negative: lower it).",
+        "--pitch",
+        metavar="DEG",
+    )
+    distance: float = option(1.0, "Scale the camera distance; 2 moves it twice as far away.", metavar="X")
+    lights: list[str] | None = option(
+        None,
+        "Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. Repeatable.",
+        "--light",
+        metavar="N=R,G,B",
+        show_default="as in the scene",
+    )
 
     def of(self, scene: Scene) -> Scene:
         """Return the scene from there and under these lamps; its info says so."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from ...refimpl.errors import InputError
 from . import options
@@ -48,17 +48,22 @@ class KernelRequest:
 def given(request: Any, *names: str) -> dict[str, object]:
     """Return the values of fields, of all without names, that are not their defaults, by option."""
     found = {}
-    for field in dataclasses.fields(request):
+    for field, kind in fields_of(type(request)):
         value = getattr(request, field.name)
         if value != field.default and field.name in (names or (field.name,)):
-            found[option_of(type(request), field.name)] = value
+            # In an annotation the name of an option is where a default would be.
+            named = kind.__metadata__[0].default
+            found[named if isinstance(named, str) else f"--{field.name.replace('_', '-')}"] = value
     return found
 
 
-def option_of(kind: type, field: str) -> str:
-    """Return the option of a field as it is typed; in an annotation its name is where a default would be."""
-    named = get_type_hints(kind, include_extras=True)[field].__metadata__[0].default
-    return named if isinstance(named, str) else f"--{field.replace('_', '-')}"
+def fields_of(kind: Any) -> list[tuple[dataclasses.Field[Any], Any]]:
+    """Return the fields of a data class, each with its annotation for typer."""
+    hints = get_type_hints(kind, include_extras=True)
+    return [
+        (each, Annotated[hints[each.name], each.metadata["option"]] if each.metadata else hints[each.name])
+        for each in dataclasses.fields(kind)
+    ]
 
 
 def refuse(values: Mapping[str, object], rule: str, remedy: str = "leave it out") -> None:
@@ -83,11 +88,10 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
         if not dataclasses.is_dataclass(kind):
             add(each.name, each.default, kind)
             continue
-        fields, own = dataclasses.fields(kind), get_type_hints(kind, include_extras=True)
-        requests[each.name] = kind, [field.name for field in fields]
-        for field in fields:
+        requests[each.name] = kind, [field.name for field in dataclasses.fields(kind)]
+        for field, annotation in fields_of(kind):
             needed = field.default is dataclasses.MISSING
-            add(field.name, inspect.Parameter.empty if needed else field.default, own[field.name])
+            add(field.name, inspect.Parameter.empty if needed else field.default, annotation)
 
     def run(**values: Any) -> None:
         for name, (kind, names) in requests.items():

@@ -49,6 +49,7 @@ from wamnet.cli.common.inputs import load_model
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.plan import Plan
+from wamnet.compiler.reading.languages import is_read
 from wamnet.compiler.schedules.common import kernel_gather
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.bench.workload import noise, paper_model
@@ -157,6 +158,9 @@ GPU_WAYS = tuple(language for language in WAYS if language != "c")
 
 TORCH, NODE = "torch", "webassembly"
 """Names of the peer, and of C's kernels in Node, among the languages."""
+
+NODE_SCHEDULES = "tile:4", "fft:4"
+"""Of vectors as WebAssembly has them: the page's, and the fastest."""
 
 # ---- one language and network, in a process of its own ----------------------------------------------------
 
@@ -295,6 +299,11 @@ def timed(ways: Mapping[str, tuple[Callable[[int], float], dict[str, Any]]], rou
         tell(name, {**facts, **told, "rounds": rounds})
 
 
+def proven(artifact: Artifact, plan: Plan) -> dict[str, Any]:
+    """Return the bound of a kernel for all images, and whether the source check reads its text."""
+    return {"bound": max(plan.bound.output or (np.inf,)), "read": is_read(artifact.manifest)}
+
+
 def answer(language: str, name: str, names: Sequence[str], given: argparse.Namespace) -> None:
     """Compile, check and time a network's kernels in a language."""
     odd, large = images_for(name, ODD), images_for(name, (given.size, given.size))
@@ -315,7 +324,7 @@ def answer(language: str, name: str, names: Sequence[str], given: argparse.Names
                 missing = {"missing": " ".join(str(error).split())[:300]}
                 tell(f"{language}, {schedule}, {name}", {**facts[schedule], **missing})
                 return None
-            facts[schedule]["compile_s"] = time.perf_counter() - start
+            facts[schedule] |= {"compile_s": time.perf_counter() - start, **proven(artifact, plans[schedule])}
             return artifact
 
         # nvcc is a program: several compile at once.
@@ -409,6 +418,7 @@ def by_node(name: str, schedules: Sequence[str], given: argparse.Namespace) -> N
                 "device": f"Node {told['version']}, one thread",
                 "schedule": schedule,
                 "compile_s": told["first"] - statistics.median(told["taken"]),
+                **proven(artifact, plan),
                 **checked(plan, name, (small, picture), (odd, large), given.prepared),
                 "ms": statistics.median(ms),
                 "least": min(ms),
@@ -431,7 +441,7 @@ def tasks(given: argparse.Namespace) -> Iterator[tuple[str, str, tuple[str, ...]
     if NODE in given.only:
         for name in FLOATS:
             if name in given.models:
-                yield NODE, name, given.schedules or ("tile:4",)
+                yield NODE, name, NODE_SCHEDULES
     if TORCH in given.only:
         for name in FLOATS:
             if name in given.models:

@@ -309,6 +309,36 @@ def moving(by: str, way: str, column: str, digits: int) -> Callable[[Records], s
 # ---- the sine -------------------------------------------------------------------------------------------
 
 
+def languages(records: Records) -> str:
+    """Return the kernels of each language on a processor, the fastest first: time, bound and compilation."""
+    rows = [r["values"] | {"name": r["configuration"].split(",")[0]} for r in records["languages"].records()]
+    found = sorted((row for row in rows if "ms" in row), key=lambda row: row["ms"])
+    cells = [
+        [
+            row["name"],
+            f"`{row['schedule']}`",
+            f"{row['ms']:,.0f}",
+            f"{row['ms'] / found[0]['ms']:.1f}",
+            f"{row['bound']:.1e}",
+            f"{row['share']:.2g}",
+            "yes" if row["read"] else "no",
+            f"{row['compile_s']:.1f}",
+        ]
+        for row in found
+    ]
+    heads = (
+        "language",
+        "schedule",
+        "ms",
+        "ratio",
+        "bound",
+        "share of the bound",
+        "source read",
+        "compile, s",
+    )
+    return tables.markdown(heads, cells)
+
+
 def sines(records: Records) -> str:
     """Return the errors of all sines; the emitted ones once, where all executors print the same digits."""
     found = [r["values"] for r in records["sines"].records() if r["values"]["table"] == 1]
@@ -452,6 +482,7 @@ TABLES: Mapping[str, TableOf] = {
     "heads": study("heads", "camera moves"),
     "history": study("history", "`minicubes`, 24 pictures a second"),
     "lamps": study("lamps", "`minicubes`, camera at rest"),
+    "languages": languages,
     "learning-curve": learning_curve,
     "losses": study("losses", "loss"),
     "planted-faults": planted_faults,

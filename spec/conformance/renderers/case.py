@@ -39,6 +39,7 @@ class Rule:
 
 
 _TEXTS = json.loads(Path(__file__).with_name("rules.json").read_text(encoding="utf-8"))
+"""Sentences of rules, and of profiles."""
 
 RULES: Mapping[str, Rule] = {name: Rule(*texts) for name, texts in _TEXTS["rules"].items()}
 """All rules by name: a later one's cases are made of what earlier ones are about."""

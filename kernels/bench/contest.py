@@ -82,7 +82,6 @@ class Contest:
     tools: Tools
     told: Callable[[float], None] = lambda share: None
     rows: dict[str, Row] = field(default_factory=dict)
-    opened: dict[str, Opened] = field(default_factory=dict)
     machine: list[Entry] = field(default_factory=list)
     found_rates: dict[str, Rates] = field(default_factory=dict)
     sizes: dict[int, dict[str, Row]] = field(default_factory=dict)
@@ -135,7 +134,7 @@ class Contest:
 
     def _going(self) -> list[Row]:
         """Return the rows that are open, and have not failed."""
-        return [row for name, row in self.rows.items() if name in self.opened and row.state == MEASURED]
+        return [row for row in self.rows.values() if row.opened and row.state == MEASURED]
 
     def _given(self, size: int) -> Given:
         """Return the picture of a size: an unseen frame, or noise."""
@@ -158,7 +157,7 @@ class Contest:
         start = time.perf_counter()
         picture = opened.display(opened.run(shown))
         row.facts |= {"open_s": seconds, "first_frame_s": time.perf_counter() - start}
-        row.state, self.opened[contender.name] = MEASURED, opened
+        row.state, row.opened = MEASURED, opened
         self._compare(contender, opened, crop, picture)
 
     def _compare(
@@ -216,7 +215,7 @@ class Contest:
         row.round = self._round(row, shown)
         if row.kind != KERNEL or frame <= budget / 2:
             start = time.perf_counter()
-            self.opened[row.name].run(shown)
+            row.opened.run(shown)
             frame = time.perf_counter() - start
         row.most = min(repeats, int(budget / max(frame, 1e-9)) - 1)
         if row.most < 1:
@@ -229,7 +228,7 @@ class Contest:
 
     def _round(self, row: Row, shown: Given, alone: bool = True) -> Round:
         """Return a round: a frame, whose time is returned, and the kernel's `alone`, which is noted."""
-        opened = self.opened[row.name]
+        opened: Opened = row.opened
 
         def work(_number: int) -> float:
             start = time.perf_counter()
@@ -250,13 +249,14 @@ class Contest:
                 continue
             facts = {key: main.facts[key] for key in ("products", "sines", "bytes")}
             facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
-            row = rows[main.name] = Row(main.name, text=main.text, kind=main.kind, facts=facts)
+            row = Row(main.name, text=main.text, kind=main.kind, facts=facts, opened=main.opened)
+            rows[main.name] = row
             if hoped > self.request.budget_s:
                 self._leave_out(row, hoped, "its time at another size")
                 continue
             with row.failing():
                 row.state = MEASURED
-                self.opened[row.name].run(shown)
+                row.opened.run(shown)
                 row.round = self._round(row, shown, alone=False)
             self.told(0.02)
         take_turns([*rows.values()], min(GROWTH_ROUNDS, self.request.repeats), self.request.pause_s)
@@ -283,7 +283,7 @@ class Contest:
         pixels = sum(noisy.height * noisy.width for noisy, _ in pairs)
         going = self._going()
         for row in going:
-            opened, hoped = self.opened[row.name], self._hoped(row.name, 1)
+            opened, hoped = row.opened, self._hoped(row.name, 1)
             if hoped is not None and hoped * pixels > self.request.budget_s:
                 row.facts["quality"] = None
                 continue

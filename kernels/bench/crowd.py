@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,16 +23,6 @@ def _vector(values: ArrayLike) -> Vector:
     return x, y, z
 
 
-def _place(number: int) -> Vector:
-    """Return a point in the room."""
-    return _vector(_uniform(number, 0, -0.8, 0.8))
-
-
-def _color(number: int) -> Vector:
-    """Return a reflectance."""
-    return _vector(_uniform(number, 1, 0.2, 0.9))
-
-
 def _rotation(number: int) -> Matrix:
     """Return a rotation by a random unit quaternion: Shoemake, Graphics Gems III, 1992."""
     u, a, b, _ = _uniform(number, 3, 0.0, 1.0)
@@ -45,42 +35,29 @@ def _rotation(number: int) -> Matrix:
     )
 
 
-def shared(number: int, size: float, rotation: Matrix) -> Box:
-    """Return a box with the rotation that all of them share."""
-    extent = 0.6 * size * _uniform(number, 2, 0.3, 1.0)
-    return Box(_place(number), _vector(extent), _color(number), rotation)
+def _part(kind: str, number: int, size: float) -> Box | Sphere | Quad:
+    """Return a primitive: a box with a rotation that all share or its own, a sphere, or a square."""
+    place, color = _vector(_uniform(number, 0, -0.8, 0.8)), _vector(_uniform(number, 1, 0.2, 0.9))
+    if kind == "spheres":
+        return Sphere(place, 0.5 * size, color)
+    if kind == "quads":
+        u, v, _ = (size * np.array(row) for row in _rotation(number))
+        return Quad(place, _vector(u), _vector(v), color)
+    extent = _vector(0.6 * size * _uniform(number, 2, 0.3, 1.0))
+    return Box(place, extent, color, _rotation(0 if kind == "shared" else number))
 
 
-def turned(number: int, size: float, _: Matrix) -> Box:
-    """Return a box with a rotation of its own."""
-    return shared(number, size, _rotation(number))
-
-
-def sphere(number: int, size: float, _: Matrix) -> Sphere:
-    """Return a sphere."""
-    return Sphere(_place(number), 0.5 * size, _color(number))
-
-
-def quad(number: int, size: float, _: Matrix) -> Quad:
-    """Return a square: two rows of a rotation are its edges."""
-    u, v, _w = (size * np.array(row) for row in _rotation(number))
-    return Quad(_place(number), _vector(u), _vector(v), _color(number))
-
-
-KINDS: Mapping[str, tuple[Callable[[int, float, Matrix], Box | Sphere | Quad], ...]] = {
-    "shared": (shared,),
-    "turned": (turned,),
-    "spheres": (sphere,),
-    "quads": (quad,),
-    "mixture": (shared, turned, sphere, quad),
+KINDS: Mapping[str, tuple[str, ...]] = {
+    **{kind: (kind,) for kind in ("shared", "turned", "spheres", "quads")},
+    "mixture": ("shared", "turned", "spheres", "quads"),
 }
 """Kinds of primitives that take turns, by the name of the scene."""
 
 
 def crowd(kind: str, count: int) -> Scene:
     """Return a room with a light and `count` primitives of a kind."""
-    rotation, size, makers = _rotation(0), 0.6 / count ** (1 / 3), KINDS[kind]
-    parts = [makers[i % len(makers)](i + 1, size, rotation) for i in range(count)]
+    size, kinds = 0.6 / count ** (1 / 3), KINDS[kind]
+    parts = [_part(kinds[i % len(kinds)], i + 1, size) for i in range(count)]
     return Scene(
         f"{kind} {count}",
         Camera((0.0, 0.0, 0.95), (0.0, 0.0, 0.0), vertical_fov_deg=70.0),

@@ -142,40 +142,39 @@ def forms(executor: Executor | None, name: str, scene: Scene, part: Part) -> lis
     executor's target.
     """
     if executor is None:
-        return [_peer_s(name, scene, part)]
+        shape = (scene, part.width, part.rows, Settings())
+        follow = lambda render: render(part.samples, 0)  # noqa: E731
+        return [_form(VARIANT, lambda: peers.table().renderers[name](*shape), follow, follow)]
     chosen = _compiled(executor, scene, forms_of(executor.name)).source
-    few = primitives(scene) <= MOST_STATEMENTS + 1
-    found: dict[str, Entry] = {}
+    few, found = primitives(scene) <= MOST_STATEMENTS + 1, dict[str, Entry]()
     for form in FORMS if few else [form for form in FORMS if form != "unrolled"]:
-        start = time.perf_counter()
-        artifact = _compiled(executor, scene, FORMS[form])
-        traced = time.perf_counter()
-        executor.build(artifact)
-        executor.trace(artifact, replace(part, rows=1, samples=1))
-        facts = {
-            "source": artifact.source,
-            "trace_s": traced - start,
-            "build_s": time.perf_counter() - traced,
-        }
-        entry = Entry(form, facts={**facts, "chosen": artifact.source == chosen})
-        entry.round = lambda _number, artifact=artifact: executor.trace(artifact, part)
-        found.setdefault(artifact.source, entry)
+
+        def build(artifact: Artifact) -> None:
+            executor.build(artifact)
+            executor.trace(artifact, replace(part, rows=1, samples=1))
+
+        compiled = partial(_compiled, executor, scene, FORMS[form])
+        entry = _form(form, compiled, build, lambda artifact: executor.trace(artifact, part), chosen)
+        found.setdefault(entry.facts["source"], entry)
     return [*found.values()]
 
 
-def _peer_s(name: str, scene: Scene, part: Part) -> Entry:
-    """Return a peer's form; what it builds is built by the first picture."""
+def _form(
+    name: str,
+    trace: Callable[[], Any],
+    build: Callable[[Any], Any],
+    follow: Callable[[Any], Any],
+    chosen: str | None = None,
+) -> Entry:
+    """Return a form that is traced and then built, which are timed; its rounds follow paths."""
     start = time.perf_counter()
-    render = peers.table().renderers[name](scene, part.width, part.rows, Settings())
-    follow, traced = partial(render, part.samples, 0), time.perf_counter()
-    follow()
-    facts = {
-        "source": "",
-        "trace_s": traced - start,
-        "build_s": time.perf_counter() - traced,
-        "chosen": False,
-    }
-    return Entry(VARIANT, facts=facts, round=lambda _number: follow())
+    made = trace()
+    traced = time.perf_counter()
+    build(made)
+    source = getattr(made, "source", "")
+    times = {"trace_s": traced - start, "build_s": time.perf_counter() - traced}
+    facts = {"source": source, **times, "chosen": source == chosen}
+    return Entry(name, facts=facts, round=lambda _number: follow(made))
 
 
 def _compiled(executor: Executor, scene: Scene, forms: Forms) -> Artifact:

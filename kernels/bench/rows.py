@@ -29,13 +29,16 @@ MOST_TOLD = 200
 
 @dataclass
 class Row(Entry):
-    """An entry whose failure does not end the run: `state` says how far it got, `reason` why no further."""
+    """An entry whose failure does not end the run: `state` says how far it got, `reason` why no further.
+
+    `opened`: the contender that is ready, if it is [contenders.py]."""
 
     text: str = ""
     kind: str = KERNEL
     state: str = PENDING
     reason: str = ""
     kernel_seconds: list[float] = field(default_factory=list)
+    opened: Any = None
 
     @contextmanager
     def failing(self) -> Iterator[None]:

@@ -63,7 +63,7 @@ def render(
     """
     from ....kernels.bench import paths
     from ....kernels.bench.fresh import empty_caches
-    from ....kernels.measure import begin, take_turns
+    from ....kernels.measure import measure
     from ....refimpl.light.render import Job
     from ....refimpl.light.transport import Settings
 
@@ -75,8 +75,7 @@ def render(
     tables = [paths.renderers(name, job, kinds, processes) for name in shown]
     entries = [entry for found in tables for entry in found]
     with progress("measuring", len(entries) * (repeats + 1), "renders") as advance, empty_caches():
-        begin(entries, done=partial(advance, 1.0))
-        take_turns(entries, repeats, done=partial(advance, 1.0))
+        measure(entries, repeats, done=partial(advance, 1.0))
     say_facts(NUMPY, f"{size}x{size}, {spp} spp, {depth} edges")
     for found in tables:
         last, last_s = found[-1].by, found[-1].times.median

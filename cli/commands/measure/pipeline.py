@@ -103,7 +103,7 @@ def _entries(
     from ....kernels import open_executor
     from ....kernels.bench import peers, pipelines
     from ....kernels.bench.fresh import first_picture
-    from ....kernels.measure import Entry, begin, take_turns
+    from ....kernels.measure import Entry, measure
 
     with ExitStack() as stack, ExitStack() as pipes:
         found: list[Entry] = []
@@ -120,8 +120,7 @@ def _entries(
             stack.callback(maker.close)
             notes[f"{name}: {maker.about}"] = None
             found += pipelines.entries(name, maker.ways(shots))
-        begin(found)
-        take_turns(found, repeats, pipelines.PAUSE_S)
+        measure(found, repeats, pause_s=pipelines.PAUSE_S)
         pipes.close()
         for each in opened:
             seconds = pipelines.first_pictures(each, model, scene, size, rays)

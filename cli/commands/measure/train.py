@@ -44,7 +44,7 @@ def train(
     install torch[/] adds PyTorch.
     """
     from ....kernels.bench import training
-    from ....kernels.measure import begin, take_turns
+    from ....kernels.measure import measure
     from ....refimpl.network.train import PRESETS
 
     names = names_of("--presets", presets, PRESETS)
@@ -58,9 +58,8 @@ def train(
     pairs = training.noise(frames, size)
     for recipe, preset in ((PRESETS[name], name) for name in names):
         entries, product = training.entries(recipe, pairs, given, seconds), training.sgemm()
-        with progress(f"measuring {preset}", (len(given) + 1) * repeats, "rounds") as advance:
-            begin([product, *entries], warm=0)
-            take_turns([product, *entries], repeats, done=partial(advance, 1.0))
+        with progress(f"measuring {preset}", (len(given) + 1) * (repeats + 1), "rounds") as advance:
+            measure([product, *entries], repeats, warm=0, done=partial(advance, 1.0))
         work, most = training.operations(recipe), product.facts["operations"] / min(product.seconds)
         say("")
         say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {most / 1e9:.0f} GFLOP/s")

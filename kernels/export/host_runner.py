@@ -24,121 +24,14 @@ from .buffer_runner import BufferRunner, Launch
 OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing here may allow what the standards do not."""
 
-CUDA_SHIM = """\
-#include <math.h>
-#include <stddef.h>
-#define __global__
-#define __device__
-#define __shared__ static
-#define __align__(bytes) alignas(bytes)
-#define __launch_bounds__(threads)
-#define __syncthreads() wamnet_wait()
-struct wamnet_place { unsigned int x, y, z; };
-static thread_local wamnet_place blockIdx, blockDim, threadIdx;
-template <class T> static inline T min(T a, T b) { return b < a ? b : a; }
-template <class T> static inline T max(T a, T b) { return a < b ? b : a; }
-struct alignas(16) int4 { int x, y, z, w; };
-struct alignas(8) float2 { float x, y; };
-static inline float2 make_float2(float x, float y) { return {x, y}; }
-static inline int4 make_int4(int x, int y, int z, int w) { return {x, y, z, w}; }
-static inline float __int_as_float(int bits) { return __builtin_bit_cast(float, bits); }
-static inline int __dp4a(int a, int b, int sum)
-{
-    for (int shift = 0; shift < 32; shift += 8) {
-        sum += (signed char)(a >> shift) * (signed char)(b >> shift);
-    }
-    return sum;
-}
-#include "kernel.txt"
-"""
-"""The words of CUDA that kernels use."""
+SHIMS = Path(__file__).parent / "shims"
+"""The words of CUDA and Metal that kernels use, and functions `wamnet_call` that run all threads one after
+another, or those of a group at once, where they wait for each other."""
 
-METAL_SHIM = """\
-#define kernel
-#define device
-#define constant const
-#define threadgroup static
-#define thread
-typedef unsigned int uint;
-struct uint2 { uint x, y; };
-namespace metal {
-struct alignas(8) float2 {
-    float x, y;
-    float2(float a, float b) : x(a), y(b) {}
-};
-struct alignas(16) float4 {
-    float x, y, z, w;
-    float4() = default;
-    explicit float4(float all) : x(all), y(all), z(all), w(all) {}
-    float4(float a, float b, float c, float d) : x(a), y(b), z(c), w(d) {}
-};
-static inline float4 operator*(float4 a, float b) { return float4(a.x * b, a.y * b, a.z * b, a.w * b); }
-static inline void operator+=(float4 &a, float4 b)
-{
-    a = float4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
-}
-static inline void operator-=(float4 &a, float4 b) { a += b * -1.0f; }
-enum class mem_flags { mem_threadgroup };
-static inline void threadgroup_barrier(mem_flags) { wamnet_wait(); }
-static inline float fabs(float x) { return __builtin_fabsf(x); }
-static inline float floor(float x) { return __builtin_floorf(x); }
-static inline float sqrt(float x) { return __builtin_sqrtf(x); }
-static inline float sin(float x) { return __builtin_sinf(x); }
-static inline float cos(float x) { return __builtin_cosf(x); }
-static inline float pow(float x, float y) { return __builtin_powf(x, y); }
-template <class T> static inline T min(T a, T b) { return b < a ? b : a; }
-template <class T> static inline T max(T a, T b) { return a < b ? b : a; }
-static inline int clamp(int x, int low, int high) { return min(max(x, low), high); }
-}
-"""
-"""The words of Metal that kernels use: the file that they include."""
 
-THREADS = """\
-extern "C" void wamnet_call(const int *sizes, float *const *buffers, int columns, int rows)
-{{
-    for (int row = 0; row < rows; ++row) {{
-        for (int column = 0; column < columns; ++column) {{
-            {call}
-        }}
-    }}
-}}
-"""
-"""The function that is called: all threads, one after another."""
-
-ALONE = "static inline void wamnet_wait() {}\n"
-"""Nobody waits."""
-
-TOGETHER = """\
-#include <barrier>
-#include <thread>
-#include <vector>
-static std::barrier<> *wamnet_barrier;
-static inline void wamnet_wait() { wamnet_barrier->arrive_and_wait(); }
-"""
-"""Threads wait for all others of their group."""
-
-GROUPS = """\
-extern "C" void wamnet_call(const int *sizes, float *const *buffers, int columns, int rows)
-{{
-    for (int group = 0; group < columns * rows; ++group) {{
-        int group_column = group % columns, group_row = group / columns;
-        std::barrier<> barrier({width} * {height});
-        wamnet_barrier = &barrier;
-        std::vector<std::thread> items;
-        for (int item = 0; item < {width} * {height}; ++item) {{
-            items.emplace_back([&barrier, item, group_column, group_row, sizes, buffers] {{
-                int column = item % {width}, row = item / {width};
-                {call}
-                barrier.arrive_and_drop();
-            }});
-        }}
-        for (std::thread &each : items) {{
-            each.join();
-        }}
-    }}
-}}
-"""
-"""The same for kernels whose threads wait: those of a group at once, one group after another."""
+def _shim(name: str) -> str:
+    """Return the text of a file of the shims."""
+    return (SHIMS / name).read_text(encoding="utf-8")
 
 
 class HostRunner(BufferRunner):
@@ -244,7 +137,8 @@ class CUDARunner(HostRunner):
         else:
             place = "blockIdx = {(unsigned)group_column, (unsigned)group_row, 0};"
             place += " threadIdx = {(unsigned)column, (unsigned)row, 0};"
-        return _waiting(group) + CUDA_SHIM + _started(f"{place} {call}", group)
+        before = _waiting(group) + _shim("cuda.h") + '#include "kernel.txt"\n'
+        return before + _started(f"{place} {call}", group)
 
 
 class MetalRunner(HostRunner):
@@ -254,7 +148,7 @@ class MetalRunner(HostRunner):
     options = ("-std=c++20", "-pthread", "-Wno-attributes")
 
     def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
-        (folder / "metal_stdlib").write_text(METAL_SHIM, encoding="utf-8")
+        (folder / "metal_stdlib").write_text(_shim("metal_stdlib.h"), encoding="utf-8")
         arrays = _arrays(kernel.interface, kernel.interface.by_number())
         arguments = ["*(const Size *)sizes", *arrays]
         places = ["{(uint)column, (uint)row}"]
@@ -266,11 +160,11 @@ class MetalRunner(HostRunner):
 
 def _waiting(group: tuple[int, int] | None) -> str:
     """Return what lets threads wait for those of their group, if there is one."""
-    return ALONE if group is None else TOGETHER
+    return _shim("alone.h" if group is None else "together.h")
 
 
 def _started(call: str, group: tuple[int, int] | None) -> str:
     """Return the function that runs all threads."""
-    if group is None:
-        return THREADS.format(call=call)
-    return GROUPS.format(call=call, width=group[0], height=group[1])
+    names = {"CALL": call} | ({} if group is None else {"WIDTH": group[0], "HEIGHT": group[1]})
+    defined = "".join(f"#define WAMNET_{name} {value}\n" for name, value in names.items())
+    return defined + _shim("threads.cpp" if group is None else "groups.cpp")

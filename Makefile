@@ -13,10 +13,13 @@ PYTHON ?= python3
 comma := ,
 WAMNET_REQUIRE ?= opencl,opengl-egl,opengl-osmesa,mitsuba,chromium,bubblewrap$(if $(shell $(CC) -E -include math.h -x c /dev/null >/dev/null 2>&1 && echo yes),$(comma)c)
 override WAMNET_REQUIRE := $(WAMNET_REQUIRE)$(if $(ALSO),$(comma)$(ALSO))
-PYTEST_OPTIONS ?= -n 2
+# A file's tests share what its fixtures make: one worker runs them.
+PYTEST_OPTIONS ?= -n 2 --dist loadfile
 MINUTES ?= 10
 COUNT ?= 300
 export VENV PYTHON WAMNET_REQUIRE
+# Without byte code on disk every process of the tests would compile the package, and each worker all tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Seconds of processor time that the tests may take (tests/support/tiers.py).
 QUICK_S = 240

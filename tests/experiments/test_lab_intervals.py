@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from lab.intervals import RESAMPLES, interval, paired, resampled_means
-from scipy import stats
+from statistical import stats
 
 from wamnet.refimpl.errors import InputError
 

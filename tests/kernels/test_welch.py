@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import statistical
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy import special, stats
+from packages import Late
+from statistical import stats, welch_p
 
 from wamnet.kernels.judge import welch
+
+special = Late("scipy.special", "scipy")
 
 
 @given(t=st.floats(0, 40), freedom=st.floats(0.5, 1e6))
@@ -35,7 +37,7 @@ def test_welch_is_scipy_s():
     expected = stats.ttest_ind(a, b, equal_var=False).pvalue
     moments = [m for x in (a, b) for m in (x.mean(axis=0), x.var(axis=0, ddof=1), len(x))]
     assert np.all(np.abs(welch.welch_p(*moments) - expected) <= 1e-9 * expected)
-    assert np.allclose(statistical.welch_p(*moments), expected, rtol=1e-9, atol=0)
+    assert np.allclose(welch_p(*moments), expected, rtol=1e-9, atol=0)
 
 
 def test_without_noise_only_equals_agree():

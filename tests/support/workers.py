@@ -4,12 +4,14 @@
    which they keep dozens [`let_go`]: each of OpenGL's software renderer takes megabytes. What is freed goes
    back to the system; the C library keeps it.
 2. Files that load what no process gives back run in one of their own [apart.py].
-3. The summary says how much memory each process took at most [`pytest_terminal_summary`].
+3. Garbage is not looked for among the thousands of tests: not while they are collected, nor later.
+4. The summary says how much memory each process took at most [`pytest_terminal_summary`].
 """
 
 from __future__ import annotations
 
 import ctypes
+import gc
 import re
 import resource
 from collections.abc import Iterator
@@ -19,6 +21,16 @@ from typing import Any
 
 import pytest
 from apart import PEAKS
+
+
+def pytest_configure() -> None:
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.enable()
+    gc.freeze()
+
 
 GROWTH_MB = 100
 """Growth since kernels were dropped after which they are dropped again, in MB."""

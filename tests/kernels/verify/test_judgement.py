@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
+from statistical import stats
 
 from wamnet.kernels.judge.welch import holm, student_quantile
 from wamnet.refimpl.errors import InputError

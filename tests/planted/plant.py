@@ -98,12 +98,19 @@ def copied(tree: Path) -> None:
     (packages / "planted.pth").write_text(f"{tree}/tests/planted\nimport reach\n")
 
 
+def write(path: Path, text: str, seconds: int) -> None:
+    """Write a module as if so many seconds from now: byte code of a text of the same length is old then."""
+    path.write_text(text, encoding="utf-8")
+    os.utime(path, (time.time() + seconds,) * 2)
+
+
 def run(tree: Path, words: Sequence[str], limit: float | None, **told: Path) -> list[list[Any]]:
     """Run pytest in a copy, for so many seconds at most; return the rows of reach.py."""
     rows, python = tree.with_suffix(".rows"), tree / ".venv/bin/python"
     rows.write_text("")
     own = {"PLANT_OUT": rows, "PYTEST_ADDOPTS": "-p reach", "OPENBLAS_NUM_THREADS": 1, "OMP_NUM_THREADS": 1}
     environment = os.environ | {key: str(value) for key, value in (own | told).items()}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", *words]
     with tree.with_suffix(".log").open("w") as log:
         where = {"cwd": tree, "env": environment, "stdout": log, "stderr": log}
@@ -152,7 +159,7 @@ def tried(fault: Fault, known: Mapping[str, Any], tree: Path) -> dict[str, Any]:
     folder = "" if lines(fault, source) else fault["file"].rpartition("/")[0] + "/"
     tests = list(dict.fromkeys([*reach.get(fault["id"], []), *reach.get(folder, [])]))
     order = tree.with_suffix(".tests")
-    (tree / fault["file"]).write_text(made, encoding="utf-8")
+    write(tree / fault["file"], made, 3600)
     for some in filter(None, (tests[:FIRST], tests[FIRST:])):
         left = LIMIT_S - (time.time() - start)
         if not row["by"] and left > 0:
@@ -161,7 +168,7 @@ def tried(fault: Fault, known: Mapping[str, Any], tree: Path) -> dict[str, Any]:
             rows = run(tree, ["-x", *names], left, PLANT_TESTS=order)
             row["by"], row["how"] = detected(rows, known["seconds"], tree.with_suffix(".log").read_text())
             row["tests"] += sum(what == "started" for *_, what in rows)
-    (tree / fault["file"]).write_text(source, encoding="utf-8")
+    write(tree / fault["file"], source, 0)
     result = "detected" if row["by"] else "missed" if tests else "unreached"
     return {"result": result, **row, "reach": len(tests), "seconds": round(time.time() - start, 1)}
 

@@ -1,13 +1,14 @@
 """What every executor is: a device with memory, on which kernels of all roles are built and started.
 
     run      images -> denoising kernel, or both of its passes -> picture
+    call     arrays -> a kernel of any other role -> what it writes
     trace    path kernel -> sums
     encode   sums -> encoding kernel -> images
     passes   all three, without leaving the device [passes.py]
     smooth   layers -> edge-avoiding filter -> image [planes.py]
     follow   first hits, last picture, colour -> history -> this picture [planes.py]
 
-The first three are written once, here; the others are functions of an executor. A device makes a kernel ready
+The first four are written once, here; the others are functions of an executor. A device makes a kernel ready
 [`Executor._prepare`] and starts it [`_start`]. One with separate memory also makes memory, with a content or
 without one [`_store`, `_memory`], copies from it [`_fetch`], and gives it back [`_release`]; others work on
 the host's.
@@ -24,7 +25,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +33,8 @@ from numpy.typing import NDArray
 from ...compiler.core.ir import Image
 from ...compiler.kernel.interface import (
     DENOISE,
-    ENCODE,
     IMAGE,
     LIGHT,
-    PATH,
     PLAIN,
     PRIMITIVES,
     READ,
@@ -162,9 +161,9 @@ class Executor(ABC):
         """Return the size of the run with which a driver finishes compiling for pictures of `size`."""
         return None
 
-    def sums_shape(self, kernel: Artifact, part: Part) -> tuple[int, int, int]:
-        """Return (planes, rows, columns) of the sums that a kernel writes: the part's, or more than it."""
-        return len(kernel.planes), part.rows, part.width
+    def sums_shape(self, kernel: Artifact, rows: int, width: int) -> tuple[int, int, int]:
+        """Return (planes, rows, columns) of the sums that a kernel writes: those of a part, or more."""
+        return len(kernel.planes), rows, width
 
     def check_size(self, artifact: Artifact, size: Size) -> None:
         """Refuse images of a size (height, width) that the device cannot hold."""
@@ -211,32 +210,17 @@ class Executor(ABC):
         self._drop([self._built.pop(next(iter(self._built))) for _ in range(len(self._built) - KEPT_KERNELS)])
 
     def _run_once(self, kernel: Artifact, size: Size) -> None:
-        """Run a kernel once on black images."""
-        role, one = kernel.interface.role, cast("Any", kernel)
-        if role == PATH:
-            (self._paint if one.images else self._trace)(one, Part(size[1], size[0], 0, size[0], 0, 1, 0))
-        elif role == ENCODE:
-            self._encode(one, np.zeros((len(one.planes), *size), np.float32), 1)
-        elif role == DENOISE:
-            self._run(one, black(one, size))
-        else:
-            self._run_planes(one, size)
-
-    def _run_planes(self, kernel: Artifact, size: Size) -> None:
-        """Run a kernel on planes once on zeros."""
-        with self._session(size), ExitStack() as made:
-            integers = {**plane_integers(kernel, size), "gap": 1, PRIMITIVES: 1}
-            arrays = {}
-            for array in kernel.interface.arrays:
-                shape = plane_shape(array.shape, integers)
-                if array.access == READ:
-                    arrays[array.name] = self._stored(array.name, np.zeros(shape, np.float32), made)
-                else:
-                    arrays[array.name] = self._made(
-                        LIGHT if array.name == RESULT else array.name, shape, made
-                    )
-            self._start(kernel, self._built[kernel.digest].prepared, arrays, integers)
-            self._finish()
+        """Run a kernel once on black images, and zeros for all else but the scene."""
+        if kernel.role == DENOISE:
+            self._run(kernel, black(kernel, size))
+            return
+        height, width = size
+        part = Part(width, height, 0, height, 0, 1, 0).integers
+        strides = {**plane_integers(kernel, size), "plane_stride": height * width}
+        integers = {**part, **strides, "sample_count": 1, "gap": 1, PRIMITIVES: 1}
+        taken = [array for array in kernel.interface.arrays if array.access == READ]
+        given = {each.name: np.zeros(plane_shape(each.shape, integers), np.float32) for each in taken}
+        self._called(kernel, {**given, **_numbers(kernel, None)}, integers)
 
     def forget(self) -> None:
         """Drop the kernels that were built: the next build is the driver's."""
@@ -285,9 +269,38 @@ class Executor(ABC):
         for kernel, result in zip(artifact.kernels, written, strict=True):
             arrays = {f"{IMAGE}{name}": memory for name, memory in images.items()}
             integers = {"width": result.shape[1], "height": result.shape[0]}
-            prepared = self._built[kernel.digest].prepared
-            self._start(kernel, prepared, {**arrays, RESULT: result}, integers)
+            self.start(kernel, {**arrays, RESULT: result}, integers)
             images = {image.name: result for image in artifact.images}
+
+    def start(self, kernel: Artifact, arrays: Mapping[str, Memory], integers: Mapping[str, int]) -> None:
+        """Start a built kernel: arrays by the names of its interface, and at least its integers, by name."""
+        self._start(kernel, self._built[kernel.digest].prepared, arrays, integers)
+
+    def call(self, kernel: Artifact, given: Images, integers: Mapping[str, int]) -> Images:
+        """Return all arrays that a kernel writes, of any role but a network's, by the interface's names.
+
+        `given`: those that it reads, and at least its integers.
+        """
+        self._check_target(kernel)
+        self.build(kernel)
+        return self._called(kernel, given, integers)
+
+    def _called(self, kernel: Artifact, given: Images, integers: Mapping[str, int]) -> Images:
+        """Run a built kernel."""
+        rows, width = integers[kernel.interface.rows], integers["width"]
+        with self._session((rows, width)), ExitStack() as made:
+            arrays = {name: self._stored(name, array, made) for name, array in given.items()}
+            # What is written in place of light, or of a history, are planes like these.
+            names = {
+                array.name: LIGHT if array.planes and array.name == RESULT else array.name
+                for array in kernel.interface.written
+            }
+            for array in kernel.interface.written:
+                shape = plane_shape(array.shape, integers)
+                shape = self.sums_shape(kernel, rows, width) if array.name == SUMS else shape
+                arrays[array.name] = self._made(names[array.name], shape, made)
+            self.start(kernel, arrays, integers)
+            return {name: self._fetch(known, arrays[name]) for name, known in names.items()}
 
     def trace(
         self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None
@@ -297,45 +310,16 @@ class Executor(ABC):
         `numbers` (n,) are those of the scene that are inputs of the kernel; None: those that it was compiled
         with.
         """
-        self._check_target(kernel)
-        self.build(kernel)
-        return self._trace(kernel, part, numbers)
-
-    def _trace(
-        self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None
-    ) -> NDArray[np.float32]:
-        """Run a built kernel."""
-        with self._session((part.rows, part.width)), ExitStack() as made:
-            sums = self._made(SUMS, self.sums_shape(kernel, part), made)
-            self._follow(kernel, part, {SUMS: sums, **self._moving(kernel, numbers, made)})
-            return self._fetch(SUMS, sums)[:, : part.rows, : part.width]
+        sums = self.call(kernel, _numbers(kernel, numbers), part.integers)[SUMS]
+        return sums[:, : part.rows, : part.width]
 
     def paint(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
         """Return the encoded images (H, W, C) of a part that is the whole picture, by name."""
-        self._check_target(kernel)
         if (part.first_row, part.rows) != (0, part.height):
             rows = f"{part.first_row} to {part.first_row + part.rows} of {part.height}"
             rule = "a kernel that writes encoded images computes the full image"
             raise InputError("rows of the image", rows, rule, "trace the part by a kernel of sums")
-        self.build(kernel)
-        return self._paint(kernel, part, numbers)
-
-    def _paint(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
-        """Run a built kernel that writes images."""
-        size = part.rows, part.width
-        with self._session(size), ExitStack() as made:
-            written = self._images(kernel.images, size, made)
-            arrays = {f"{IMAGE}{name}": memory for name, memory in written.items()}
-            self._follow(kernel, part, {**arrays, **self._moving(kernel, numbers, made)})
-            return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
-
-    def _moving(
-        self, kernel: Artifact, numbers: NDArray[np.float32] | None, made: ExitStack
-    ) -> dict[str, Memory]:
-        """Return the memory of the scene's numbers, where they are inputs, which `made` gives back."""
-        if not kernel.programs.inputs:
-            return {}
-        return {SCENE_NUMBERS: self._stored(SCENE_NUMBERS, numbers_for(kernel, numbers), made)}
+        return _of_features(self.call(kernel, _numbers(kernel, numbers), part.integers))
 
     def _made(self, name: str, shape: tuple[int, ...], made: ExitStack) -> Memory:
         """Return memory that a kernel will write, which `made` gives back."""
@@ -350,13 +334,8 @@ class Executor(ABC):
             written[image.name] = self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
         return written
 
-    def _follow(self, kernel: Artifact, part: Part, arrays: Mapping[str, Memory]) -> None:
-        """Start a built kernel, whose sums go to memory of [`sums_shape`], or its images to theirs."""
-        self._start(kernel, self._built[kernel.digest].prepared, arrays, part.integers)
-
     def encode(self, kernel: Artifact, sums: NDArray[np.float32], samples: int) -> Images:
         """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
-        self._check_target(kernel)
         wanted = len(kernel.planes)
         if sums.dtype != np.float32 or sums.ndim != 3 or len(sums) != wanted or 0 in sums.shape:
             raise InputError(
@@ -365,17 +344,10 @@ class Executor(ABC):
                 f"must be float32 of shape ({wanted}, height, width): planes {', '.join(kernel.planes)}",
                 "add up the planes that the encoding was compiled for",
             )
-        self.build(kernel)
-        return self._encode(kernel, np.ascontiguousarray(sums), samples)
-
-    def _encode(self, kernel: Artifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Run a built kernel."""
-        size = sums.shape[1:]
-        with self._session((size[0], size[1])), ExitStack() as made:
-            given = self._stored(SUMS, sums, made)
-            written = self._images(kernel.images, (size[0], size[1]), made)
-            self._turn(kernel, given, written, samples)
-            return {name: self._fetch(f"{IMAGE}{name}", memory) for name, memory in written.items()}
+        height, width = sums.shape[1:]
+        strides = {"width": width, "height": height, "row_stride": width, "plane_stride": height * width}
+        given = {SUMS: np.ascontiguousarray(sums)}
+        return _of_features(self.call(kernel, given, {**strides, "sample_count": samples}))
 
     def _turn(self, kernel: Artifact, sums: Memory, written: Mapping[str, Memory], samples: int) -> None:
         """Start a built encoding of sums that may be larger than the images."""
@@ -383,8 +355,7 @@ class Executor(ABC):
         _, rows, stride = sums.shape
         arrays = {SUMS: sums, **{f"{IMAGE}{name}": memory for name, memory in written.items()}}
         integers = {"width": width, "height": height, "row_stride": stride, "plane_stride": rows * stride}
-        built = self._built[kernel.digest]
-        self._start(kernel, built.prepared, arrays, {**integers, "sample_count": samples})
+        self.start(kernel, arrays, {**integers, "sample_count": samples})
 
     def _check_target(self, artifact: Artifact) -> None:
         """Refuse a kernel in another language."""
@@ -403,3 +374,14 @@ class Executor(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _numbers(kernel: Artifact, numbers: NDArray[np.float32] | None) -> Images:
+    """Return the array of a scene's numbers, where they are inputs."""
+    taken = kernel.interface.named(SCENE_NUMBERS)
+    return {SCENE_NUMBERS: numbers_for(kernel, numbers)} if taken else {}
+
+
+def _of_features(written: Images) -> Images:
+    """Return encoded images by the names of their features."""
+    return {name.removeprefix(IMAGE): image for name, image in written.items()}

@@ -25,7 +25,7 @@ from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .images import Images, widest
-from .kernel import Memory, Part, Size, in_order, shapes
+from .kernel import Memory, Size, in_order, shapes
 
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
@@ -217,9 +217,9 @@ class OpenCLExecutor(Executor):
         arguments = [*(held[array.name] for array in taken.arrays), *in_order(taken, integers)]
         prepared.kernel(self._queue, _whole(items, prepared.local), prepared.local, *arguments)
 
-    def sums_shape(self, kernel: Artifact, part: Part) -> tuple[int, int, int]:
+    def sums_shape(self, kernel: Artifact, rows: int, width: int) -> tuple[int, int, int]:
         """Return the shape of whole groups of whole vectors; numbers beyond the part mean nothing."""
-        items = (-(-part.width // kernel.lanes), part.rows)
+        items = (-(-width // kernel.lanes), rows)
         columns, rows = _whole(items, PATH_LOCAL_SIZE[min(kernel.lanes, 2)])
         return len(kernel.planes), rows, columns * kernel.lanes
 

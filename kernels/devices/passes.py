@@ -52,14 +52,15 @@ class Passes:
         if kernel.images:
             written = {f"{IMAGE}{image.name}": self._images[image.name] for image in kernel.images}
             with executor._session(self.size):
-                executor._follow(kernel, part, {**written, **self._moving(kernel, numbers)})
+                executor.start(kernel, {**written, **self._moving(kernel, numbers)}, part.integers)
             return
-        shape = executor.sums_shape(kernel, part)
+        shape = executor.sums_shape(kernel, part.rows, part.width)
         with executor._session(self.size):
             if shape != self._sums.shape:
                 self._sums = self._dropped(self._sums)
                 self._sums = executor._memory(SUMS, shape)
-            executor._follow(kernel, part, {SUMS: self._sums, **self._moving(kernel, numbers)})
+            arrays = {SUMS: self._sums, **self._moving(kernel, numbers)}
+            executor.start(kernel, arrays, part.integers)
 
     def _moving(self, kernel: Artifact, numbers: NDArray[np.float32] | None) -> dict[str, Memory]:
         """Return the memory of the scene's numbers, where they are inputs; the same are not written again."""

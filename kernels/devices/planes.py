@@ -27,7 +27,7 @@ from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
 from ...refimpl.network.dataset import known
 from ...refimpl.network.smoothing import LEVELS
 from .executor import Executor
-from .kernel import Memory, plane_integers, plane_shape
+from .kernel import plane_integers, plane_shape
 
 
 def smoothed(
@@ -53,10 +53,10 @@ def smoothed(
         guides, light, other = (
             executor._made(name, plane_shape(shapes[name], integers), made) for name in (GUIDES, LIGHT, LIGHT)
         )
-        _start(executor, kernels.guide, {**arrays, GUIDES: guides, LIGHT: light}, integers)
+        executor.start(kernels.guide, {**arrays, GUIDES: guides, LIGHT: light}, integers)
         for level in range(LEVELS):
             integers["gap"] = 2**level
-            _start(executor, kernels.smooth, {GUIDES: guides, LIGHT: light, RESULT: other}, integers)
+            executor.start(kernels.smooth, {GUIDES: guides, LIGHT: light, RESULT: other}, integers)
             light, other = other, light
         images = executor._images(kernels.encode.images, (height, width), made)
         executor._turn(kernels.encode, light, images, 1)
@@ -71,21 +71,5 @@ def followed(
     `arrays` are those of the kernel by name: planes of first hits and of the last image, the colour
     (H, W, 3), rows of motions, cameras.
     """
-    executor._check_target(kernel)
-    executor.build(kernel)
     _, height, width = arrays[PAST].shape
-    with executor._session((height, width)), ExitStack() as made:
-        integers = plane_integers(kernel, (height, width))
-        given = {name: executor._stored(name, values, made) for name, values in arrays.items()}
-        result = kernel.interface.named(RESULT)
-        assert result is not None
-        memory = executor._made(PAST, plane_shape(result.shape, integers), made)
-        _start(executor, kernel, {**given, RESULT: memory}, integers)
-        return executor._fetch(PAST, memory)
-
-
-def _start(
-    executor: Executor, kernel: Artifact, arrays: Mapping[str, Memory], integers: Mapping[str, Any]
-) -> None:
-    """Start a built kernel."""
-    executor._start(kernel, executor._built[kernel.digest].prepared, arrays, integers)
+    return executor.call(kernel, arrays, plane_integers(kernel, (height, width)))[RESULT]

@@ -1,7 +1,7 @@
 """Hold an export to its promise: compile it by the target's own tools, run it, compare with the check pair.
 
 1. Tools that compile or validate the files are run; one that is missing is a verdict and no error
-   [`COMPILED`].
+   [`targets.Tool`].
 2. What is nearest to the target runs the denoiser on the pair's images [`runner`]; each number must lie
    within the pair's bound, be its bits where that is 0. With a scene its paths are run too, and compared
    with the reference's sums [`_paths`].
@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,11 @@ from ...compiler.core.ir import sha256
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.executor import Executor
 from ..devices.kernel import Part
-from . import onnx_export, tools
+from . import onnx_export
 from .check_pair import SEED
 from .package import Export
-from .runners import WAYS
+from .runners import opened
+from .targets import ONNX, TARGETS
 
 OPERATIONS = 10_000
 """Operations of a path of six surfaces, rounded up: sums may be off by so many roundings of values near 1."""
@@ -35,9 +36,6 @@ PATHS_WITHIN = OPERATIONS * 2.0**-24
 
 PATHS_ALIKE = 0.98
 """Share of a picture's sums that must lie within; the others are of paths that passed an edge that near."""
-
-Told = Callable[[Export, Path], str]
-"""(export, its folder) -> what has compiled it, or an error."""
 
 
 @dataclass(frozen=True)
@@ -132,20 +130,21 @@ UNTOLD: Mapping[str, str] = {"metal": "none of Apple's here", "onnx": "onnx.chec
 
 def _compiled(export: Export) -> tuple[str, str]:
     """Return which tools took the files, and what one of them refused."""
-    told = []
+    if export.target == ONNX or (tool := TARGETS[export.target].tool) is None:
+        return UNTOLD.get(export.target, "the device's compiler"), ""
     with tempfile.TemporaryDirectory(prefix="wamnet-check-") as name:
         folder = Path(name)
         for path, data in export.files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
-        for step in COMPILED.get(export.target, ()):
-            try:
-                told.append(step(export, folder))
-            except ExecutorUnavailable as error:
-                told.append(f"missing: {error}")
-            except CompileError as error:
-                return "", str(error)
-    return " + ".join(dict.fromkeys(told)) or UNTOLD.get(export.target, "the device's compiler"), ""
+        try:
+            for path in _sources(export, tool.suffix):
+                tool.take(folder, path, *tool.options)
+        except ExecutorUnavailable as error:
+            return f"missing: {error}", ""
+        except CompileError as error:
+            return "", str(error)
+    return tool.title, ""
 
 
 def _sources(export: Export, suffix: str) -> list[str]:
@@ -154,92 +153,14 @@ def _sources(export: Export, suffix: str) -> list[str]:
     return [name for name in named if name.endswith(suffix)]
 
 
-def _glslang(stage: str, *options: str, suffix: str) -> Told:
-    """Return the step of glslang's reference compiler."""
-
-    def step(export: Export, folder: Path) -> str:
-        for name in _sources(export, suffix):
-            tools.run("glslangValidator", *options, "-S", stage, name, folder=folder)
-        return "glslangValidator"
-
-    return step
-
-
-def _validated(export: Export, folder: Path) -> str:
-    """Validate SPIR-V."""
-    for name in _sources(export, ".spv"):
-        tools.validate(folder, name)
-    return "spirv-val"
-
-
-def _translated(export: Export, folder: Path) -> str:
-    """Translate GLSL for Vulkan to SPIR-V, and validate that."""
-    for name in _sources(export, ".comp"):
-        tools.spirv((folder / name).read_text())
-    return "glslangValidator + spirv-val"
-
-
-def _hlsl(export: Export, folder: Path) -> str:
-    """Compile HLSL to SPIR-V, and validate that."""
-    for name in _sources(export, ".hlsl"):
-        tools.spirv((folder / name).read_text(), "hlsl")
-    return "glslangValidator -D + spirv-val"
-
-
-UNREAD = "177"
-"""Number of the warning that a variable is not read: a path's program has some, whatever it adds up."""
-
-
-def _nvcc(export: Export, folder: Path) -> str:
-    """Compile CUDA C to PTX."""
-    for name in _sources(export, ".cu"):
-        tools.run(
-            "nvcc",
-            "-ptx",
-            "-Werror",
-            "all-warnings",
-            "-diag-suppress",
-            UNREAD,
-            "-o",
-            "kernel.ptx",
-            name,
-            folder=folder,
-        )
-    return "nvcc -ptx"
-
-
-WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror", "-c")
-"""What a careful project compiles C with."""
-
-
-def _cc(export: Export, folder: Path) -> str:
-    """Compile each header by itself, with all warnings as errors."""
-    for name in _sources(export, ".h"):
-        (folder / "one.c").write_text(f'#include "{name}"\nint wamnet_one;\n')
-        tools.run("cc", *WARNINGS, "-Wno-unused-function", "-o", "one.o", "one.c", folder=folder)
-    return "cc -Wall -Wextra -Wconversion -Werror"
-
-
-COMPILED: Mapping[str, Sequence[Told]] = {
-    "glsl-compute": (_glslang("comp", suffix=".comp"),),
-    "glsl-es": (_glslang("frag", suffix=".frag"),),
-    "glsl-vulkan": (_translated,),
-    "spirv": (_validated,),
-    "hlsl": (_hlsl,),
-    "c": (_cc,),
-    "cuda": (_nvcc,),
-}
-"""Tools by target; the others' files are compiled by what runs them."""
-
-
 def runner(target: str, kernel: str) -> Executor:
     """Return what runs a target's kernels here; `kernel` is the compiler's name of target and place."""
-    opened = WAYS[target].open()
+    found = opened(*TARGETS[target].opens)
     home = kernel.partition(":")[2]
-    if home and home not in opened.homes:
-        opened.close()
+    if home and home not in found.homes:
+        found.close()
         raise ExecutorUnavailable(f"no runner for {target} with this storage of the weights is installed")
-    return opened
+    return found
 
 
 def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
@@ -249,17 +170,17 @@ def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
         data = export.files["denoise/denoise.onnx"]
         device, found = onnx_export.run_graph(data, pair.images)
         return device, found, None
-    with runner(export.target, export.denoiser.target) as opened:
-        found = opened.run(export.denoiser, pair.images)
-        return WAYS[export.target].route + opened.device, found, _paths(export, opened)
+    with runner(export.target, export.denoiser.target) as device:
+        found = device.run(export.denoiser, pair.images)
+        return TARGETS[export.target].route + device.device, found, _paths(export, device)
 
 
-def _paths(export: Export, opened: Any) -> float | None:
+def _paths(export: Export, device: Any) -> float | None:
     """Return the share of the sums, or of encoded numbers, that only rounding moves off the reference."""
     height, width, _ = export.pair.output.shape
     if export.passes:
         values = {"iFrame": SEED, "seed_number": SEED, "width": width, "height": height}
-        drawn = {name: opened.draw(text, (height, width), values) for name, text in export.passes.items()}
+        drawn = {name: device.draw(text, (height, width), values) for name, text in export.passes.items()}
         held = export.pair.images
         near = [np.abs(drawn[n][..., : held[n].shape[2]] - held[n]) <= PATHS_WITHIN for n in drawn]
         return float(np.mean([x.mean() for x in near]))
@@ -269,6 +190,6 @@ def _paths(export: Export, opened: Any) -> float | None:
     wanted = [(None, export.pair.sums), *((moment.numbers, moment.sums) for moment in export.pair.moments)]
     alike = []
     for numbers, sums in wanted:
-        off = np.abs(opened.trace(export.path, part, numbers) - sums)
+        off = np.abs(device.trace(export.path, part, numbers) - sums)
         alike.append(float((off <= PATHS_WITHIN * np.maximum(1, np.abs(sums))).mean()))
     return min(alike)

@@ -21,7 +21,7 @@ from ..measure import PAUSE_S, Clock, Entry, take_turns
 from .check import runner
 from .host_runner import HostRunner
 from .package import Export
-from .runners import WAYS
+from .targets import TARGETS
 
 SIZE_PX = 512
 """Width and height of the picture, as in the project's tables of speed."""
@@ -63,7 +63,7 @@ def measure(
     is missing on this machine.
     """
     check_measured(export.target)
-    found = [_measured(export, size, rounds, clock, each) for each in WAYS[export.target].timed or [()]]
+    found = [_measured(export, size, rounds, clock, each) for each in TARGETS[export.target].timed or [()]]
     return replace(found[0], plain_ms=found[1].ms if found[1:] else None)
 
 
@@ -87,7 +87,7 @@ def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Seq
         take_turns([entry], rounds, PAUSE_S, clock=clock)
         median, ms = entry.times.median, [MS * seconds for seconds in entry.seconds]
         # Some drivers compile when a kernel first runs: what that took beyond a picture is theirs.
-        device = " ".join([WAYS[export.target].route + opened.device, *options])
+        device = " ".join([TARGETS[export.target].route + opened.device, *options])
         compiled = max(0.0, first - median)
         return Speed(device, size, rounds, MS * median, min(ms), max(ms), compiled)
 
@@ -100,8 +100,8 @@ def _unseen(denoiser: Artifact) -> Artifact:
 
 def check_measured(target: str) -> None:
     """Refuse a target of which nothing here runs what its users would run."""
-    way = WAYS.get(target)
-    if way is None or way.stands_in:
+    row = TARGETS.get(target)
+    if row is None or row.stands_in:
         rule = "does not run on real hardware here, so a time would be meaningless"
-        known = ", ".join(name for name, each in WAYS.items() if not each.stands_in)
+        known = ", ".join(name for name, each in TARGETS.items() if not each.stands_in)
         raise InputError("--measure with target", target, rule, f"leave it out, or choose one of {known}")

@@ -6,8 +6,9 @@ one being the usual one, and says how files are named, how kernels are called, a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from ...compiler.kernel.interface import BLOCK, TABLE, staged
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
@@ -42,6 +43,42 @@ class Place:
     schedules: tuple[str, ...] = (PLAIN,)
     limit: Limit | None = None
     each: float = 4.0
+
+
+UNREAD = "177"
+"""Number of the warning that a variable is not read: a path's program has some, whatever it adds up."""
+
+PTX = ("nvcc", "-ptx", "-Werror", "all-warnings", "-diag-suppress", UNREAD, "-o", "kernel.ptx")
+"""What compiles CUDA C."""
+
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror", "-c")
+"""What a careful project compiles C with."""
+
+
+def _run(folder: Path, name: str, *command: str) -> None:
+    """Run a command for a file."""
+    tools.run(*command, name, folder=folder)
+
+
+def _translated(folder: Path, name: str, *language: str) -> None:
+    """Compile a file to SPIR-V, and validate that."""
+    tools.spirv((folder / name).read_text(), *language)
+
+
+def _cc(folder: Path, name: str) -> None:
+    """Compile a header by itself, with all warnings as errors."""
+    (folder / "one.c").write_text(f'#include "{name}"\nint wamnet_one;\n')
+    tools.run("cc", *WARNINGS, "-Wno-unused-function", "-o", "one.o", "one.c", folder=folder)
+
+
+@dataclass(frozen=True)
+class Tool:
+    """The target's own compiler or validator: `take` gets a folder, a file's name, and these options."""
+
+    title: str
+    suffix: str
+    take: Callable[..., None] = _run
+    options: tuple[str, ...] = ()
 
 
 Files = Callable[[str, str], Mapping[str, bytes]]
@@ -81,6 +118,11 @@ class Row:
 
     `single`: a pass of the host writes one image, so that a noisy picture's features are passes of their own.
     `dispatch`: how kernels on buffers with numbers are started.
+
+    `opens`: what runs its kernels here, the target's own compiler and device or the nearest to it
+    [runners.py], to which they are translated by `route`. `stands_in`: it computes the same, but is nothing
+    that the target's users have. `timed`: where options of a compiler decide, those that are timed: the
+    advised ones, and those of a plain build. `tool`: what takes its files, if not what runs them.
     """
 
     name: str
@@ -94,6 +136,11 @@ class Row:
     most_images: Limit | None = None
     source: Limit | None = None
     dispatch: str = ""
+    opens: tuple[str, ...] = ()
+    route: str = ""
+    stands_in: bool = False
+    timed: tuple[Sequence[str], ...] = ()
+    tool: Tool | None = None
 
 
 def _block(bytes_: int, name: str) -> Limit:
@@ -237,8 +284,17 @@ ROWS: tuple[Row, ...] = (
         "    round_up((width + {columns} - 1) / {columns}, {group_x}),\n"
         "    round_up((height + {rows} - 1) / {rows}, {group_y})}};\n"
         "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
+        opens=("opencl",),
     ),
-    Row("glsl", "GLSL 3.30, fragment shader", _fragment("opengl", 1024), _as(".frag"), "names", GL_CODE),
+    Row(
+        "glsl",
+        "GLSL 3.30, fragment shader",
+        _fragment("opengl", 1024),
+        _as(".frag"),
+        "names",
+        GL_CODE,
+        opens=("opengl",),
+    ),
     Row(
         "glsl-compute",
         "GLSL 4.30, compute shader",
@@ -247,6 +303,8 @@ ROWS: tuple[Row, ...] = (
         "numbered",
         _buffers_code("GLuint"),
         dispatch=f"gl{DISPATCH}",
+        opens=("gl_runner", "ComputeRunner"),
+        tool=Tool("glslangValidator", ".comp", options=("glslangValidator", "-S", "comp")),
     ),
     Row(
         "glsl-es",
@@ -255,6 +313,8 @@ ROWS: tuple[Row, ...] = (
         _as(".frag"),
         "names",
         f"{GL_CODE}\n{ENGINES}",
+        opens=("gl_runner", "ESRunner"),
+        tool=Tool("glslangValidator", ".frag", options=("glslangValidator", "-S", "frag")),
     ),
     Row(
         "glsl-vulkan",
@@ -264,6 +324,9 @@ ROWS: tuple[Row, ...] = (
         "numbered",
         _buffers_code("VkPipeline"),
         dispatch=DISPATCH,
+        opens=("wgpu_runner", "vulkan_runner"),
+        route="SPIR-V, wgpu, ",
+        tool=Tool("glslangValidator + spirv-val", ".comp", _translated),
     ),
     Row(
         "wgsl",
@@ -274,6 +337,8 @@ ROWS: tuple[Row, ...] = (
         _buffers_code("const"),
         dispatch=DISPATCH,
         most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
+        opens=("wgpu_runner", "WgpuRunner"),
+        route="wgpu, ",
     ),
     Row(
         "hlsl",
@@ -283,6 +348,9 @@ ROWS: tuple[Row, ...] = (
         "registers",
         _buffers_code("auto"),
         dispatch=DISPATCH,
+        opens=("wgpu_runner", "hlsl_runner"),
+        route="back to SPIR-V, wgpu, ",
+        tool=Tool("glslangValidator -D + spirv-val", ".hlsl", _translated, ("hlsl",)),
     ),
     Row(
         "metal",
@@ -294,6 +362,9 @@ ROWS: tuple[Row, ...] = (
         _buffers_code("id<MTLComputePipelineState>"),
         dispatch="dispatchThreadgroups(ceil(width / {across}), ceil({height} / {down})) "
         "of {group_x} x {group_y}",
+        opens=("host_runner", "MetalRunner"),
+        route="as C++ with a shim, ",
+        stands_in=True,
     ),
     Row(
         "spirv",
@@ -303,6 +374,9 @@ ROWS: tuple[Row, ...] = (
         "numbered",
         _buffers_code("VkPipeline"),
         dispatch=DISPATCH,
+        opens=("wgpu_runner", "vulkan_runner"),
+        route="wgpu, ",
+        tool=Tool("spirv-val", ".spv", tools.validate),
     ),
     Row(
         "c",
@@ -317,6 +391,9 @@ ROWS: tuple[Row, ...] = (
         "   the program chooses. For x86 processors without AVX2 define WAMNET_PORTABLE.\n"
         "   Other schedules: tile:8 needs registers of 8 floats (AVX2), tile:4 those of 4 (SSE, NEON).\n"
         "   GCC and clang also compile fft:16, fft:8 and fft:4, which are faster for large windows. */",
+        opens=("host_runner", "CRunner"),
+        timed=(("-O3", "-march=native"), ("-O2",)),
+        tool=Tool("cc -Wall -Wextra -Wconversion -Werror", ".h", _cc),
     ),
     Row(
         "cuda",
@@ -330,6 +407,10 @@ ROWS: tuple[Row, ...] = (
             "wamnet_denoise<<<grid, block>>>({arguments});\n"
             "cudaDeviceSynchronize();",
         ),
+        opens=("host_runner", "CUDARunner"),
+        route="as C++ with a shim, ",
+        stands_in=True,
+        tool=Tool("nvcc -ptx", ".cu", options=PTX),
     ),
     Row(
         "shadertoy",
@@ -344,6 +425,8 @@ ROWS: tuple[Row, ...] = (
         "4. Set each channel's filter to nearest and its wrap to clamp.",
         entry="mainImage",
         single=True,
+        opens=("host_pass_runner", "ShadertoyRunner"),
+        route="its uniforms declared, ",
         most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
         # The site states none: with more its editor hardly moves.
         source=Limit("characters of the largest shader", 1_000_000, "use a smaller --variant, as window8"),
@@ -366,6 +449,8 @@ ROWS: tuple[Row, ...] = (
         "# Leave HDR 2D off: a viewport with it encodes for the display what it shows, and these colours\n"
         "# are encoded. To read them in 16 bits, draw into a SubViewport with use_hdr_2d that is not shown.",
         single=True,
+        opens=("host_pass_runner", "GodotRunner"),
+        route="its words declared, ",
     ),
 )
 """All rows but that of ONNX, which is not a kernel's text."""

@@ -50,23 +50,10 @@ def encoding(model: Model) -> str:
     return dict(lower(model).info)[OUTPUT_ENCODING]
 
 
-def kernels(
-    row: Row,
-    denoiser: Artifact,
-    path: Artifact | None,
-    encoder: Artifact | None,
-    passes: Mapping[str, str],
-) -> list[dict[str, Any]]:
-    """Return what a manifest says about each kernel, in the order in which they run."""
-    found = [_pass(row, name, text) for name, text in passes.items()]
-    if path is not None:
-        found.append(_kernel(row, "path", path))
-    if encoder is not None:
-        found.append(_kernel(row, "encode", encoder))
-    for kernel in denoiser.kernels:
-        role = "denoise" if kernel is denoiser else "horizontal"
-        found.append(_kernel(row, role, kernel))
-    return found
+def kernels(row: Row, made: Mapping[str, Artifact], passes: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return what a manifest says about each kernel, by its name, in the order in which they run."""
+    of_host = [_pass(row, name, text) for name, text in passes.items()]
+    return [*of_host, *(_kernel(row, name, kernel) for name, kernel in made.items())]
 
 
 def _bound(interface: Interface) -> list[Binding]:
@@ -85,7 +72,7 @@ def _bound(interface: Interface) -> list[Binding]:
 
 def _kernel(row: Row, role: str, kernel: Artifact) -> dict[str, Any]:
     """Return what a manifest says about one kernel."""
-    files = sorted(row.files("denoise" if role == "horizontal" else role, kernel.source))
+    files = sorted(row.files(kernel.role, kernel.source))
     return {
         "role": role,
         "files": [f"{role}/{name}" for name in files],

@@ -26,6 +26,7 @@ from ...compiler.compile import compile_plan
 from ...compiler.core import weights as weight_layout
 from ...compiler.core.ir import sha256
 from ...compiler.core.lower import lower
+from ...compiler.kernel.interface import DENOISE
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import compile_encode
 from ...compiler.scenes.host_pass import feature_pass
@@ -96,11 +97,11 @@ class Export:
     request: Request
     files: Mapping[str, bytes]
     manifest: Mapping[str, Any]
-    denoiser: Artifact | None
-    path: Artifact | None
-    encoder: Artifact | None
-    passes: Mapping[str, str]
     pair: check_pair.Pair
+    denoiser: Artifact | None = None
+    path: Artifact | None = None
+    encoder: Artifact | None = None
+    passes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def target(self) -> str:
@@ -130,21 +131,18 @@ def export(request: Request) -> Export:
     plan = plan_model(request.model, place.kernel, request.profile, schedule, request.variant)
     denoiser = compile_plan(plan)
     limits = _limits(request, row, place, denoiser)
-    files: dict[str, bytes] = {}
-    for kernel, folder in _folders(denoiser):
-        files |= _written(kernel, folder)
-        files |= {f"{folder}/{n}": data for n, data in row.files("denoise", kernel.source).items()}
-        if row.slots == "header":
-            files[f"{folder}/{scratch.NAME}"] = scratch.header(kernel).encode()
-    halves = _halves(denoiser)
-    if halves:
-        files[f"denoise/{HALVES_NAME}"] = halves
     programs = _programs(request, row)
     path, encoder, passes = _of_scene(request, row, programs)
-    for name, made in (("path", path), ("encode", encoder)):
-        if made is not None:
-            files |= _written(made, name)
-            files |= {f"{name}/{n}": data for n, data in row.files(name, made.source).items()}
+    made = {"path": path, "encode": encoder, "horizontal": denoiser.before, "denoise": denoiser}
+    kernels = {role: kernel for role, kernel in made.items() if kernel is not None}
+    files: dict[str, bytes] = {}
+    for role, kernel in kernels.items():
+        held = {**artifacts.files_of(kernel), **row.files(kernel.role, kernel.source)}
+        if row.slots == "header" and kernel.role == DENOISE:
+            held[scratch.NAME] = scratch.header(kernel).encode()
+        files |= {f"{role}/{name}": data for name, data in held.items()}
+    if halves := _halves(denoiser):
+        files[f"denoise/{HALVES_NAME}"] = halves
     for name, text in passes.items():
         found = row.files(f"feature.{name}", text)
         files |= {f"features/{n}": data for n, data in found.items()}
@@ -160,9 +158,9 @@ def export(request: Request) -> Export:
     files |= bindings.inputs_written(made_by)
     facts = _facts(request, row, how, denoiser, limits, bool(halves)) | {"schedules": list(place.schedules)}
     facts["scene"] = _scene(request, programs)
-    facts["kernels"] = bindings.kernels(row, denoiser, path, encoder, passes)
+    facts["kernels"] = bindings.kernels(row, kernels, passes)
     facts |= {"inputs": bindings.input_facts(made_by)} if made_by else {}
-    return _finished(request, facts, files, denoiser, path, encoder, passes, pair)
+    return _finished(Export(request, files, facts, pair, denoiser, path, encoder, passes))
 
 
 def _check_imported(request: Request) -> None:
@@ -222,28 +220,21 @@ def _graph(request: Request) -> Export:
         "schedules": [],
         "kernels": [onnx_export.kernel(model)],
     }
-    return _finished(request, facts, files, None, None, None, {}, pair)
+    return _finished(Export(request, files, facts, pair))
 
 
-def _finished(
-    request: Request,
-    facts: Mapping[str, Any],
-    files: Mapping[str, bytes],
-    denoiser: Artifact | None,
-    path: Artifact | None,
-    encoder: Artifact | None,
-    passes: Mapping[str, str],
-    pair: check_pair.Pair,
-) -> Export:
-    """Return the export with its README and manifest, which has hashes and lengths of all other files."""
-    facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts(), **facts}
+def _finished(export: Export) -> Export:
+    """Return an export with what all manifests say, its host, its README, and hashes and lengths of files."""
+    request, pair, files = export.request, export.pair, export.files
+    facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts()}
+    facts |= export.manifest
     if request.host:
         host = host_named(request.host)
         facts["host"] = host.facts()
         first = next(iter(pair.images.values()))
         seen = first if first.shape[2] == 3 else pair.output
         files = {**files, **host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
-    return _closed(Export(request, files, facts, denoiser, path, encoder, passes, pair))
+    return _closed(replace(export, files=files, manifest=facts))
 
 
 def _closed(export: Export) -> Export:
@@ -387,17 +378,6 @@ def _limits(request: Request, row: Row, place: Place, denoiser: Artifact) -> lis
         rule = f"target {row.name} has one pass for the denoiser, and a rank is two"
         raise InputError("--variant", denoiser.manifest["variant"]["name"], rule, "leave the rank out")
     return found
-
-
-def _folders(denoiser: Artifact) -> list[tuple[Artifact, str]]:
-    """Return the kernels of a denoiser and their folders."""
-    first = [(denoiser.before, "horizontal")] if denoiser.before is not None else []
-    return [*first, (denoiser, "denoise")]
-
-
-def _written(kernel: Artifact, folder: str) -> dict[str, bytes]:
-    """Return the files that `wamnet compile` would write, in a folder."""
-    return {f"{folder}/{name}": data for name, data in artifacts.files_of(kernel).items()}
 
 
 def _programs(request: Request, row: Row) -> PathPrograms | None:

@@ -248,54 +248,28 @@ def command_words(text: str) -> tuple[str, ...]:
 # ---- renderers that the project knows ---------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Known:
-    """A renderer that is run against: form of scenes, command, end of pictures, and what it needs."""
+EACH = "{python} {scene} {seeds} {outputs}"
+"""The command of a scene that is a Python script."""
 
-    form: str
-    words: tuple[str, ...]
-    output: str
-    needs: str
-    more: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-
-
-KNOWN: Mapping[str, Known] = {
-    "mitsuba": Known(
-        "mitsuba",
-        (sys.executable, "-m", f"{__package__}.mitsuba_process", "{scene}", "{seeds}", "{outputs}"),
-        NPZ,
-        "pip install mitsuba",
-    ),
-    "cycles": Known(
-        "blender", (sys.executable, "{scene}", "{seeds}", "{outputs}"), EXR, "pip install --no-deps bpy"
-    ),
-    "cycles-as-it-comes": Known(
-        "blender",
-        (sys.executable, "{scene}", "{seeds}", "{outputs}", "--as-it-comes"),
-        EXR,
-        "pip install --no-deps bpy",
-    ),
-    "cycles-gltf": Known(
+KNOWN: Mapping[str, tuple[str, str, str]] = {
+    "mitsuba": ("mitsuba", "{python} -m wamnet_verify.mitsuba_process {scene} {seeds} {outputs}", NPZ),
+    "cycles": ("blender", EACH, EXR),
+    "cycles-as-it-comes": ("blender", f"{EACH} --as-it-comes", EXR),
+    "cycles-gltf": (
         "gltf",
-        (
-            *(sys.executable, "-m", f"{__package__}.gltf_process", "{seeds}", "{outputs}"),
-            *("{scene}", "{width}", "{samples}", "{depth}"),
-        ),
+        "{python} -m wamnet_verify.gltf_process {seeds} {outputs} {scene} {width} {samples} {depth}",
         EXR,
-        "pip install --no-deps bpy",
     ),
-    "luxcore": Known(
-        "luxcore", (sys.executable, "{scene}", "{seeds}", "{outputs}"), NPZ, "pip install pyluxcore"
-    ),
-    "povray": Known(
-        "povray",
-        ("povray", "+I{scene}", "+O{output}", "+W{width}", "+H{height}", "-D", "-GA", "-A"),
-        EXR,
-        "apt-get install povray",
-        {EXR: ("+FE",), PNG: ("+FN8", "File_Gamma=sRGB")},
-    ),
+    "luxcore": ("luxcore", EACH, NPZ),
+    "povray": ("povray", "povray +I{scene} +O{output} +W{width} +H{height} -D -GA -A", EXR),
 }
-"""Renderers by name, beside `wamnet` itself: a new one is a line here."""
+"""Form of scenes, command and end of pictures of renderers by name, beside `wamnet` itself: a new one is a
+line here. They need the packages mitsuba, bpy (without its dependencies), pyluxcore, and povray of Debian."""
+
+MORE: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "povray": {EXR: ("+FE",), PNG: ("+FN8", "File_Gamma=sRGB")}
+}
+"""Further words of a known renderer by the end of a picture's name."""
 
 
 def known(name: str, executor: str, read: Read, limit_s: float = LIMIT_S) -> Renderer:
@@ -305,5 +279,6 @@ def known(name: str, executor: str, read: Read, limit_s: float = LIMIT_S) -> Ren
     if name not in KNOWN:
         names = ", ".join(("wamnet", *KNOWN))
         raise InputError("--renderer", name, "it is unknown", f"known are {names}; or give --command")
-    found = KNOWN[name]
-    return ByCommand(name, found.form, found.words, read, found.output, limit_s, found.more)
+    form, command, output = KNOWN[name]
+    words = tuple(sys.executable if word == "{python}" else word for word in command.split())
+    return ByCommand(name, form, words, read, output, limit_s, MORE.get(name, {}))

@@ -34,9 +34,6 @@ from .intervals import Interval, interval
 SCHEMA = "wamnet-experiment-2"
 """Name and version of the form of a file of results."""
 
-OLDER = "wamnet-experiment-1"
-"""The form before it, without commands, which is read too."""
-
 PER_FRAME = "per_frame"
 """The value that holds lists of numbers, one for each pose, by the names of their means."""
 
@@ -71,10 +68,9 @@ def _data(path: Path) -> dict[str, Any]:
     """Return what a file says, or refuse it."""
     try:
         data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        data.setdefault("commands", [])
-        if data["schema"] not in (SCHEMA, OLDER) or not isinstance(data["records"], list):
+        if data["schema"] != SCHEMA or not isinstance(data["records"], list):
             raise KeyError("schema")
-        _ = data["experiment"], data["settings"]
+        _ = data["experiment"], data["settings"], data["commands"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         rule = f"is not a file of results ({type(error).__name__})"
         raise InputError("file of results", str(path), rule, WAY_OUT) from None
@@ -147,14 +143,10 @@ class Results:
 
     def put(self, configuration: str, seed: int, values: Values) -> None:
         """Add a record, in place of an older one of this configuration and seed."""
-        self.put_all({configuration: values}, seed)
-
-    def put_all(self, rows: Mapping[str, Values], seed: int = 0) -> None:
-        """Add a record for each configuration in one step."""
         with self._locked():
             found = self._checked()
-            kept = [r for r in found["records"] if r["configuration"] not in rows or r["seed"] != seed]
-            kept += [{"configuration": n, "seed": seed, "values": dict(v)} for n, v in rows.items()]
+            kept = [r for r in found["records"] if (r["configuration"], r["seed"]) != (configuration, seed)]
+            kept.append({"configuration": configuration, "seed": seed, "values": dict(values)})
             commands = dict.fromkeys([*found["commands"], *([self.command] if self.command else [])])
             self._write(kept, list(commands))
 

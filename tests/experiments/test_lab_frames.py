@@ -142,7 +142,8 @@ def test_names_without_features_of_their_own_are_the_older_ones(tmp_path):
     names = {frames.path_of(tmp_path, replace(shot, feature_spp=rays), "numpy") for rays in (0, 5, 16)}
     assert len(names) == 3
     job = {**asdict(shot.job)}
-    del job["feature_spp"], job["feature_sampler"], job["seen"], job["color"]
+    for later in ("feature_spp", "feature_sampler", "seen", "color", "shadow_rays"):
+        del job[later]
     made_from = [scene_digest(shot.build()), job, "numpy", sorted(USUAL), version()]
     digest = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
     assert any(name.name.endswith(digest[:16]) for name in names)

@@ -10,13 +10,13 @@ Each kernel is compiled, its certificate checked by the independent checker, and
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from lab.command import described
 from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
@@ -84,9 +84,7 @@ def rows(models: Sequence[str], kernels: Sequence[str]) -> Iterator[list[str]]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("--models", default=",".join(MODELS), help="shipped models")
     parser.add_argument(
         "--only", default=",".join(KERNELS), help="target:schedule or target:schedule:variant"

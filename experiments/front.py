@@ -11,12 +11,12 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from lab.command import described
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
@@ -74,9 +74,7 @@ def sheet(images: list[NDArray[np.uint8]]) -> Image.Image:
 
 def main() -> None:
     """Render and write the loop."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/front.webp"))
     parser.add_argument("--period", type=float, default=8.0, help="the scene's time at the loop's end")
     options = parser.parse_args()

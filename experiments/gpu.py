@@ -38,7 +38,7 @@ from typing import Any
 
 import numpy as np
 from lab import node
-from lab.command import begin
+from lab.command import begin, described
 from lab.nvcc import NvccRunner
 from lab.patches import ODD, Wanted, cropped, patches
 from lab.results import Results
@@ -531,9 +531,7 @@ def prepare(given: argparse.Namespace) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure, and print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     listed = lambda text: tuple(filter(None, text.split(",")))  # noqa: E731
     parser.add_argument("--size", type=int, default=1024, help="pixels of a side of the timed image")
     parser.add_argument("--rounds", type=int, default=7)

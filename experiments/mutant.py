@@ -10,13 +10,13 @@ conformance` does; without it all are asked, except pictures that are judged by 
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Iterator, Sequence
 
 import mutants
 from lab import mutation, trial
 from lab.blame import Clauses
+from lab.command import described
 from lab.mutation import Mutant
 
 from wamnet.refimpl.errors import InputError
@@ -86,9 +86,7 @@ def told(mutant: Mutant, source: str, asked: Asked, failures: Failures, whole: b
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Show a mutant."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("name", help="name of a mutant, or a part of it; * is any text")
     parser.add_argument("-k", dest="words", action="append", default=[], help="only such cases")
     options = parser.parse_args(arguments)

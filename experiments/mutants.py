@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 from lab import mutation, mutation_c, trial, trial_c
 from lab.blame import Clauses
+from lab.command import described
 from lab.mutation import Mutant
 from lab.tables import markdown
 from lab.trial import Outcome
@@ -199,9 +200,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     The share is that of mutants that are run and have no reason, of which all would be caught at best.
     """
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("words", nargs="*", help="only mutants whose name holds one")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of outcomes")
     parser.add_argument("--count", type=int, help="how many, drawn at random; all without it")

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from lab import printed
-from lab.command import begin
+from lab.command import begin, described
 from lab.records import BENCH, DEMO, FOLDER, ROOT, checked, of_bench, of_demo
 from lab.results import PACKAGES, SCHEMA, Results, written
 
@@ -47,9 +47,7 @@ IMAGES = "docs/images"
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make a record."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("file", type=Path, nargs="?", help="results of an experiment, or bench.json")
     parser.add_argument("--name", help="the record's name")
     parser.add_argument("--command", help="what made the file, where it does not say so")

@@ -11,12 +11,11 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 
 from lab import plots, texts
-from lab.command import begin
+from lab.command import begin, described
 from lab.gallery import PLOTS
 from lab.records import ROOT, Records, pending
 from lab.shown import FIGURES, TABLES
@@ -26,9 +25,7 @@ from wamnet.cli.files.outputs import replacing, write_text
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write what differs, or name it."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing; status 1 if anything differs")
     options = parser.parse_args(arguments)
     records = Records()

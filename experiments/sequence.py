@@ -22,6 +22,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from lab.command import described
+
 from wamnet.cli.common.sequence import frames_of, outputs_of, overlapped
 from wamnet.cli.files import exr
 from wamnet.refimpl.frame import Frame
@@ -139,9 +141,7 @@ def single_rows(folder: Path, rounds: int) -> list[str]:
 
 def main() -> None:
     """Measure."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument("--frames", type=int, default=240)
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--rounds", type=int, default=3)

@@ -13,7 +13,6 @@ any other. Faults of the language around the arithmetic are in tests/support/tex
 
 from __future__ import annotations
 
-import argparse
 import random
 import re
 import sys
@@ -23,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
+from lab.command import described
 from lab.tables import markdown
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, write
@@ -201,9 +201,7 @@ def planted(folder: Path, count: int, seed: int) -> tuple[list[str], int]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plant faults as the command line says; return the exit status."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = described(__doc__)
     parser.add_argument(
         "folders", type=Path, nargs="*", help="kernels; default: small ones, of all languages"
     )

@@ -51,13 +51,15 @@ def line(arguments: Sequence[str] | None = None) -> str:
     return shlex.join(["python", f"{path.parent.name}/{path.name}", *kept])
 
 
+def described(text: str | None, **how: str) -> argparse.ArgumentParser:
+    """Return a parser whose help is a module's docstring."""
+    form = argparse.RawDescriptionHelpFormatter
+    return argparse.ArgumentParser(description=text, formatter_class=form, **how)
+
+
 def parser(text: str, name: str) -> argparse.ArgumentParser:
     """Return a parser with the options that all experiments have; `text` is the module's docstring."""
-    made = argparse.ArgumentParser(
-        prog=f"python experiments/{name}.py",
-        description=text,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    made = described(text, prog=f"python experiments/{name}.py")
     made.add_argument(
         "--scale",
         choices=(*SCALES, HIDDEN_SCALE),

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.kernel.interface import UNSIGNED
-from wamnet.kernels.devices.kernel import Kernel, Memory
+from wamnet.kernels.devices.kernel import Memory
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.buffer_runner import BufferRunner, Launch
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
@@ -99,7 +100,7 @@ class NvccRunner(BufferRunner):
         if error:
             raise CompileError(f"{self.device}: CUDA error {error}")
 
-    def _build(self, kernel: Kernel, group: tuple[int, int] | None) -> Any:
+    def _build(self, kernel: Artifact, group: tuple[int, int] | None) -> Any:
         taken = kernel.interface
         numbers = taken.numbers()
         arguments = [f"buffers[{numbers[array.name]}]" for array in taken.arrays]

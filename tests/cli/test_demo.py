@@ -19,11 +19,25 @@ from wamnet.cli.reports import machine, runs
 from wamnet.compiler.variants import plan_model
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding, metrics
+from wamnet.refimpl.network import train
 from wamnet.refimpl.network.denoise import denoise
+
+for_this_machine = demo.for_this_machine
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small():
+    """Let NumPy render and train a little: test_dataset.py and test_train.py test kernels that do."""
+    by_numpy = {"renderer": "numpy", "trainer": "numpy"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo, "QUICK", demo.replace(demo.QUICK, size_px=16, steps=20))
+        patch.setattr(demo, "for_this_machine", lambda plan: demo.replace(plan, **by_numpy))
+        patch.setitem(train.PRESETS, "best", demo.replace(train.BEST, widths=(8, 8), batch=64))
+        yield
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(tmp_path_factory, small):
     """Return the folder of a finished quick demonstration."""
     folder = tmp_path_factory.mktemp("demo") / "out"
     assert main(["demo", "--quick", "-o", str(folder)]) == 0
@@ -194,7 +208,7 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
         raise ExecutorUnavailable(f"{name}: nothing there")
 
     monkeypatch.setattr("wamnet.kernels.devices.registry.open_executor", nothing)
-    plan = demo.for_this_machine(demo.Plan())
+    plan = for_this_machine(demo.Plan())
     assert plan == demo.replace(
         demo.Plan(),
         renderer="numpy",
@@ -312,7 +326,7 @@ def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> Non
     pictures = [dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")] * 2
     plot = {"light": "", "dark": ""}
     drawn = {"errors": [{"input": plot, "denoised": plot}] * 2, "training": plot}
-    assert "<dd>– <small>60 steps</small>" in page(data, pictures, drawn)
+    assert f"<dd>– <small>{demo.QUICK.steps} steps</small>" in page(data, pictures, drawn)
 
 
 def test_the_report_tells_whose_picture_it_is(finished, report) -> None:

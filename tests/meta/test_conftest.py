@@ -54,57 +54,39 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch):
     return run_with
 
 
-@pytest.mark.parametrize(("require", "outcome"), [("", "skipped"), ("mitsuba", "errors")])
-def test_missing_peer_has_the_same_policy(run, pytester, require, outcome):
-    pytester.makepyfile(
-        'import sys\nsys.modules["mitsuba"] = None\ndef test_it(mitsuba):\n    assert mitsuba\n'
-    )
-    result = run(require)
-    result.assert_outcomes(**{outcome: 1})
-    result.stdout.fnmatch_lines(["mitsuba: MISSING: mitsuba: the package is not installed; pip install *"])
-    if require:
-        result.stdout.fnmatch_lines(["peer mitsuba is required and MISSING: mitsuba: the package *"])
+MISSING = {
+    "test_peer": 'import sys\nsys.modules["mitsuba"] = None\ndef test_it(mitsuba):\n    assert mitsuba\n',
+    "test_file": "from packages import needed\nneeded('torch')\ndef test_it():\n    assert True\n",
+    "test_test": "from packages import needed\ndef test_it():\n    assert needed('torch')\n",
+    "conftest_torch": 'import sys\nsys.modules["torch"] = None\n',
+}
+"""Files that need a program, and a package that cannot be imported, from the start or in a test."""
 
 
-NEEDED = """
-import sys
-
-sys.modules["torch"] = None
-from packages import needed
-
-{}
-
-def test_it():
-    assert {}
-"""
-"""A file that needs a package that cannot be imported, from the start or in its test."""
+@pytest.fixture
+def missing(run, pytester):
+    """Let STUB, and tests of a peer and of a package, be there, but nothing that they need."""
+    pytester.makepyfile(**MISSING)
+    return lambda require, *options: run(require, "--nightly", "-p", "conftest_torch", *options)
 
 
-@pytest.mark.parametrize(("before", "asserted"), [("needed('torch')", "True"), ("", "needed('torch')")])
-@pytest.mark.parametrize(("require", "outcome"), [("", "skipped"), ("pyoidn,torch", None)])
-def test_missing_package_has_the_same_policy(run, pytester, before, asserted, require, outcome):
-    pytester.makepyfile(NEEDED.format(before, asserted))
-    result = run(require)
-    result.assert_outcomes(**{outcome or ("errors" if before else "failed"): 1})
-    missing = "MISSING: PyTorch cannot be imported (*); pip install torch"
-    result.stdout.fnmatch_lines([f"torch: {missing}", "pyoidn: not requested by any test that ran"])
-    if require:
-        result.stdout.fnmatch_lines([f"*package torch is required and {missing}"])
+TORCH = "MISSING: PyTorch cannot be imported (*); pip install torch"
 
 
-@pytest.mark.parametrize("options", [(), ("-n", "1")])
-def test_missing_executor_is_skipped_and_told(run, options):
-    result = run("", "--nightly", *options)
-    result.assert_outcomes(passed=1, skipped=3)
-    result.stdout.fnmatch_lines(
-        ["numpy: ok (this processor)", "opengl-osmesa: MISSING: no opengl with {'context': 'osmesa'}"]
-    )
+def test_what_is_missing_is_skipped_and_told(missing):
+    result = missing("", "-n", "1")
+    result.assert_outcomes(passed=1, skipped=6)
+    lines = ["numpy: ok (this processor)", "opengl-osmesa: MISSING: no opengl with {'context': 'osmesa'}"]
+    lines += ["mitsuba: MISSING: mitsuba: the package is not installed; pip install *", f"torch: {TORCH}"]
+    result.stdout.fnmatch_lines([*lines, "pyoidn: not requested by any test that ran"])
 
 
-def test_missing_executor_that_is_required_fails(run):
-    result = run("opencl", "--nightly")
-    result.assert_outcomes(passed=1, skipped=2, errors=1)
-    result.stdout.fnmatch_lines(["executor opencl is required and MISSING: no opencl with {}; *"])
+def test_what_is_missing_and_required_fails(missing):
+    result = missing("opencl,mitsuba,pyoidn,torch", "--continue-on-collection-errors")
+    result.assert_outcomes(passed=1, skipped=2, errors=3, failed=1)
+    lines = ["executor opencl is required and MISSING: no opencl with {}; *", f"torch: {TORCH}"]
+    lines += ["peer mitsuba is required and MISSING: mitsuba: the package *"]
+    result.stdout.fnmatch_lines_random([*lines, *[f"*package torch is required and {TORCH}"] * 2])
 
 
 def test_unknown_name_is_refused(run):
@@ -135,37 +117,86 @@ def test_cases(a, b):
 """
 
 
+GROWS = """
+import numpy as np
+
+class Executor:
+    forgotten = 0
+    def forget(self):
+        self.forgotten += 1
+
+kept = []
+
+def test_little(opened_executors):
+    opened_executors["numpy"] = Executor()
+
+def test_much(opened_executors):
+    assert opened_executors["numpy"].forgotten == 0
+    kept.append(np.ones(2**25))
+
+def test_after(opened_executors):
+    assert opened_executors["numpy"].forgotten == 1
+
+def test_after_that(opened_executors):
+    assert opened_executors["numpy"].forgotten == 1
+"""
+"""A file one of whose tests takes 256 MB, and keeps them."""
+
+
+DRAWN = """
+import pytest
+from hypothesis import given, strategies
+
+@pytest.mark.parametrize("number", range(2))
+def test_it(number):
+    drawn = []
+
+    @given(strategies.integers(0, 2**64))
+    def draw(value):
+        drawn.append(value)
+
+    draw()
+    print("DRAWN", len(drawn), drawn[-1])
+"""
+
+
 @pytest.mark.parametrize(
-    ("profile", "options", "passed"), [("ci", (), 5), ("ci", ("--nightly",), 13), ("long", (), 13)]
+    ("profile", "options", "ci", "passed", "alike"),
+    [
+        ("ci", ("--budget", "600"), "true", 5, True),
+        ("ci", ("--budget", "0.001", "--nightly"), "true", 13, True),
+        ("long", ("--budget", "0.001"), "", 13, False),
+        ("long", ("--hypothesis-seed=7",), "true", 13, True),
+    ],
 )
-def test_a_tier_says_what_it_leaves_out(run, pytester, monkeypatch, profile, options, passed):
-    """Each value of each parameter remains in some case of a product."""
-    pytester.makepyfile(TIERS)
-    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
+def test_a_tier_says_what_it_leaves_out(run, pytester, monkeypatch, profile, options, ci, passed, alike):
+    """Each value of each parameter remains in some case of a product; beyond its budget CI fails.
+
+    Long runs draw other cases each time: two numbers of 64 bits are the same by chance once in 2^64 runs.
+    """
+    pytester.makepyfile(TIERS, test_drawn=DRAWN, test_grows=GROWS)
+    for name, value in (("PROFILE", profile), ("EXAMPLES", "30")):
+        monkeypatch.setenv(f"HYPOTHESIS_{name}", value)
+    monkeypatch.setenv("CI", ci)
     result = run("", "-s", *options)
-    result.assert_outcomes(passed=passed, deselected=13 - passed)
+    result.assert_outcomes(passed=passed + 6, deselected=13 - passed)
     ran = [line.split("case ")[1].split()[:2] for line in result.outlines if "case " in line]
-    assert {a for _, a in ran} == {"x", "y"}
-    assert {b for b, _ in ran} == {"1", "2", "3", "[4]"}
+    assert ({a for a, _ in map(reversed, ran)}, {b for b, _ in ran}) == ({"x", "y"}, {"1", "2", "3", "[4]"})
     if passed < 13:
         result.stdout.fnmatch_lines(["4 tests left out: nightly: *", "4 tests left out: product: *"])
+    found = re.findall(r"DRAWN (\d+) (\d+)", result.stdout.str())
+    assert [count for count, _ in found] == ["30" if profile == "long" else "100"] * 2
+    assert (found[0] == found[1]) == alike
+    exceeded = "0.001" in options
+    assert result.ret == (exceeded and ci == "true")
+    assert ("TOO MUCH" in result.stdout.str()) is exceeded
+    if "--budget" in options:
+        result.stdout.fnmatch_lines([f"processor time: * s, budget {options[1]} s*"])
 
 
 def test_a_case_that_is_named_runs_in_every_tier(run, pytester):
     file = pytester.makepyfile(TIERS)
     run("", f"{file.name}::test_nightly").assert_outcomes(passed=1)
-
-
-@pytest.mark.parametrize(
-    ("budget", "ci", "status"), [("600", "true", 0), ("0.001", "true", 1), ("0.001", "", 0)]
-)
-def test_a_tier_that_takes_too_much_fails_in_ci(run, pytester, monkeypatch, budget, ci, status):
-    pytester.makepyfile("def test():\n    assert True\n")
-    monkeypatch.setenv("CI", ci)
-    result = run("", "--budget", budget)
-    assert result.ret == status
-    result.stdout.fnmatch_lines([f"processor time: * s, budget {budget} s*"])
-    assert ("TOO MUCH" in result.stdout.str()) is (budget == "0.001")
 
 
 APART = """
@@ -202,8 +233,7 @@ def test_after():
 """Tests in a process of their own, which one of them ends."""
 
 
-@pytest.mark.parametrize("options", [(), ("-n", "1")])
-def test_a_file_apart_has_a_process_of_its_own(run, pytester, options):
+def test_a_file_apart_has_a_process_of_its_own(run, pytester):
     """Its results are those of any file, and so are what it lacks and its peak; a crash fails one test.
 
     The worker takes 512 MB, which do not count as the other's.
@@ -213,7 +243,7 @@ def test_a_file_apart_has_a_process_of_its_own(run, pytester, options):
         "kept = numpy.ones(2**26)\n\ndef test_it():\n    assert kept.any()\n"
     )
     pytester.makepyfile(body, test_apart=APART)
-    result = run("", "-rs", *options)
+    result = run("", "-rs", "-n", "1")
     result.assert_outcomes(passed=4, skipped=1, failed=2)
     result.stdout.fnmatch_lines_random(
         [
@@ -238,68 +268,6 @@ def test_folders_around_a_file_apart_are_left_as_around_any(run, pytester):
     for path in pytester.path.glob("test_*.py"):
         path.unlink()
     run("").assert_outcomes(passed=3)
-
-
-GROWS = """
-import numpy as np
-
-class Executor:
-    forgotten = 0
-    def forget(self):
-        self.forgotten += 1
-
-kept = []
-
-def test_little(opened_executors):
-    opened_executors["numpy"] = Executor()
-
-def test_much(opened_executors):
-    assert opened_executors["numpy"].forgotten == 0
-    kept.append(np.ones(2**25))
-
-def test_after(opened_executors):
-    assert opened_executors["numpy"].forgotten == 1
-
-def test_after_that(opened_executors):
-    assert opened_executors["numpy"].forgotten == 1
-"""
-"""A file one of whose tests takes 256 MB, and keeps them."""
-
-
-def test_kernels_are_dropped_where_a_test_has_built_much(run, pytester):
-    pytester.makepyfile(GROWS)
-    run("").assert_outcomes(passed=4)
-
-
-DRAWN = """
-import pytest
-from hypothesis import given, strategies
-
-@pytest.mark.parametrize("number", range(2))
-def test_it(number):
-    drawn = []
-
-    @given(strategies.integers(0, 2**64))
-    def draw(value):
-        drawn.append(value)
-
-    draw()
-    print("DRAWN", len(drawn), drawn[-1])
-"""
-
-
-@pytest.mark.parametrize(
-    ("profile", "options", "examples", "alike"),
-    [("ci", (), "100", True), ("long", (), "30", False), ("long", ("--hypothesis-seed=7",), "30", True)],
-)
-def test_long_runs_draw_other_cases_each_time(run, pytester, monkeypatch, profile, options, examples, alike):
-    """The same property twice; two numbers of 64 bits are the same by chance once in 2^64 runs."""
-    pytester.makepyfile(DRAWN)
-    monkeypatch.setenv("HYPOTHESIS_PROFILE", profile)
-    monkeypatch.setenv("HYPOTHESIS_EXAMPLES", "30")
-    found = re.findall(r"DRAWN (\d+) (\d+)", run("", "-s", *options).stdout.str())
-    assert [count for count, _ in found] == [examples] * 2
-    assert (found[0] == found[1]) == alike
 
 
 QUICK = """
@@ -327,10 +295,9 @@ def test_it(executor_named):
 """One test that is quick, two that ask for what a quick run lacks, two that say so."""
 
 
-@pytest.mark.parametrize("options", [(), ("-n", "1")])
-def test_a_quick_run_has_no_packages_devices_or_programs(run, pytester, options):
+def test_a_quick_run_has_no_packages_devices_or_programs(run, pytester):
     pytester.makepyfile(QUICK, test_file="import moderngl")
-    result = run("", "--quick", *options)
+    result = run("", "--quick", "-n", "1")
     result.assert_outcomes(passed=1, failed=2, skipped=3)
     result.stdout.fnmatch_lines_random(
         [

@@ -19,6 +19,7 @@ import re
 import token
 import tokenize
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import pytest
@@ -145,6 +146,7 @@ def blank(text: str) -> str:
     return re.sub(r"[^\n]", " ", text)
 
 
+@cache
 def prose(suffix: str, text: str) -> str:
     """Return a file's prose where it was, and spaces in place of all else."""
     if suffix == ".py":
@@ -226,12 +228,20 @@ def commands_of(source: str) -> Mapping[str, list[str]]:
     return found
 
 
-def wrong_words(name: str, text: str, words: Sequence[Word] = WORDS) -> Iterator[str]:
+@cache
+def pattern_of(words: tuple[Word, ...]) -> re.Pattern[str]:
+    """Return the pattern of one of some words."""
+    spaced = "|".join(word.pattern.replace(" ", r"\s+") for word in words)
+    return re.compile(rf"\b(?:{spaced})(?!\w)", re.IGNORECASE)
+
+
+def wrong_words(name: str, text: str, words: tuple[Word, ...] = WORDS) -> Iterator[str]:
     """Yield `name:line: "word": write ..., for ...` for all that a text should not say."""
     flat = re.sub(r"\n[> *#|-]*", lambda match: " " * len(match[0]), prose(name[name.rindex(".") :], text))
+    if not pattern_of(words).search(flat):
+        return
     for word in words:
-        spaced = word.pattern.replace(" ", r"\s+")
-        for match in re.finditer(rf"\b(?:{spaced})(?!\w)", flat, re.IGNORECASE):
+        for match in pattern_of((word,)).finditer(flat):
             start = match.end() - len(match[0].lstrip())
             line = text.count("\n", 0, start) + 1
             said = " ".join(match[0].split())

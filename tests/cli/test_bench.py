@@ -39,19 +39,14 @@ def here(samples, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture
-def found(wamnet, here):
-    """Run the benchmark on the interpreter at two sizes, and return its data and what it said."""
+def test_the_result_is_written_in_all_forms(wamnet, here) -> None:
+    """Of the interpreter at two sizes; what is predicted stands beside what is measured."""
     outcome = wamnet(
         *("bench", "model.safetensors", "--only", "numpy:*", "--repeats", 2),
         *("--size", 16, "--sizes", "8,16", "-o", "made/speed"),
     )  # fmt: skip
     assert outcome.status == 0, outcome.err
-    return json.loads((here / "made/speed/bench.json").read_text()), outcome
-
-
-def test_the_result_is_written_in_all_forms(found, here) -> None:
-    data, outcome = found
+    data = json.loads((here / "made/speed/bench.json").read_text())
     assert data["schema"] == "wamnet-bench-2"
     assert data["interrupted"] is False
     assert data["command"].split()[0] == "wamnet"
@@ -72,6 +67,13 @@ def test_the_result_is_written_in_all_forms(found, here) -> None:
     assert re.search(r"^\| contender \| 8, ms \(predicted\) \| 16, ms \(predicted\) \|$", text, re.M)
     assert "numpy:plain *" in outcome.out
     assert "results: made/speed/bench.json, made/speed/bench.md" in outcome.out
+    assert keys_of(data) <= set(re.findall(r"`(\w+)`", SPEC.read_text())), "every key is documented"
+    heads, rows = bench_report.speed_table(data)
+    assert heads[1:4] == ("ms", "range", "predicted, ms")
+    assert rows[0][3] == bench_report.number(data["contenders"][0]["predicted_ms"])
+    ((mark,),) = (panel.marks for panel in bench_report.panels(data, bench_report.ERRORS))
+    assert mark.ms[0] == data["contenders"][0]["ms"]["median"]
+    assert mark.on_front
 
 
 def keys_of(value, skip: bool = False) -> set[str]:
@@ -82,22 +84,6 @@ def keys_of(value, skip: bool = False) -> set[str]:
         return set()
     own = set() if skip else set(value)
     return own.union(*(keys_of(item, key in NAMES_AS_KEYS) for key, item in value.items()))
-
-
-def test_every_key_is_documented(found) -> None:
-    documented = set(re.findall(r"`(\w+)`", SPEC.read_text()))
-    assert keys_of(found[0]) - documented == set()
-
-
-def test_predicted_stands_beside_measured(found) -> None:
-    data, _ = found
-    heads, rows = bench_report.speed_table(data)
-    assert heads[1:4] == ("ms", "range", "predicted, ms")
-    assert rows[0][3] == bench_report.number(data["contenders"][0]["predicted_ms"])
-    (panel,) = bench_report.panels(data, bench_report.ERRORS)
-    (mark,) = panel.marks
-    assert mark.ms[0] == data["contenders"][0]["ms"]["median"]
-    assert mark.on_front
 
 
 @pytest.mark.parametrize(

@@ -1,27 +1,28 @@
-"""The memory of a kernel of tiles under test: arrays whose elements many turns use at once.
+"""The memory of a kernel under test: arrays whose elements many turns use at once.
 
 Turns that are run at once must have nothing to do with each other: `Race` where one writes an element that
-another reads or writes. An array that is declared inside them has a column for each. What only some lanes
-have written is read by these alone.
+another reads or writes. An array that is declared inside them has a column for each. Numbers of an image that
+only some lanes write are kept for each lane [`Wide`], and folded once all have written theirs. Another
+number, which all lanes share, is read by those alone that have written it.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.kernel import Type
-from .field import P, hashed
-from .lanes import Wrong
-from .terms import Term, drawn_or_zero
+from .field import P, drawn, hashed, zero
+from .lanes import Unread, Wrong
+from .terms import Term
 
 NOBODY, SEVERAL = -1, -2
 """Instead of the number of a turn that has used an element."""
 
-EMPTY, SHAPE, SUM, BOTH = range(4)
-"""What an element holds: nothing, a shape, a sum on its way, or a sum that is an expression as well."""
+EMPTY, WIDE, SHAPE, SUM, BOTH = range(5)
+"""What an element holds: nothing, a number of each lane, a shape, a sum on its way, or both of them."""
 
 
 class Race(Exception):
@@ -58,7 +59,7 @@ class Turns:
     def restore(self) -> None:
         """Undo all writes."""
         for cells, arrays in self.saved.values():
-            for array, before in zip(cells.arrays, arrays, strict=True):
+            for array, before in zip(cells.arrays, arrays, strict=False):
                 array[...] = before
 
     def end(self, outer: Turns) -> None:
@@ -84,20 +85,47 @@ class Turns:
                 )
 
 
-class Cells:
-    """An array of `count` floats in `columns`: shapes, sums on their way, and the lanes that have written."""
+class Reader(Protocol):
+    """What reads memory: for the lanes that are active."""
 
-    def __init__(self, name: str, count: int, columns: int) -> None:
-        self.name, self.count, self.columns = name, count, columns
+    def readable(self, numbers: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Return whether what the lanes of these numbers have written is there for all that are active."""
+        raise NotImplementedError
+
+    def complete(self, written: NDArray[np.bool_]) -> bool:
+        """Return whether all lanes that count, or are active, have written (..., lanes)."""
+        raise NotImplementedError
+
+    def folded(self, term: Term) -> Term:
+        """Return a number of all lanes together."""
+        raise NotImplementedError
+
+
+class Wide:
+    """Numbers (count, columns, lanes) of an array's elements, and the lanes that have written them."""
+
+    def __init__(self, size: tuple[int, ...]) -> None:
+        self.shape, self.written = np.full(size, zero()), np.zeros(size, bool)
+
+
+class Cells:
+    """An array of `count` numbers in `columns`: shapes, sums, spans, and the lanes that have written."""
+
+    def __init__(self, name: str, count: int, columns: int, kind: str = "float32") -> None:
+        self.name, self.count, self.columns, self.kind = name, count, columns, kind
         size = count, columns
         self.state, self.lanes = np.zeros(size, np.uint8), np.zeros(size, np.int32)
         self.shape, self.sums = np.zeros(size, np.uint64), np.zeros((2, *size), np.uint64)
-        self.has_sums = self.partial = False
+        whole = kind != "float32"
+        self.span = np.zeros((2, *(size if whole else (0, 0))), np.int64)
+        self.has_sums, self.partial = whole, False
+        self.wide: Wide | None = None
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """All that it holds."""
-        return self.state, self.lanes, self.shape, self.sums
+        wide = () if self.wide is None else (self.wide.shape, self.wide.written)
+        return self.state, self.lanes, self.shape, self.sums, self.span, *wide
 
     def at(self, place: Any, width: int, turns: Turns, active: NDArray[np.bool_] | None) -> Any:
         """Return rows and columns of an access: slices, or (width, turns); place 0 if not active."""
@@ -121,12 +149,14 @@ class Cells:
             return rows, 0
         return rows, np.arange(turns.count) // (turns.count // self.columns)
 
-    def load(self, place: Any, width: int, turns: Turns, active: Any, readable: Any) -> Term:
-        """Return numbers that have been written, in the lanes that run: `readable` by a number of lanes."""
+    def load(self, place: Any, width: int, turns: Turns, active: Any, reader: Reader) -> Term:
+        """Return numbers that have been written, in the lanes that run."""
         at = self.at(place, width, turns, active)
+        if self.wide is not None and (self.state[at] == WIDE).any():
+            self._settle(at, turns, active, reader)
         state = self.state[at]
         if not state.all() or self.partial:
-            bad = (state == EMPTY) | ~readable(self.lanes[at])
+            bad = (state == EMPTY) | ~reader.readable(self.lanes[at])
             if (bad if active is None else bad & active).any():
                 raise Wrong(f"{self.name} is read before it is written")
         if self.columns < turns.count:
@@ -134,47 +164,129 @@ class Cells:
         shape = self.shape[at]
         one = width == 1
         if not self.has_sums or not (state >= SUM).any():
-            return Term(shape.copy() if one else shape[:, None].copy())
+            return Term(shape.copy() if one else shape[:, None].copy(), kind=self.kind)
         sums = self.sums[:, at[0], at[1]]
         if not (state >= SUM).all():
-            sums = np.where(state >= SUM, sums, drawn_or_zero(shape))
+            sums = np.where(state >= SUM, sums, drawn(shape))
         sums = sums.copy() if one else sums[:, :, None].copy()
+        if self.kind != "float32":
+            return self._integers(at, one, sums)
         if (state == SUM).all():
             return Term(None, sums)
         if not one:
             state, shape = state[:, None], shape[:, None]
         return Term(np.where(state == SUM, hashed("sum", *sums % P), shape), sums)
 
+    def _integers(self, at: Any, one: bool, sums: Any) -> Term:
+        """Return integers; one that is not a sum is not known."""
+        good, shape = self.state[at] == BOTH, self.shape[at]
+        low, high = (np.where(good, self.span[end, at[0], at[1]], 1 - end) for end in (0, 1))
+        if not one:
+            shape, low, high = shape[:, None], low[:, None], high[:, None]
+        return Term(shape.copy(), sums, kind=self.kind, span=(low, high))
+
+    def _settle(self, at: Any, turns: Turns, active: Any, reader: Reader) -> None:
+        """Fold what each lane has written for itself: all that count must have."""
+        assert self.wide is not None
+        if turns.undoes:
+            turns.save(self)
+        rows, columns, _ = self._items(at, turns, active)
+        columns = np.broadcast_to(columns, rows.shape)
+        own = self.state[rows, columns] == WIDE
+        at = rows[own], columns[own]
+        if not reader.complete(self.wide.written[at]):
+            raise Wrong(f"{self.name} is read before it is written")
+        shape = np.ascontiguousarray(self.wide.shape[at].T)
+        term = Term(shape)
+        if self.kind != "float32":
+            span = self.span[0][at][None], self.span[1][at][None]
+            term = Term(shape, self.sums[:, at[0], at[1]][:, None], kind=self.kind, span=span, leaf=shape)
+        term = reader.folded(term)
+        if self.kind != "float32":
+            assert term.sums is not None
+            self.sums[:, at[0], at[1]] = term.sums[:, 0]
+        self.shape[at], self.state[at] = term.known[0], SHAPE if self.kind == "float32" else BOTH
+
     def store(self, place: Any, width: int, value: Term, turns: Turns, active: Any, lanes: int) -> None:
         """Write numbers of active turns (turns,), in the lanes of a number."""
         at = self.at(place, width, turns, active)
         if turns.undoes:
             turns.save(self)
-        known: Any = np.uint64(0) if value.shape is None else value.shape
-        shape = known if known.ndim < 3 else known[:, 0]
-        begins = value.begins
-        if begins:
-            term = value.term
-            term = term if term.ndim == 3 else term[:, :, 0]
-            self.has_sums = True
-        state = SHAPE if not begins else SUM if value.shape is None else BOTH
         self.partial |= lanes > 0
+        keep: Any = None
         if self.columns < turns.count or active is not None:
-            rows, columns, who = self._items(at, turns, None)
-            keep = np.ones(rows.shape, bool) if active is None else np.broadcast_to(active, rows.shape)
-            if self.columns < turns.count:
-                keep = self._writes((rows, columns, who), keep, turns)
-            at = rows[keep], np.broadcast_to(columns, rows.shape)[keep]
-            shape = np.broadcast_to(shape, rows.shape)[keep]
-            if begins:
-                term = np.broadcast_to(term, (2, *rows.shape))[:, keep]
+            rows, columns, keep = self._kept(at, turns, active)
+            at = rows[keep], columns[keep]
         elif isinstance(at[0], np.ndarray):
             at = at[0], np.broadcast_to(at[1], at[0].shape)
-        self.shape[at] = shape
+
+        def own(values: Any, axis: int) -> Any:
+            """Return the values of what is kept: the axis of lanes is one."""
+            flat = values if values.ndim == axis + 2 else values.take(0, axis=axis + 1)
+            return (
+                flat if keep is None else np.broadcast_to(flat, (*flat.shape[:axis], *keep.shape))[..., keep]
+            )
+
+        self.shape[at] = 0 if value.shape is None else own(value.shape, 0)
         self.lanes[at] = lanes
-        self.state[at] = state
-        if begins:
-            self.sums[:, at[0], at[1]] = term
+        self.state[at] = SHAPE if not value.begins else SUM if value.shape is None else BOTH
+        if value.begins:
+            self.sums[:, at[0], at[1]] = own(value.term, 1)
+            self.has_sums = True
+        if value.span is not None and self.span.size:
+            for end in (0, 1):
+                self.span[end][at] = own(value.span[end], 0)
+
+    def store_wide(self, place: Any, width: int, value: Term, turns: Turns, active: Any, mask: Any) -> None:
+        """Write numbers of an image in some lanes (lanes, turns)."""
+        rows, columns, keep = self._kept(self.at(place, width, turns, active), turns, active, apart=True)
+        if turns.undoes:
+            turns.save(self)
+        if self.wide is None:
+            self.wide = Wide((self.count, self.columns, len(mask)))
+        shape = value.shape if self.kind == "float32" else value.leaf
+        if shape is None:
+            raise Unread("integers, in some lanes, that are not an image's")
+
+        def own(values: Any) -> Any:
+            """Return lines (elements, lanes) of arrays (lanes, turns), or (width, lanes, turns)."""
+            return np.broadcast_to(np.swapaxes(values, -1, -2), (*keep.shape, len(mask)))[keep]
+
+        at = rows[keep], columns[keep]
+        where, fresh = own(np.broadcast_to(mask, (len(mask), turns.count))), self.state[at] != WIDE
+        self.wide.written[at] = np.where(fresh[:, None], where, self.wide.written[at] | where)
+        self.wide.shape[at] = np.where(where, own(shape), self.wide.shape[at])
+        self.state[at], self.lanes[at] = WIDE, 0
+        if self.kind != "float32":
+            self._offset(at, fresh, value, keep)
+
+    def _offset(self, at: Any, fresh: Any, value: Term, keep: Any) -> None:
+        """Keep what integers of some lanes are more than an image's: the same in all lanes."""
+        assert value.sums is not None
+        assert value.span is not None
+        size = keep.shape if value.sums.ndim < 4 else (len(keep), 1, keep.shape[1])
+        more = np.broadcast_to(value.sums, (2, *size)).reshape(2, *keep.shape)[:, keep]
+        if (~fresh & (more != self.sums[:, at[0], at[1]]).any(axis=0)).any():
+            raise Unread("integers that differ between lanes by more than an image's")
+        self.sums[:, at[0], at[1]] = more
+        for end, hull in enumerate((np.minimum, np.maximum)):
+            new = np.broadcast_to(value.span[end], size).reshape(keep.shape)[keep]
+            self.span[end][at] = np.where(fresh, new, hull(new, self.span[end][at]))
+
+    def _kept(self, at: Any, turns: Turns, active: Any, apart: bool = False) -> Any:
+        """Return rows and columns (width, turns) of an access, and which of them are written.
+
+        `apart`: no two turns may write one element.
+        """
+        rows, columns, who = self._items(at, turns, None)
+        columns = np.broadcast_to(columns, rows.shape)
+        keep = np.ones(rows.shape, bool) if active is None else np.broadcast_to(active, rows.shape)
+        if self.columns < turns.count:
+            kept = self._writes((rows, columns, who), keep, turns)
+            if apart and (kept != keep).any():
+                raise Race
+            keep = kept
+        return rows, columns, keep
 
     def _items(self, at: Any, turns: Turns, active: Any) -> tuple[Any, Any, Any]:
         """Return rows, columns and numbers of turns (width, turns) of an access, those of active turns."""
@@ -222,10 +334,93 @@ class Cells:
         return kept
 
 
+class Shared:
+    """An array that the items of each group share, and which of these have used its elements in this phase.
+
+    Lanes are the items of a few groups, one group behind the other. Items race for an element where one
+    writes it and another reads or writes it with no barrier between both; nor may an item write what it has
+    read itself. An element is a number of an image, or a word of four of these.
+    """
+
+    def __init__(self, name: str, size: int, kind: str, lanes: int, items: int) -> None:
+        self.name, self.size, self.kind, self.blank = name, size, kind, True
+        group, self.item = np.divmod(np.arange(lanes, dtype=np.int32)[:, None], np.int32(items))
+        count = lanes // items * size
+        self.bytes = 1 if kind == "float32" else 4
+        self.shape, self.held = np.zeros((self.bytes, count), np.uint64), np.zeros(count, bool)
+        self.writer, self.reader = np.full(count, NOBODY, np.int32), np.zeros(count, bool)
+        self.span = [np.zeros((self.bytes, 1, 1), np.int64) for _ in range(2)]
+        self.first = group.astype(np.int64) * size
+        self.writes = self.full = False
+
+    def wait(self) -> None:
+        """Begin another phase."""
+        self.writer.fill(NOBODY)
+        self.reader.fill(False)
+        self.writes, self.full = False, bool(self.held.all())
+
+    def _at(self, place: Any, mask: Any) -> Any:
+        """Return the places (lanes, turns) of elements in all groups' memory, and those of active lanes."""
+        place = np.broadcast_to(place, np.broadcast_shapes(np.shape(place), self.first.shape, np.shape(mask)))
+        if place.min() < 0 or place.max() >= self.size:
+            beyond = (place < 0) | (place >= self.size)
+            if mask is None or (beyond & mask).any():
+                raise Wrong(f"{self.name} is read or written beyond its {self.size} numbers")
+            place = np.where(beyond, 0, place)
+        every, item = self.first + place, np.broadcast_to(self.item, place.shape)
+        if mask is None:
+            return every, every, item, ...
+        active = np.broadcast_to(mask, place.shape)
+        return every, every[active], item[active], active
+
+    def load(self, place: Any, mask: Any) -> Term:
+        """Return numbers, each lane those of its group."""
+        every, at, item, _ = self._at(place, mask)
+        if not self.full and not self.held[at].all():
+            raise Wrong(f"{self.name} is read before it is written")
+        if self.writes and ((self.writer[at] != NOBODY) & (self.writer[at] != item)).any():
+            raise Wrong(f"{self.name}: an item reads what another writes, without a barrier between")
+        self.reader[at] = True
+        if self.bytes == 1:
+            return Term(self.shape[0][every])
+        leaf = self.shape[:, every]
+        span = self.span[0], self.span[1]
+        return Term(leaf, np.zeros((2, 4, 1, 1), np.uint64), kind="word", span=span, leaf=leaf)
+
+    def store(self, place: Any, value: Term, turns: Turns, mask: Any) -> None:
+        """Write numbers, each lane into its group's memory."""
+        if turns.count > 1:
+            raise Race
+        leaf = self._leaf(value)
+        every, at, item, active = self._at(place, mask)
+        writer = self.writer[at]
+        if self.reader[at].any():
+            raise Wrong(f"{self.name}: an item writes what another reads, without a barrier between")
+        self.writer[at] = item
+        if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
+            raise Wrong(f"{self.name}: two items write one number")
+        self.shape[:, at] = np.broadcast_to(leaf, (self.bytes, *every.shape))[:, active]
+        self.held[at] = self.writes = True
+
+    def _leaf(self, value: Term) -> Any:
+        """Return the shapes of an image's numbers, and note their spans."""
+        if self.bytes == 1:
+            if value.shape is None or (not value.is_wide and value.literal is None):
+                raise Unread(f"numbers behind a sum in {self.name}")
+            return value.shape
+        if value.kind != "word" or value.leaf is None or value.span is None or np.any(value.sums):
+            raise Unread(f"anything but words of an image in {self.name}")
+        for end, hull in enumerate((np.minimum, np.maximum)):
+            own = np.broadcast_to(value.span[end], self.span[end].shape)
+            self.span[end] = own if self.blank else hull(self.span[end], own)
+        self.blank = False
+        return value.leaf
+
+
 class Slice:
     """An array of a kernel: elements of a kind in memory, from a place on; a view has sizes (None,)."""
 
-    def __init__(self, cells: Cells, first: Any, kind: Type, sizes: tuple[int | None, ...]) -> None:
+    def __init__(self, cells: Any, first: Any, kind: Type, sizes: tuple[int | None, ...]) -> None:
         self.cells, self.first, self.kind, self.sizes = cells, first, kind, sizes
 
     def each(self, _: Any, two: Any) -> Slice:

@@ -9,10 +9,8 @@ import secrets
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...refimpl.reading import read_file
-from ..kernel.interface import IMAGE, ITEMS, RESULT, WEIGHTS
+from ..kernel.interface import IMAGE, ITEMS, RESULT
 from ..kernel.kernel import Array, Kernel, Store, parts, values, walk
 from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
@@ -20,13 +18,9 @@ from ..parsing.parse import parse
 from ..parsing.reader import Passes
 from ..proof.evidence import NODE, Refused, read, same
 from .claim import Claim
-from .field import add_up_lanes
-from .groups import Group, group_lanes, tile_lanes
-from .lanes import Unread, Wrong, lanes_for
+from .lanes import Unread, Wrong, group_lanes, lanes_for, tile_lanes
 from .languages import TITLES, is_read
 from .limits import limited
-from .machine import Machine
-from .memory import Image, Result
 from .spectra import Tiles
 from .trial import Trial
 
@@ -95,27 +89,22 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         else:
             reach = max(centre, window - centre)
             lanes = lanes_for((reach + pixels - 1, reach), pixels, seed)
-        counts = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
-        if not tiles:
-            add_up_lanes(np.ones(lanes.count, dtype=bool) if group else counts)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles, slots)
         lanes.channels = max(int(manifest["output"]["channels"]), *(int(n) for _, n in claim.images))
         kernel = parsed(source, manifest)
         check_interface(kernel, claim, manifest)
-        if tiles:
-            trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
-            trial.body(kernel.body)
-            trial.complete()
-        else:
-            run_once(kernel, claim, manifest)
+        trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
+        trial.body(kernel.body)
+        trial.ended()
+        shared = 4 * sum(memory.size for memory in trial.shared)
+        if shared != schedule.get("shared_bytes", 0):
+            raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
     except Wrong as error:
         raise Refused(f"source: {error}") from error
     except RecursionError as error:
         raise Unread("expressions, or blocks, so deep in each other") from error
     except MEANINGLESS as error:
         raise Refused(f"source: it has no meaning to the checker ({error})") from error
-    finally:
-        add_up_lanes(None)
     return {"sums": len(claim.tables) * claim.together // slots, "lanes": lanes.count}
 
 
@@ -219,26 +208,6 @@ def parsed(source: str, manifest: Any) -> Kernel:
     bounded = any(manifest["bound"]["output"])
     channels[RESULT] = output["channels"]
     return parse(source, manifest["target"], channels, bounded, passes_of(manifest["schedule"]))
-
-
-def run_once(kernel: Kernel, claim: Claim, manifest: Any) -> None:
-    """Run a kernel: `Wrong` unless it writes the claim's outputs, and nothing else."""
-    lanes, schedule = claim.lanes, manifest["schedule"]
-    size = schedule.get("group")
-    group = Group(lanes, size[0] * size[1]) if size else None
-    extent, spans = (lanes.place(1), lanes.place(3)), claim.ranges.images(claim.text)
-    result = Result(claim, int(manifest["output"]["channels"]))
-    memory = {WEIGHTS: claim.weights, RESULT: result} | {
-        f"{IMAGE}{name}": Image(name, int(n), extent, spans.get(name)) for name, n in claim.images
-    }
-    span_of = claim.ranges.of if claim.stated else None
-    texels = LANGUAGES[manifest["target"]].texels
-    machine = Machine(kernel, lanes, memory, claim.added, group, span_of, texels)
-    machine.body(kernel.body)
-    shared = 4 * sum(memory.size for memory in group.memories) if group else 0
-    if shared != schedule.get("shared_bytes", 0):
-        raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
-    result.complete()
 
 
 def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:

@@ -3,14 +3,14 @@
 An affine map is known by the value of its sum. Where the certificate's bound rests on partial sums
 [spec/profiles.md, PRO-6b], each of these is known as well, and a number of its own replaces it: a text that
 does not add up these parts finds no sum of the whole. A sum that has been found is a number of the program
-from there on [`Claim.added`]; all other operations must be those of the program, in its order.
+from there on [`Trial`]; all other operations must be those of the program, in its order.
 """
 
 from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -19,33 +19,30 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS, NODE, places
 from ..proof.sine_checker import sine
-from . import words
-from .field import (
-    Number,
-    P,
-    Words,
-    choice,
-    difference,
-    drawn,
-    expression,
-    hashed,
-    leaf,
-    literal,
-    product,
-    total,
-)
+from .field import P, Words, drawn, hashed, literal
+from .integers import Ranges, Stored, stated
 from .lanes import Lanes, Unread
-from .memory import Weights
-from .spectra import Tiles
-from .terms import Fold
+from .spectra import Tiles, patches
+from .terms import Fold, Term, compared, constant, expression, known_floats, known_integers, operate, select
 
 COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
 """Operations whose operands may be exchanged, sums and products apart."""
 
-OPERATIONS: dict[str, Callable[[Number, Number], Number]] = {
-    "multiply": product, "add": total, "subtract": difference,
-    **{name: partial(expression, name, commutes=True) for name in COMMUTE},
-    **{name: partial(expression, name) for name in ("right_shift", "left_shift")},
+
+def combine(name: str, a: Term, b: Term) -> Term:
+    """Return what an operation makes of two numbers: equal where its name, kinds and operands are."""
+    commutes = name in COMMUTE or (name in ("add", "multiply") and a.kind != "float32")
+    return Term(expression(name, a, b, commutes=commutes), kind=b.kind)
+
+
+def _exact(name: str, a: Term, b: Term) -> Term:
+    """Return a sum, a difference or a product: of integers it is an operation like any other."""
+    return operate(name, a, b) if a.kind == "float32" else combine(name, a, b)
+
+
+OPERATIONS: dict[str, Callable[[Term, Term], Term]] = {
+    **{name: partial(_exact, name) for name in ("multiply", "add", "subtract")},
+    **{name: partial(combine, name) for name in (*COMMUTE, "right_shift", "left_shift")},
 }  # fmt: skip
 """Operations of a program's text, in addition to affine maps, sines, constants and conversions."""
 
@@ -53,28 +50,25 @@ OPERATIONS: dict[str, Callable[[Number, Number], Number]] = {
 class Traced(np.lib.mixins.NDArrayOperatorsMixin):
     """A number that the reference's sine is called with."""
 
-    def __init__(self, number: Number) -> None:
+    def __init__(self, number: Term) -> None:
         self.number = number
 
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any) -> Any:
-        a = [one.number if isinstance(one, Traced) else literal(float(one), "float32") for one in given]
+        a = [one.number if isinstance(one, Traced) else constant(float(one)) for one in given]
         name = ufunc.__name__
         if name in OPERATIONS:
             return Traced(OPERATIONS[name](*a))
-        if name == "less_equal":
-            found = expression(name, *a, kind="bool")
-            return Traced(Number(found.given, found.shape, "bool", compared=(a[0], a[1])))
-        return Traced(expression(name, *a))
+        return Traced(compared(name, *a) if name == "less_equal" else Term(expression(name, *a)))
 
     def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
-        return Traced(choice(*(one.number for one in given)))
+        return Traced(select(*(one.number for one in given)))
 
 
 class Claim:
-    """The program of a certificate, for each of the `pixels` of every lane; `outputs` has what these are.
+    """The program of a certificate, for all pixels of every lane at once.
 
-    A lane's pixels are `stride` columns apart; of `tiles` they are those of `rows` rows too, all at once, in
-    `slots` [terms.py]: `expected` has the shapes (slots, pixels, channels) of what these are.
+    A lane has `pixels` columns, `stride` apart, of `rows` rows, in `slots` [terms.py]: `expected` has the
+    shapes (slots, pixels, channels) of what these are. Sums of `tiles` come from spectra.
     """
 
     def __init__(
@@ -92,22 +86,20 @@ class Claim:
         self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
         self.exact = held["schema"] == INTEGERS
         self.sine = self._sine(held)
-        self.stated = words.stated(held)
-        self.ranges = words.Ranges(held, self.stated)
-        self.weights: Any = words.Stored(raw) if self.stated else self._memory(raw)
+        self.stated = stated(held)
+        self.ranges = Ranges(held, self.stated)
+        self.spectra = tiles.range if tiles else range(0)
+        self.weights: Any = Stored(raw) if self.stated else self._weights(raw)
         self.tables: list[tuple[str, str]] = []
         self.first: dict[int, int] = {}
         self.found: set[int] = set()
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
         self.centre = int(manifest["window"]["centre"])
-        self.together, self.outputs = 1, []
-        if tiles:
-            self.fold = Fold((lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3]), slots)
-            self.together = pixels * self.rows * slots
-            self.expected = self._pixel(0).known.reshape(slots, pixels * self.rows, -1)
-        else:
-            self.outputs = [self._pixel(p * stride) for p in range(pixels)]
+        own = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
+        self.fold = Fold(own | (lanes.inside is not None), slots)  # all items of a group compute sums
+        self.together = pixels * self.rows * slots
+        self.expected = self._outputs().known.reshape(slots, pixels * self.rows, -1)
 
     def _sine(self, held: Any) -> Any:
         """Return the sine that the certificate promises, as the spec defines it."""
@@ -117,11 +109,8 @@ class Claim:
 
     # ---- inputs --------------------------------------------------------------------------------------------
 
-    def _memory(self, raw: NDArray[np.float32]) -> Weights:
-        return Weights(self._weights(raw), self.tiles.range if self.tiles else range(0))
-
-    def _weights(self, raw: NDArray[np.float32]) -> Number:
-        """Return all weights (2, 1, n) of the file: those of the program as unknowns, others as they are."""
+    def _weights(self, raw: NDArray[np.float32]) -> Term:
+        """Return all weights (1, n) of the file: those of the program as unknowns, others as they are."""
         shape = hashed("weight", np.arange(len(raw)))
         value = drawn(shape)
         owned = np.zeros(len(raw), dtype=bool)
@@ -134,70 +123,55 @@ class Claim:
         if self.tiles:
             owned[self.tiles.owned.ravel()] = True
             owned[self.tiles.bias if self.tiles.bias is not None else []] = True
-        for number in np.unique(raw[~owned]):
-            same = ~owned & (raw == number)
-            value[:, same] = literal(float(number), "float32").value
-        return Number(value[:, None], shape[None], weight=True)
+        value[:, ~owned] = drawn(literal(raw[~owned], "float32"))
+        return Term(shape[None], draw=value[:, None])
 
-    def parameter(self, name: str) -> Number:
-        """Return a parameter's numbers, (2, 1, outputs * inputs) or (2, 1, outputs)."""
+    def _stored(self, at: NDArray[np.intp]) -> Term:
+        """Return numbers (1, n) of the file."""
+        return self.weights.each(lambda a: a[:, at], lambda a: a[:, :, at])  # type: ignore[no-any-return]
+
+    def parameter(self, name: str) -> Term:
+        """Return a parameter's numbers, (1, outputs * inputs) or (1, outputs)."""
         if self.stated:
-            array = self.stated[name]
-            return words.integers(array.ravel(), "float32", True) if array.ndim > 1 else words.floats(array)
+            array = self.stated[name].ravel()[None]
+            return known_integers(array, "float32") if self.stated[name].ndim > 1 else known_floats(array)
         if "base64" in self.parameters[name]:
             if self.tiles is None:
                 raise Unread("weights that the file does not hold")
-            return words.floats(np.frombuffer(base64.b64decode(self.parameters[name]["base64"]), "<f4"))
-        numbers = self.weights.numbers
-        at = places(name, self.parameters[name], numbers.value.shape[-1]).ravel()
-        return Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
+            text = base64.b64decode(self.parameters[name]["base64"])
+            return known_floats(np.frombuffer(text, "<f4")[None])
+        return self._stored(places(name, self.parameters[name], self.weights.known.shape[-1]).ravel())
 
-    def _input(self, at: int) -> Number:
-        """Return the window (2, 1, n) of a pixel of each lane: tap by tap, all images' channels.
-
-        It is added up over lanes: nothing but sums reads it.
-        """
-        return Number(np.stack([tap.term for tap in self._taps(at)], axis=-1))
-
-    def _taps(self, at: int) -> Iterator[Number]:
-        """Yield the numbers of a pixel's window in every lane."""
-        lanes, nothing = self.lanes, literal(0.0, "float32")
-        _, width, _, height = lanes.known
-        for dy in range(int(self.window[0])):
-            for dx in range(int(self.window[1])):
-                column, row = lanes.x + at + dx - self.centre, lanes.y + dy - self.centre
-                pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
-                inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-                for name, channels in self.images:
-                    for c in range(int(channels)):
-                        number = leaf(hashed(f"image {name}", pixel * int(channels) + c))
-                        if self.window[2] == "zero":
-                            value = np.where(inside, number.value, nothing.value)
-                            number = Number(value, np.where(inside, number.known, nothing.known))
-                        yield number
+    def _input(self) -> Term:
+        """Return the windows (1, pixels * n) of all pixels, folded: tap by tap, all images' channels."""
+        rows, columns = (np.arange(int(size)) - self.centre for size in self.window[:2])
+        every = columns + self.stride * np.arange(self.pixels)[:, None]
+        across = np.unique(every)
+        read = patches(self.lanes, self.fold, self.images, (across, rows), self.window[2])
+        taps = np.stack(list(read), axis=-1)[0][:, np.searchsorted(across, every)]
+        return Term(taps.transpose(1, 0, 2, 3).reshape(1, -1))
 
     # ---- the program ---------------------------------------------------------------------------------------
 
-    def _pixel(self, pixel: int) -> Number:
-        """Return the outputs of a pixel of each lane, and make a table of its sums."""
+    def _outputs(self) -> Term:
+        """Return the outputs of all pixels, and make a table of their sums."""
         values: dict[str, Any] = {}
         for m in filter(None, map(NODE.fullmatch, self.text.splitlines())):
             number, op, named = m[1], m[2], dict(p.split("=") for p in (m[4] or "").split(", ") if p)
             given = [values[i] for i in re.findall(r"%(\d+)", m[3])]
             kind = m[0].rpartition(" : ")[2].partition("[")[0]
             if op == "input":
-                values[number] = None if self.tiles else self._input(pixel)  # which only spectra read
+                values[number] = None if self.tiles else self._input()  # which only spectra read
             elif op == "affine":
                 self.ranges.note(re.findall(r"%(\d+)", m[3])[0], given[0])
                 values[number] = self._affine(number, given[0], named, is_window=values["0"] is given[0])
             elif op == "constant":
-                values[number] = literal(float(named["value"]), kind)
+                values[number] = constant(float(named["value"]), kind)
             elif op == "parameter":
                 values[number] = self._each(self.parameter(named["name"]))
             elif op == "convert":
-                values[number] = (
-                    expression("convert", given[0], kind=kind) if given[0].kind != kind else given[0]
-                )
+                same = given[0].kind == kind
+                values[number] = given[0] if same else Term(expression("convert", given[0]), kind=kind)
             elif op == "sin" and self.sine:
                 values[number] = self.sine(Traced(given[0])).number
             elif op in OPERATIONS:
@@ -205,16 +179,16 @@ class Claim:
             else:
                 raise Unread(f"operation {op} of %{number}")
         (output,) = re.findall(r"(?m)^  output \w+ = %(\d+)$", self.text)
-        found: Number = values[output]
+        found: Term = values[output]
         return found
 
-    def _affine(self, node: str, given: Number, named: Any, is_window: bool) -> Number:
+    def _affine(self, node: str, given: Term, named: Any, is_window: bool) -> Term:
         """Return W x + b, and note its value and those of its parts."""
         if is_window and self.tiles:
             return self._from_spectra(node, "bias" in named)
         weight = self.parameter(named["weight"])
         outputs = self.parameters[named["weight"]]["shape"][0]
-        matrix = weight.value[:, 0].reshape(2, outputs, -1)
+        matrix = weight.term[:, 0].reshape(2, outputs, -1)
         whole: Any = np.zeros((2, 1, 1), dtype=np.uint64)
         parts = self._parts(matrix.shape[2]) if is_window and not self.exact else []
         terms = (given.term % P).reshape(2, -1, matrix.shape[2])
@@ -226,35 +200,29 @@ class Claim:
             whole = dot(terms, matrix)
         if "bias" in named:
             whole = (whole + self.parameter(named["bias"]).term) % P
-        whole = whole.reshape(2, -1, self.together * outputs)
-        self._note(whole, "sum", f"the sums of %{node}")
-        return self._number(whole)
+        return self._summed(node, whole)
 
-    def _each(self, number: Number) -> Number:
-        """Return a number of every pixel (2, 1, n) as those of all that are computed at once."""
-        if self.together == 1:
-            return number
-        return Number(np.tile(number.value, self.together), np.tile(number.known, self.together), weight=True)
+    def _each(self, number: Term) -> Term:
+        """Return a number of every pixel (1, n) as those of all that are computed at once."""
+        return number.each(lambda a: np.tile(a, self.together), lambda a: np.tile(a, self.together))
 
-    def _from_spectra(self, node: str, biased: bool) -> Number:
+    def _from_spectra(self, node: str, biased: bool) -> Term:
         """Return the sums of the window with their bias, all pixels': those before it are known by shape."""
         assert self.tiles is not None
         if biased != (self.tiles.bias is not None) or len(re.findall(r"= affine %0\b", self.text)) != 1:
             raise Unread("spectra of a layer that is not the only one to read the window, or of another bias")
         channels = self.tiles.channels(self.lanes, self.fold, self.images, self.centre, self.window[2])
-        found = leaf(self.tiles.sums(channels))
-        if not biased:
+        found = Term(self.tiles.sums(channels))
+        if self.tiles.bias is None:
             return found
-        at = self.tiles.bias
-        numbers = self.weights.numbers
-        bias = Number(numbers.value[:, :, at], numbers.known[:, at], weight=True)
-        whole = (found.term + np.tile(bias.term, self.together)) % P
-        self._note(whole, "sum", f"the sums of %{node}")
-        return self._number(whole)
+        bias = self._stored(self.tiles.bias)
+        return self._summed(node, (found.term + np.tile(bias.term, self.together)) % P)
 
-    def _number(self, value: Words) -> Number:
-        """Return the number of the program that a sum is, in all lanes: it is known by the sum's value."""
-        return Number(None, hashed("found", *value))
+    def _summed(self, node: str, value: Words) -> Term:
+        """Note the sums (2, pixels, n), or (2, 1, pixels * n), of a map; return the numbers that they are."""
+        value = value.reshape(2, 1, -1)
+        self._note(value, "sum", f"the sums of %{node}")
+        return Term(hashed("found", *value))
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
@@ -269,37 +237,23 @@ class Claim:
         ]
 
     def _note(self, value: Words, kind: str, name: str) -> None:
-        """Keep sums (2, 1, n), to be found by their pairs of numbers."""
-        for word in _word(value).tolist():
-            self.first.setdefault(word, len(self.tables))
+        """Keep sums of all pixels, to be found by their pairs of numbers."""
+        table = len(self.tables) * self.together
+        words = word_of(value.reshape(2, self.together, -1))
+        for pixel, line in enumerate(words.tolist()):
+            for word in line:
+                self.first.setdefault(word, table + pixel)
         self.tables.append((kind, name))
-
-    # ---- what a text has found -----------------------------------------------------------------------------
-
-    def added(self, number: Number) -> Number:
-        """Return a sum of a text: a number of the program, or a part, if it is one; else as it is."""
-        if number.shape is not None:
-            return number
-        value = number.value % P
-        words = _word(value)
-        hits = [self.first.get(word) for word in words.ravel().tolist()]
-        if not any(hit is not None for hit in hits):
-            return number
-        good = np.array([hit is not None for hit in hits]).reshape(words.shape)
-        table = next(hit for hit in hits if hit is not None)
-        self.found.add(table)
-        if self.tables[table][0] == "part":
-            return Number(np.where(good, renamed(value), value))
-        return Number(None, np.where(good, self._number(value).known, hashed("sum", *value)))
 
     def missing(self) -> str | None:
         """Return the first sum of the program that a text has not made."""
-        return next((name for k, (_, name) in enumerate(self.tables) if k not in self.found), None)
+        each = (name for _, name in self.tables for _ in range(self.together))
+        return next((name for k, name in enumerate(each) if k not in self.found), None)
 
 
-def _word(value: Words) -> Words:
-    """Return both numbers of sums (2, 1, ...) as one."""
-    word: Words = value[0, 0] << np.uint64(32) | value[1, 0]
+def word_of(value: Words) -> Words:
+    """Return both numbers of sums (2, ...) as one."""
+    word: Words = value[0] << np.uint64(32) | value[1]
     return word
 
 

@@ -13,7 +13,6 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +20,11 @@ from numpy.typing import NDArray
 from ...refimpl.rng import pcg4d
 from ..parsing.parse import Unread as Unread
 
-Mask = NDArray[np.bool_]
-
 FAR = 1000
 """Coordinates that stand for all that are far from a border lie between one and two times this."""
+
+SOME = 32
+"""How many pairs of distances of a group from two borders are drawn in each run."""
 
 
 class Wrong(Exception):
@@ -33,20 +33,17 @@ class Wrong(Exception):
 
 @dataclass
 class Lanes:
-    """Pixels under test: `known` (4, lanes) are x, width, y and height; `active` (lanes,) still run.
+    """Pixels under test: `known` (4, lanes) are x, width, y and height.
 
     No constant beyond `caps`, of a row and of a column, may be compared with them. Of work groups `known` has
     the first pixel's x and y, multiples of `steps`, and `inside` (2, lanes) are the items' places in their
-    group. `mask` (lanes,) are those that a branch runs in. `channels`: the most of an image, so that no index
-    is larger [`most`].
+    group. `channels`: the most of an image, so that no index is larger [`most`].
     """
 
     known: NDArray[np.int64]
     caps: tuple[int, int]
-    active: Mask
     inside: NDArray[np.int64] | None = None
     steps: tuple[int, int] | None = None
-    mask: Mask | None = None
     channels: int = 1
 
     @cached_property
@@ -55,15 +52,15 @@ class Lanes:
         _, width, _, height = self.known + np.array(sum(self.caps) + 1)
         return np.asarray(2**17 + self.channels * width * height)
 
-    @property
-    def running(self) -> Mask:
-        """The lanes (lanes,) in which a statement has an effect now."""
-        return self.active if self.mask is None else self.mask & self.active
+    @cached_property
+    def least(self) -> int:
+        """The least of these."""
+        return int(self.most.min())
 
     @property
     def count(self) -> int:
         """How many there are."""
-        return len(self.active)
+        return int(self.known.shape[1])
 
     @property
     def x(self) -> NDArray[np.int64]:
@@ -74,94 +71,6 @@ class Lanes:
     def y(self) -> NDArray[np.int64]:
         """The row (lanes,) of each lane's pixels."""
         return np.asarray(self.known[2] if self.inside is None else self.known[2] + self.inside[1])
-
-    def place(self, axis: int) -> Place:
-        """Return x, width, y or height."""
-        return Place(self, self.known[axis], np.eye(4)[axis])
-
-    def constant(self, value: Any) -> Place:
-        """Return an integer, or one for each lane, that no coordinate goes into."""
-        return Place(self, np.broadcast_to(value, (self.count,)), np.zeros(4))
-
-
-class Place:
-    """An integer that differs between lanes: `values` (lanes,), and the linear `form` (4, lanes) of each.
-
-    That is of x, width, y and height, without a constant; NaN where it is not linear.
-    """
-
-    def __init__(self, lanes: Lanes, values: Any, form: Any) -> None:
-        self.lanes, self.values = lanes, np.asarray(values, dtype=np.int64)
-        self.form = np.reshape(np.asarray(form, dtype=np.float64), (4, -1))
-
-    def plus(self, other: Any, sign: int = 1) -> Place:
-        """Return the sum with an integer, or the difference."""
-        values, form = (other.values, other.form) if isinstance(other, Place) else (other, 0.0)
-        return Place(self.lanes, self.values + sign * values, self.form + sign * form)
-
-    def times(self, other: Any) -> Place:
-        """Return the product with an integer."""
-        if not isinstance(other, Place):
-            form, near = self.form * other, np.round(self.form * other)
-            return Place(self.lanes, self.values * other, np.where(np.abs(form - near) < 1e-9, near, form))
-        for one, by in ((self, other), (other, self)):
-            if not one.form.any() and len(set(one.values.tolist())) == 1:
-                return by.times(int(one.values[0]))
-        return Place(self.lanes, self.values * other.values, np.full(4, np.nan))
-
-    def against(self, other: Any) -> NDArray[np.int64]:
-        """Return the difference (lanes,) from another integer; `Wrong` unless lanes decide its sign."""
-        found, running = self.plus(other, -1), self.lanes.running
-        form, values, known = found.form, found.values, self.lanes.known
-        if not running.all():
-            form = form if form.shape[1] == 1 else form[:, running]
-            values, known = values[running], known[:, running]
-        (a, b), (c, d) = form[:2], form[2:]
-        one_axis = (np.abs(a) + np.abs(b) == 0) | (np.abs(c) + np.abs(d) == 0)
-        plain = np.isin(form, (-1, 0, 1)).all(axis=0) & (a * b <= 0) & (c * d <= 0)
-        if not (one_axis & plain).all():
-            raise Wrong("it compares coordinates in a way that no lane decides")
-        rest = values - (form * known).sum(axis=0)
-        for axis, cap in enumerate(self.lanes.caps):
-            own, extent = form[2 * axis : 2 * axis + 2]
-            if not (own.any() or extent.any()):
-                continue
-            if (np.abs(rest) * ((own != 0) | (extent != 0))).max(initial=0) > cap:
-                raise Wrong(f"it compares a coordinate with a constant beyond {cap}")
-            alone = rest * (own + extent) * (own * extent == 0)
-            if self.lanes.steps and (alone <= -self.lanes.steps[axis]).any():
-                raise Wrong("it compares a coordinate with a constant as large as a group")
-        return found.values
-
-
-def plus(a: Any, b: Any, sign: int = 1) -> Any:
-    """Return a + b or a - b of integers."""
-    if isinstance(a, Place):
-        return a.plus(b, sign)
-    return (b if sign == 1 else b.times(-1)).plus(a) if isinstance(b, Place) else a + sign * b
-
-
-def times(a: Any, b: Any) -> Any:
-    """Return a * b of integers."""
-    if isinstance(b, Place) and not isinstance(a, Place):
-        a, b = b, a
-    return a.times(b) if isinstance(a, Place) else a * b
-
-
-def clamped(value: Any, end: Any, sign: int) -> Any:
-    """Return the larger (sign 1) or the smaller (-1) of two integers."""
-    if not isinstance(value, Place) and not isinstance(end, Place):
-        return max(value, end) if sign == 1 else min(value, end)
-    value = value if isinstance(value, Place) else end.lanes.constant(value)
-    return chosen(value.lanes, value.against(end) * sign >= 0, value, end)
-
-
-def chosen(lanes: Lanes, where: Mask, a: Any, b: Any) -> Any:
-    """Return integer a in some lanes and b in the others."""
-    if not isinstance(a, Place) and not isinstance(b, Place) and a == b:
-        return a
-    one, other = (v if isinstance(v, Place) else lanes.constant(v) for v in (a, b))
-    return Place(lanes, np.where(where, one.values, other.values), np.where(where, one.form, other.form))
 
 
 def words(seed: int) -> Iterator[int]:
@@ -188,4 +97,66 @@ def lanes_for(caps: tuple[int, int], step: int, seed: int) -> Lanes:
     cases = itertools.product(pairs(caps[0], step), pairs(caps[1], 1))
     found = [(*drawn(p, step), *drawn(q, 1)) for p, q in cases]
     found.insert(0, (*drawn((None, None), step), *drawn((None, None), 1)))
-    return Lanes(np.array(found, dtype=np.int64).T, caps, np.ones(len(found), dtype=bool))
+    return Lanes(np.array(found, dtype=np.int64).T, caps)
+
+
+def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
+    """Return the items of groups of all cases, `pixels` of a row to an item.
+
+    A group's first column is 0 or far: the next, one group on, is as far as any from constants smaller than a
+    group [`Place.compared`]. Its distance from the right border is each that the group and the window reach,
+    or far. So for rows, with the columns far from all borders. Last are groups at both axes' borders.
+    """
+    steps = group[0] * pixels, group[1]
+    known, caps = _cases(steps, window, seed, every=False)
+    y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
+    inside = np.tile([x, y], len(known[0]))
+    return Lanes(np.repeat(known, len(x), axis=1), caps, inside=inside, steps=steps)
+
+
+def tile_lanes(steps: tuple[int, int], window: int, seed: int, beyond: bool) -> Lanes:
+    """Return work items of all cases, of so many columns and rows of pixels.
+
+    The cases are those of groups of as many pixels [`group_lanes`]. `beyond`: and tiles below the picture, at
+    each distance from it, or far.
+    """
+    known, caps = _cases(steps, window, seed, every=True)
+    if beyond:
+        near = np.arange(caps[1] + 2)
+        down = np.concatenate(
+            [(near // steps[1] + 1) * steps[1], np.full(len(near), 2 * FAR // steps[1] * steps[1])]
+        )
+        cases = known[:, np.arange(len(down)) * 7 % known.shape[1]].copy()
+        cases[2], cases[3] = down, down - np.concatenate([near, near])
+        cases[3, len(near) - 1], cases[3, -1] = 1, 1
+        known = np.concatenate([known, cases], axis=1)
+    return Lanes(known, caps, steps=steps)
+
+
+def _cases(
+    steps: tuple[int, int], window: int, seed: int, every: bool
+) -> tuple[NDArray[np.int64], tuple[int, int]]:
+    """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
+
+    Near two borders are `every` pair of distances, first columns and rows being 0 or far, or some, and
+    a whole group, whose items have every pair of their own.
+    """
+    random, caps = words(seed), (steps[0] + window, steps[1] + window)
+
+    def drawn(case: tuple[int | None, int | None], step: int) -> tuple[int, int]:
+        before, behind = case
+        at = (FAR + next(random) % FAR) // step * step if before is None else before
+        return at, at + (FAR + next(random) % FAR if behind is None else behind)
+
+    across, down = ([(b, n) for b in (None, 0) for n in (None, *range(1, cap + 2))] for cap in caps)
+    cases = [(a, down[0]) for a in across] + [(across[0], b) for b in down[1:]]
+    near = range(1, caps[0] + 2), range(1, caps[1] + 2)
+    corners = [*itertools.product((None, 0), repeat=2)]
+    chosen = [*itertools.product(itertools.product(*near), corners)]
+    if not every:
+        some = [(1 + next(random) % a[-1], 1 + next(random) % b[-1]) for a, b in [near] * SOME]
+        chosen = [(steps, c) for c in corners] + [(pair, corners[next(random) % 4]) for pair in some]
+    cases += [((x, b), (y, d)) for (b, d), (x, y) in chosen]
+    for a, c in corners:
+        cases += [((a, None), (c, None)), ((a, None), (c, steps[1])), ((a, steps[0]), (c, None))]
+    return np.array([(*drawn(a, steps[0]), *drawn(b, steps[1])) for a, b in cases], dtype=np.int64).T, caps

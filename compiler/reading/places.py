@@ -1,4 +1,4 @@
-"""Coordinates of a kernel of tiles under test: `Place`, for all lanes and turns at once [lanes.py]."""
+"""Coordinates of a kernel under test: `Place`, for all lanes and turns at once [lanes.py]."""
 
 from __future__ import annotations
 
@@ -35,6 +35,12 @@ class Place:
         self.values, self.form = values, form
 
     @classmethod
+    def inside(cls, lanes: Lanes, axis: int) -> Place:
+        """Return the place of an item in its group."""
+        assert lanes.inside is not None
+        return cls(lanes.inside[axis][:, None], np.zeros((4, 1, 1)))
+
+    @classmethod
     def of(cls, lanes: Lanes, axis: int) -> Place:
         """Return x, width, y or height."""
         return cls(lanes.known[axis][:, None], np.eye(4)[axis].reshape(4, 1, 1))
@@ -68,11 +74,17 @@ class Place:
             form = np.full((4, 1, 1), np.nan) if both else fa * vb if isinstance(a, Place) else fb * va
             near = np.round(form)
             found = cls(va * vb, np.where(np.abs(form - near) < 1e-9, near, form))
+        elif what in ("divide", "remainder") and type(b) is int and not fa.any():
+            bad = va < 0
+            if b <= 0 or (bad if mask is None else bad & mask).any():
+                raise Wrong("it divides a negative integer, or by one")
+            found = cls(va // b if what == "divide" else va % b, fa)
         else:
             raise Unread(f"{what} of coordinates")
-        large = np.abs(found.values) > lanes.most[:, None]
-        if (large if mask is None else large & mask).any():
-            raise Wrong("an integer is larger than an index of an image")
+        if max(-found.values.min(), found.values.max()) > lanes.least:
+            large = np.abs(found.values) > lanes.most[:, None]
+            if (large if mask is None else large & mask).any():
+                raise Wrong("an integer is larger than an index of an image")
         if (np.abs(found.form) > lanes.channels).any():
             raise Wrong("a coordinate is multiplied by more than the channels of an image")
         return found
@@ -113,7 +125,7 @@ def chosen(lanes: Lanes, where: NDArray[np.bool_], a: Any, b: Any) -> Any:
     return Place(np.where(where, va, vb), form)
 
 
-def integers(what: str, a: Any, b: Any, wrong: Callable[[Any, str], None]) -> Any:
+def indices(what: str, a: Any, b: Any, wrong: Callable[[Any, str], None]) -> Any:
     """Return what an operation makes of two integers, or arrays (1, turns); `wrong` refuses where it is."""
     if not all(type(each) is not bool and getattr(each, "dtype", np.int64) == np.int64 for each in (a, b)):
         raise Unread(f"{what} of truths")

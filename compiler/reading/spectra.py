@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import Words, combined, expression, hashed, leaf, literal
+from .field import Words, combined, hashed, literal
 from .lanes import Lanes, Unread
 from .terms import Fold
 
@@ -63,14 +63,14 @@ class Arithmetic:
 
 def _of_shapes(name: str, a: Words, b: Words) -> Words:
     """Return the shapes of an operation's results, of shapes that all are of one number or of one lane."""
-    return expression(name, leaf(a), leaf(b), commutes=name != "subtract").known
+    return combined(name, ("float32", "float32"), [a, b], name != "subtract")
 
 
 SHAPES = Arithmetic(
     partial(_of_shapes, "add"),
     partial(_of_shapes, "subtract"),
     partial(_of_shapes, "multiply"),
-    lambda value: literal(value, "float32").known,
+    lambda value: literal([value], "float32"),
 )
 """Of the shapes of field.py; a constant is the nearest float32."""
 
@@ -216,21 +216,27 @@ class Tiles:
 
     def channels(self, lanes: Lanes, fold: Fold, images: Any, centre: int, border: str) -> Iterator[Words]:
         """Yield the numbers (slots, N, N + beside) that the tiles read of each channel, folded over lanes."""
-        width, height = lanes.known[1][:, None, None], lanes.known[3][:, None, None]
         across = np.arange(self.points + self.columns - self.out) - centre
-        column = lanes.x[:, None, None] + across
-        row = lanes.y[:, None, None] + np.arange(self.points)[:, None] - centre
-        pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
-        outside = (column < 0) | (column >= width) | (row < 0) | (row >= height)
-        centres = iter(self.held["centres"])
-        for name, count in images:
-            for c in range(int(count)):
+        down = np.arange(self.points) - centre
+        read = patches(lanes, fold, images, (across, down), border)
+        for known, middle in zip(read, self.held["centres"], strict=True):
+            middles = literal([middle], "float32")
+            yield combined("subtract", ("float32", "float32"), [known, middles], False) if middle else known
+
+
+def patches(lanes: Lanes, fold: Fold, images: Any, at: Any, border: str) -> Iterator[Words]:
+    """Yield the numbers (slots, rows, columns) of each channel at columns and rows, folded over lanes."""
+    across, down = at
+    width, height = lanes.known[1][:, None], lanes.known[3][:, None]
+    column = lanes.x[:, None] + across
+    for name, count in images:
+        for c in range(int(count)):
+            lines = []
+            for row in (lanes.y[:, None] + dy for dy in down):
+                pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
                 known = hashed(f"image {name}", pixel * int(count) + c)
                 if border == "zero":
-                    known = np.where(outside, literal(0.0, "float32").known, known)
-                one = np.stack([fold.of(known.reshape(len(known), -1), slot) for slot in range(fold.slots)])
-                known = one.reshape(fold.slots, *known.shape[1:])
-                if middle := next(centres):
-                    middles = literal(middle, "float32").known
-                    known = combined("subtract", ("float32", "float32"), [known, middles], False)
-                yield known
+                    outside = (column < 0) | (column >= width) | (row < 0) | (row >= height)
+                    known = np.where(outside, literal(0.0, "float32"), known)
+                lines.append([fold.of(known, slot) for slot in range(fold.slots)])
+            yield np.array(lines).transpose(1, 0, 2)

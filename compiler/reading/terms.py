@@ -1,4 +1,4 @@
-"""Values of a kernel of tiles under test, many at once: shapes of field.py, and sums on their way.
+"""Values of a kernel under test, many at once: shapes of field.py, sums on their way, and integers.
 
 A `Term` has one value for each lane and each turn: an array (lanes, turns), or (width, lanes, turns) of a
 vector, where an axis of one stands for all. Lanes are images of all cases [lanes.py]; turns are turns of
@@ -9,15 +9,19 @@ operation or an array is given is folded into one number for all lanes first [`F
 from __future__ import annotations
 
 import secrets
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import P, Words, combined, drawn, hashed, literal
-from .lanes import Wrong
+from .field import P, Words, combined, drawn, hashed, literal, zero
+from .lanes import Unread, Wrong
+
+Span = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""The least and the largest value of integers, in any lane; of one that is not known these are 1 and 0."""
 
 
 class Fold:
@@ -41,19 +45,39 @@ class Fold:
             return hashed("fold", np.einsum("...l,lt->...t", shape[..., 0], factors))
         return hashed("fold", np.einsum("...lt,lt->...t", shape, factors))
 
+    def term(self, term: Term, slot: Any) -> Term:
+        """Return a term that all lanes share."""
+        if term.shape is None or term.shape.shape[-2] == 1:
+            return term
+        if term.folded is None:
+            sums = term.sums
+            if term.leaf is not None:
+                value = drawn(self.of(term.leaf, slot)[..., None, :])
+                sums = (np.where((term.leaf == zero()).all(axis=-2, keepdims=True), 0, value) + sums) % P
+            term.folded = replace(term, shape=self.of(term.shape, slot)[..., None, :], sums=sums, leaf=None)
+        return term.folded
+
 
 @dataclass(eq=False)
 class Term:
     """Shapes, None of a sum on its way; `sums` (2, ...): its values; `draw` (2, ...): those of a weight.
 
-    `literal`: it is one constant. `factors`: of a product with that, which is a term of a sum if need be.
+    `kind` is its type. `literal`: what a constant is. `factors`: of a product with that, which is a term of a
+    sum if need be. `span`: of an integer, whose value is that of its `sums`, with signs in both rows, and of
+    a float that is one. `leaf`: shapes of an integer that differs between lanes and is these numbers plus its
+    `sums`. `compared`: a and b of a < b. `folded`: the same for all lanes, once it has been made.
     """
 
     shape: Words | None
     sums: Words | None = None
     draw: Words | None = None
-    literal: bool = False
+    kind: str = "float32"
+    literal: float | None = None
     factors: tuple[Term, Term] | None = None
+    span: Span | None = None
+    leaf: Words | None = None
+    compared: tuple[Term, Term] | None = None
+    folded: Term | None = None
 
     @property
     def known(self) -> Words:
@@ -63,7 +87,7 @@ class Term:
         assert self.sums is not None
         return hashed("sum", *self.sums % P)
 
-    @property
+    @cached_property
     def value(self) -> Words:
         """Its field elements (2, ...) as a factor."""
         if self.draw is not None:
@@ -71,7 +95,7 @@ class Term:
         if self.shape is None:
             assert self.sums is not None
             return self.sums % P
-        return drawn_or_zero(self.shape)
+        return drawn(self.shape)
 
     @property
     def term(self) -> Words:
@@ -83,6 +107,11 @@ class Term:
         """Return whether it is part of a sum, or begins one."""
         return self.sums is not None or self.draw is not None
 
+    @property
+    def is_wide(self) -> bool:
+        """Return whether it differs between lanes."""
+        return self.shape is not None and self.shape.shape[-2] > 1
+
     def part(self, index: Any) -> Term:
         """Return some of a vector's numbers."""
         return self.each(lambda a: a[index], lambda a: a[:, index])
@@ -90,46 +119,77 @@ class Term:
     def each(self, one: Any, two: Any) -> Term:
         """Return a term of changed arrays: of shapes, and of values."""
         sums, draw = (None if a is None else two(a) for a in (self.sums, self.draw))
-        return Term(None if self.shape is None else one(self.shape), sums, draw)
+        shape, leaf = (None if a is None else one(a) for a in (self.shape, self.leaf))
+        span = self.span and (one(self.span[0]), one(self.span[1]))
+        return Term(shape, sums, draw, self.kind, self.literal, span=span, leaf=leaf)
 
 
-def drawn_or_zero(shape: Words) -> Words:
-    """Return the field elements (2, ...) of shapes: 0 of a zero."""
-    zero = literal(0.0, "float32").known[0]
-    return np.where(shape == zero, np.uint64(0), drawn(shape))
-
-
-def constant(value: float) -> Term:
+def constant(value: float, kind: str = "float32") -> Term:
     """Return a constant (1, 1)."""
-    return Term(literal(value, "float32").known[:, None], literal=True)
+    if kind == "float32":
+        value = float(np.float32(value))
+        ends = np.full((1, 1), int(value) if value == int(value) and abs(value) < 2**31 else 1)
+        span = ends, np.where(ends == value, ends, 0)
+        return Term(literal(value, kind)[None, None], literal=value, span=span)
+    return replace(known_integers(np.full((1, 1), value), kind), literal=value)
+
+
+def known_integers(values: NDArray[Any], kind: str) -> Term:
+    """Return integers that are known."""
+    values = np.asarray(values, dtype=np.int64)
+    row = (values % np.int64(P)).astype(np.uint64)
+    return Term(literal(values, kind), np.stack([row, row]), kind=kind, span=(values, values))
+
+
+def known_floats(values: NDArray[Any]) -> Term:
+    """Return weights that are known: each value is an unknown, but 0."""
+    shape = literal(values, "float32")
+    return Term(shape, draw=drawn(shape))
 
 
 def stacked(terms: Sequence[Term]) -> Term:
     """Return a vector of single numbers."""
 
-    def together(arrays: Sequence[Words], axis: int) -> Words:
+    def together(arrays: Sequence[Any], axis: int) -> Any:
         return np.stack(np.broadcast_arrays(*arrays), axis=axis)
 
+    kind = terms[0].kind
+    if any(term.kind != kind for term in terms):
+        raise Unread("a vector of numbers of several kinds")
+    if kind != "float32" and all(term.span for term in terms):
+        return _integers(terms, together)
     if any(term.shape is None for term in terms):
-        return Term(None, together([term.term for term in terms], 1))
+        return Term(None, together([term.term for term in terms], 1), kind=kind)
     shape = together([term.known for term in terms], 0)
     sums = draw = None
-    if any(term.sums is not None for term in terms):
+    if any(term.sums is not None for term in terms) and kind == "float32":
         sums = together([term.term for term in terms], 1)
     elif any(term.draw is not None for term in terms):
         draw = together([term.value for term in terms], 1)
-    return Term(shape, sums, draw)
+    return Term(shape, sums, draw, kind)
 
 
-def operate(name: str, a: Term, b: Term, dual: bool) -> Term:
-    """Return a sum, a difference or a product; `dual`: a sum may be an expression as well."""
+def _integers(terms: Sequence[Term], together: Callable[[Sequence[Any], int], Any]) -> Term:
+    """Return a vector of integers; if one has a leaf, so have the others, of which only 0 has a constant."""
+    shape, leaf = together([term.known for term in terms], 0), None
+    if any(term.leaf is not None for term in terms):
+        leaves = [np.full((1, 1), zero()) if term.leaf is None else term.leaf for term in terms]
+        leaf = together(leaves, 0)
+        shape = np.broadcast_to(shape, leaf.shape)
+    sums = together([term.sums for term in terms], 1)
+    spans = [together([term.span[end] for term in terms if term.span], 0) for end in (0, 1)]
+    return Term(shape, sums, kind=terms[0].kind, span=(spans[0], spans[1]), leaf=leaf)
+
+
+def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
+    """Return a sum, a difference or a product of floats; `dual`: a sum may be an expression as well."""
     sums: Words | None = None
     if name == "multiply":
         if any(each.shape is not None and _is_zero(each.shape) for each in (a, b)):
             raise Wrong("a product with 0, which is no number where the other factor is infinite")
         if a.draw is not None or b.draw is not None:
             sums = _product(a, b)
-        elif a.literal or b.literal:
+        elif a.literal is not None or b.literal is not None:
             return Term(expression(name, a, b, commutes=True), factors=(a, b))
     elif a.begins or b.begins:
         for one, other in ((a, b), (b, a)):
@@ -139,10 +199,10 @@ def operate(name: str, a: Term, b: Term, dual: bool) -> Term:
             each if each.factors is None else Term(each.shape, _product(*each.factors)) for each in (a, b)
         )
         if name == "add":
-            sums = _aligned(np.add, a.term, b.term)
+            sums = aligned(np.add, a.term, b.term)
         else:  # magnitudes add up
             va, vb = a.term % P, b.term % P
-            sums = np.stack([_aligned(np.add, va[0], P - vb[0]), _aligned(np.add, va[1], vb[1])])
+            sums = np.stack([aligned(np.add, va[0], P - vb[0]), aligned(np.add, va[1], vb[1])])
     dual = dual or any(each.shape is not None and each.sums is not None for each in (a, b))
     if sums is not None and not dual:
         return Term(None, sums)
@@ -150,15 +210,14 @@ def operate(name: str, a: Term, b: Term, dual: bool) -> Term:
 
 
 def _product(a: Term, b: Term) -> Words:
-    return _aligned(lambda x, y: x * y % P, a.value, b.value)
+    return aligned(lambda x, y: x * y % P, a.value, b.value)
 
 
 def _is_zero(shape: Words) -> bool:
-    zero = literal(0.0, "float32").known[0]
-    return shape.flat[0] == zero and bool((shape == zero).all())
+    return bool(shape.flat[0] == zero()) and bool((shape == zero()).all())
 
 
-def _aligned(function: Any, a: Words, b: Words) -> Words:
+def aligned(function: Any, a: Words, b: Words) -> Words:
     """Return a function of values (2, ...) or shapes, of which one may be of a vector and the other not."""
     if a.ndim != b.ndim and a.shape[0] == b.shape[0] == 2:
         a, b = (x if x.ndim >= max(a.ndim, b.ndim) else x[:, None] for x in (a, b))
@@ -167,10 +226,57 @@ def _aligned(function: Any, a: Words, b: Words) -> Words:
 
 
 def expression(name: str, *operands: Term, commutes: bool = False) -> Words:
-    """Return the shape of an operation on floats."""
-    return combined(name, ("float32",) * len(operands), [each.known for each in operands], commutes)
+    """Return the shape of an operation on numbers."""
+    kinds = tuple([operand.kind for operand in operands])
+    return combined(name, kinds, [operand.known for operand in operands], commutes)
 
 
 def select(where: Term, a: Term, b: Term) -> Term:
-    """Return one of two numbers by a truth of numbers."""
-    return Term(combined("select", ("bool", "float32", "float32"), [where.known, a.known, b.known], False))
+    """Return one of two numbers by a truth of numbers: the minimum or the maximum, if these were compared.
+
+    Of NaN they differ; no number of a certified program is NaN.
+    """
+    if where.compared:
+        less, more = (part.known for part in where.compared)
+        for one, other, name in ((less, more, "minimum"), (more, less, "maximum")):
+            if np.all(a.known == one) and np.all(b.known == other):
+                return Term(expression(name, a, b, commutes=True), kind=a.kind)
+    return Term(expression("select", where, a, b), kind=a.kind)
+
+
+def compared(what: str, a: Term, b: Term) -> Term:
+    """Return the truth of a comparison."""
+    if what.startswith("greater"):
+        a, b, what = b, a, what.replace("greater", "less")
+    order = (a, b) if what == "less" else None
+    return Term(expression(what, a, b), kind="bool", compared=order)
+
+
+def chosen(where: NDArray[np.bool_], a: Term, b: Term) -> Term:
+    """Return a term in some lanes and turns, and another one in the others."""
+    if a.kind != b.kind or a.shape is None or b.shape is None:
+        raise Unread("a choice of sums on their way, or of numbers of several kinds")
+    if a.kind == "float32" and not (a.sums is b.sums is None):
+        raise Unread("a choice of sums on their way")
+    wide = where.shape[0] > 1
+    if wide and not a.is_wide and not b.is_wide:
+        raise Unread("a choice, by lanes, of numbers of all lanes")
+    shape = np.where(where, a.shape, b.shape)
+    sums: Words | None = None
+    leaf: Words | None = None
+    if a.kind != "float32" and a.span is not None and b.span is not None:
+        if (a.leaf is None) != (b.leaf is None) or (wide and not np.all(a.sums == b.sums)):
+            raise Unread("a choice, by lanes, of integers that are not an image's")
+        assert a.sums is not None
+        assert b.sums is not None
+        sums = a.sums if wide else np.where(where, a.sums, b.sums)
+        leaf = None if a.leaf is None or b.leaf is None else np.where(where, a.leaf, b.leaf)
+    return Term(shape, sums, kind=a.kind, span=hull(a.span, b.span), leaf=leaf)
+
+
+def hull(a: Span | None, b: Span | None) -> Span | None:
+    """Return the span of what lies in one of two."""
+    if a is None or b is None:
+        return None
+    both = (a[0] <= a[1]) & (b[0] <= b[1])
+    return np.where(both, np.minimum(a[0], b[0]), 1), np.where(both, np.maximum(a[1], b[1]), 0)

@@ -1,7 +1,7 @@
-"""Runs a kernel of tiles on terms: run.py with other values, and turns of a loop at once where they may be.
+"""Runs a kernel on terms: run.py with other values [values.py], and turns of a loop at once if they may be.
 
-1. A float is a `Term` [terms.py]; an index is Python's integer, an array (1, turns), or a `Place` where it
-   depends on coordinates; a truth is Python's, or one for each lane and turn.
+1. Reading what was not written, reading or writing beyond an array or an image, and branching on a number of
+   the image raise `Wrong`, what this has no rule for `Unread`.
 2. A loop over known turns is run for all of them at once. Where these have to do with each other [cells.py],
    what was written is undone, and they are run one after another.
 3. Launches compute a few tiles, of an odd number that no source can know: an index is that of its own tile
@@ -34,21 +34,25 @@ from ..kernel.kernel import (
     name,
     walk,
 )
-from ..kernel.run import Runner
 from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
-from .cells import Cells, Device, Race, Slice, Tile, Turns
+from .cells import Cells, Device, Race, Shared, Slice, Tile, Turns
 from .claim import Claim
-from .field import P, Words, hashed
+from .field import Words, hashed
+from .integers import Stored
 from .lanes import Unread, Wrong
-from .places import COMPARES, Place, chosen, corner, integers
-from .terms import Term, constant, expression, operate, select, stacked
+from .places import Place, corner
+from .terms import Term, constant
+from .values import Values
 
 MOST = 2**20
 """Most numbers of all arrays: no kernel comes near."""
 
 TOGETHER = 64
 """Turns of loops are run at once while there are fewer of them than this."""
+
+LARGEST = 2**23
+"""Turns of loops are run at once if there are no more numbers than this, one for each turn and lane."""
 
 LONGEST = 2**12
 """Most turns of a loop."""
@@ -57,60 +61,50 @@ TRIES = 3
 """How often turns of a loop that have to do with each other are run at once."""
 
 
-class Trial(Runner):
-    """One run of a kernel for a claim about tiles."""
+class Trial(Values):
+    """One run of a kernel for a claim.
+
+    `texels`: a channel beyond a pixel's own is not that of the next pixel, but wrong.
+    """
 
     def __init__(self, kernel: Kernel, claim: Claim, texels: bool) -> None:
-        lanes = claim.lanes
-        self.kernel, self.claim, self.texels, self.lanes = kernel, claim, texels, lanes
+        super().__init__(kernel, claim)
+        lanes, self.texels = claim.lanes, texels
         self.functions = {each.name: each for each in kernel.functions}
         self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
-        self.dual, self.fold = bool(kernel.launches), claim.fold
-        self.turns = Turns(1)
-        self.mask: NDArray[np.bool_] | None = None
-        self.numbers: dict[int, Any] = {}
         self.memory: dict[str, Any] = {}
+        self.shared: list[Shared] = []
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
-        x, width, y, height = (Place.of(lanes, axis) for axis in range(4))
+        width, height = Place.of(lanes, 1), Place.of(lanes, 3)
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
-        self.start = x, y
-        if not kernel.launches:
-            self.names |= dict(zip(kernel.place, self.start, strict=True))
+        self.start = self._start()
+        self.spans = claim.ranges.images(claim.text)
         self.images = {f"{IMAGE}{key}": int(n) for key, n in claim.images}
-        self.weights = claim.weights
         self.outputs = claim.expected
         slots, pixels, channels = self.outputs.shape
         self.written = np.zeros((slots, pixels, channels, lanes.count), bool)
-        self.evaluators = self._evaluators()
-        self.keys = np.array(sorted(claim.first), dtype=np.uint64)
         of = 2**36 + secrets.randbelow(2**36)
-        self.tile_count = of * self.fold.slots
-        self.tiles = secrets.randbelow(of) + of * np.arange(self.fold.slots)
+        self.tile_count = of * claim.fold.slots
+        self.tiles = secrets.randbelow(of) + of * np.arange(claim.fold.slots)
         if kernel.launches:
             self.names[BATCH[1]] = Tile(np.array([[self.tile_count]]))
+        else:
+            self.names |= dict(zip(kernel.place, self.start, strict=True))
 
-    def _evaluators(self) -> dict[str, Any]:
-        """Return the methods that evaluate expressions: of no other operations than these."""
-        return {key: getattr(self, f"_value_{key}") for key in EVALUATED}
+    def _start(self) -> tuple[Place, Place]:
+        """Return the first pixel of an item, and name its place in its group."""
+        x, y = Place.of(self.lanes, 0), Place.of(self.lanes, 2)
+        if self.lanes.inside is None or not self.kernel.group:
+            return x, y
+        local_x, local_y = Place.inside(self.lanes, 0), Place.inside(self.lanes, 1)
+        item = local_y.values * self.kernel.group[0] + local_x.values
+        self.names |= {"local_x": local_x, "local_y": local_y, "item": Place(item, local_x.form)}
+        return Place(x.values + local_x.values, x.form), Place(y.values + local_y.values, y.form)
 
     # ---- lanes and turns -----------------------------------------------------------------------------------
-
-    @property
-    def active(self) -> NDArray[np.bool_] | None:
-        """The turns (turns,) that are active in any lane; None for all."""
-        if self.mask is None:
-            return None
-        found: NDArray[np.bool_] = np.broadcast_to(self.mask.any(axis=0), (self.turns.count,))
-        return None if found.all() else found
-
-    def _wrong(self, bad: Any, what: str) -> None:
-        """Refuse what is wrong in a lane and turn that are active."""
-        found = bad is not False and (bad is True or bad.any())
-        if found and (self.mask is None or np.logical_and(bad, self.mask).any()):
-            raise Wrong(what)
 
     def _number(self) -> int:
         """Return the number of the lanes that are active, the same in all turns."""
@@ -127,7 +121,7 @@ class Trial(Runner):
         self.masks.append(lanes)
         return len(self.masks) - 1
 
-    def _readable(self, numbers: NDArray[np.int32]) -> NDArray[np.bool_]:
+    def readable(self, numbers: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return whether what these lanes have written is there for those that are active."""
         good = np.ones(numbers.shape, bool)
         for number in np.unique(numbers[numbers > 0]):
@@ -135,12 +129,11 @@ class Trial(Runner):
             good &= (numbers != number) | bool((~active | self.masks[number]).all())
         return good
 
-    def _folded(self, term: Term) -> Term:
-        """Return a number of all lanes together."""
-        if term.shape is None or term.shape.shape[-2] == 1:
-            return term
-        slot = self.turns.slot
-        return Term(self.fold.of(term.shape, 0 if slot is None else slot)[..., None, :])
+    def complete(self, written: NDArray[np.bool_]) -> bool:
+        """Return whether all lanes that count, or are active, have written."""
+        due: Any = self.claim.fold.factors.any(axis=1)
+        active = self.masks[0] if self.mask is None else self.mask.any(axis=1)
+        return bool((written | ~(due | active)).all())
 
     def _only(self, mask: NDArray[np.bool_], body: Body) -> None:
         """Run statements for some lanes and turns."""
@@ -155,8 +148,6 @@ class Trial(Runner):
     def _run_array(self, statement: Array) -> None:
         """Make new memory, of which nothing is written."""
         kind = statement.type
-        if kind.dtype != "float32" or statement.space == "group":
-            raise Unread(f"an array {statement.name} of {kind.dtype} in tiles")
         if statement.space == "device":
             self._device(statement)
             return
@@ -166,9 +157,23 @@ class Trial(Runner):
         if not 0 < count <= MOST or sum(self.size.values()) > MOST:
             raise Wrong(f"{statement.name} is an array of {count} numbers: at most {MOST} in all")
         self.names.pop(statement.name, None)
-        self.memory[statement.name] = Slice(Cells(statement.name, count, self.turns.count), 0, kind, sizes)
+        if statement.space == "group":
+            self.memory[statement.name] = self._share(statement.name, count, kind, sizes)
+            return
+        cells = Cells(statement.name, count, self.turns.count, kind.dtype)
+        self.memory[statement.name] = Slice(cells, 0, kind, sizes)
         if statement.value is not None:
             self._put(statement.name, (), kind, self.value(statement.value))
+
+    def _share(self, key: str, count: int, kind: Type, sizes: tuple[int, ...]) -> Slice:
+        """Return an array that the items of a group share."""
+        if self.kernel.group is None or self.lanes.inside is None or self.turns.count > 1:
+            raise Unread("memory that a group shares, without groups")
+        if kind.lanes > 1 or kind.dtype not in ("float32", "int32"):
+            raise Unread(f"{key}, which a group shares, of {kind.lanes} x {kind.dtype}")
+        items = self.kernel.group[0] * self.kernel.group[1]
+        self.shared.append(Shared(key, count, kind.dtype, self.lanes.count, items))
+        return Slice(self.shared[-1], 0, kind, sizes)
 
     def _run_store(self, statement: Store) -> None:
         """Write an element, or add to it."""
@@ -178,9 +183,8 @@ class Trial(Runner):
             away = value.op == "negative"
             number = self.value(value.args[0] if away else value)
             read = self._load(statement.array, index, kind)
-            self._put(
-                statement.array, index, kind, self._of_floats("subtract" if away else "add", read, number)
-            )
+            total = self.operate("subtract" if away else "add", read, number)
+            self._put(statement.array, index, kind, total)
         else:
             self._put(statement.array, index, kind, self.value(value))
 
@@ -188,12 +192,20 @@ class Trial(Runner):
         if array == RESULT:
             self._result(index, value)
             return
-        if not isinstance(value, Term) or kind.dtype != "float32":
-            raise Unread(f"anything but floats in {array}")
         cells, place = self._place_of(array, index, kind)
-        cells.store(place, kind.lanes, self._folded(value), self.turns, self.active, self._number())
+        value = constant(value, kind.dtype) if type(value) is int else value
+        if isinstance(cells, Shared) and isinstance(value, Term):
+            cells.store(place, value, self.turns, self.mask)
+            return
+        if not isinstance(value, Term) or value.kind != cells.kind:
+            raise Unread(f"anything but numbers of type {cells.kind} in {array}")
+        in_lanes = self.mask is not None and self.mask.shape[0] > 1
+        if in_lanes and (value.is_wide or (value.literal is not None and cells.kind == "float32")):
+            cells.store_wide(place, kind.lanes, value, self.turns, self.active, self.mask)
+            return
+        cells.store(place, kind.lanes, self.folded(value), self.turns, self.active, self._number())
 
-    def _place_of(self, array: str, index: Sequence[Any], kind: Type) -> tuple[Cells, Any]:
+    def _place_of(self, array: str, index: Sequence[Any], kind: Type) -> tuple[Any, Any]:
         """Return an array's memory, and the place of an element."""
         memory = self.memory.get(array)
         if isinstance(memory, Device):
@@ -201,22 +213,31 @@ class Trial(Runner):
                 raise Wrong(f"{array} holds other elements")
             return memory.cells, memory.place(index[0], self.active)
         if not isinstance(memory, Slice):
-            raise Wrong(f"{array} is not an array of tiles")
-        element: Any = 0
-        sizes = memory.sizes
-        if len(index) == len(sizes) and (kind.lanes == memory.kind.lanes or len(sizes) > 1):
-            if kind.lanes != memory.kind.lanes:
+            raise Wrong(f"{array} is not an array of items")
+        if kind.dtype != memory.kind.dtype:
+            raise Unread(f"{array} as {kind.dtype}")
+        if isinstance(memory.cells, Shared):
+            if len(index) != 1 or isinstance(index[0], Tile) or kind.lanes != 1:
+                raise Wrong(f"{array} is an array of single numbers")
+            return memory.cells, Place.values_of(index[0])
+        index = [self._plain(each) for each in index]
+        return memory.cells, memory.first + self._element(array, memory, index, kind)
+
+    def _element(self, array: str, memory: Slice, index: Sequence[Any], kind: Type) -> Any:
+        """Return the place of an element in an array, counted in numbers."""
+        sizes, lanes = memory.sizes, memory.kind.lanes
+        if len(index) == len(sizes) and (kind.lanes == lanes or len(sizes) > 1):
+            if kind.lanes != lanes:
                 raise Unread(f"numbers of vectors of {array}")
+            element: Any = 0
             for each, size in zip(index, sizes, strict=True):
-                each = self._plain(each)
                 if size is not None:
                     self._wrong((each < 0) | (each >= size), f"{array} has no such element")
                 element = element * (size or 0) + each
-        elif len(index) == 1 and len(sizes) == 1 and kind.lanes == 1:
-            element = self._plain(index[0])
-        else:
-            raise Wrong(f"{array} has {len(sizes)} indices")
-        return memory.cells, memory.first + element * kind.lanes
+            return element * lanes
+        if len(index) == len(sizes) == 1 and 1 in (kind.lanes, lanes):
+            return index[0]
+        raise Wrong(f"{array} has {len(sizes)} indices")
 
     def _plain(self, index: Any) -> Any:
         """Return an index that no coordinate goes into."""
@@ -227,28 +248,35 @@ class Trial(Runner):
     def _run_for(self, statement: For) -> None:
         """Run a loop: all turns at once, or one after another, each for the lanes that are in it."""
         start, count, step = map(self.value, (statement.start, statement.count, statement.step))
-        if not all(type(each) is int for each in (start, count, step)) or step < 1:
-            raise Unread(f"the loop over {statement.name} has other ends than integers")
-        turns = range(start, count, step)
-        if len(turns) > LONGEST:
-            raise Wrong(f"a loop runs more than {LONGEST} times")
-        together = self.turns.count < TOGETHER and len(turns) > 1 and statement.until is None
-        key = id(statement), self.turns.count
-        if together and self.apart[key] < TRIES and self._at_once(statement, turns):
-            return
-        outer = self.mask
-        for turn in turns:
+        if type(step) is not int or step < 1:
+            raise Wrong(f"the loop over {statement.name} has a step that is not positive")
+        if type(start) is type(count) is int and statement.until is None:
+            turns = range(start, count, step)
+            together = 1 < len(turns) <= LARGEST // (self.lanes.count * self.turns.count)
+            key = id(statement), self.turns.count
+            together = together and self.turns.count < TOGETHER and self.apart[key] < TRIES
+            if together and self._at_once(statement, turns):
+                return
+        outer, turn = self.mask, start
+        for _ in range(LONGEST):
             self.names[statement.name] = turn
-            if statement.until is not None:
-                going = self._truth(self.value(statement.until))
-                if going is False:
-                    break
-                if going is not True:
-                    self.mask = going if self.mask is None else self.mask & going
-                    if not self.mask.any():
-                        break
+            if not self._goes_on(self._of_indices("less", turn, count)):
+                break
+            if statement.until is not None and not self._goes_on(self.value(statement.until)):
+                break
             self.body(statement.body)
+            turn = self._of_indices("add", turn, step)
+        else:
+            raise Wrong(f"a loop runs more than {LONGEST} times")
         self.mask = outer
+
+    def _goes_on(self, condition: Any) -> bool:
+        """Leave those lanes and turns in a loop in which a condition holds; return whether there are any."""
+        going = self._truth(condition)
+        if isinstance(going, bool):
+            return going
+        self.mask = going if self.mask is None else self.mask & going
+        return bool(self.mask.any())
 
     def _at_once(self, loop: For, turns: range) -> bool:
         """Run all turns of a loop at once, if they have nothing to do with each other."""
@@ -284,16 +312,20 @@ class Trial(Runner):
         self._only(found, statement.body)
         self._only(~found, statement.otherwise)
 
-    def _truth(self, value: Any) -> Any:
-        if isinstance(value, bool) or (isinstance(value, np.ndarray) and value.dtype == bool):
-            return value
-        raise Wrong("it branches on a number of the image, or on an integer")
-
     def _run_barrier(self, statement: Any) -> None:
-        """Refuse."""
-        raise Unread("a barrier, or a loop that ends in its body, in tiles")
+        """Let all items of a group wait for each other."""
+        if self.lanes.inside is None:
+            raise Unread("a barrier without groups")
+        if self.turns.count > 1:
+            raise Race
+        if self.mask is not None:
+            raise Wrong("a barrier that not all items of a group reach")
+        for memory in self.shared:
+            memory.wait()
 
-    _run_break = _run_barrier
+    def _run_break(self, statement: Any) -> None:
+        """Refuse."""
+        raise Unread("a loop that ends in its body")
 
     def _run_call(self, statement: Call) -> None:
         """Run a function on views."""
@@ -322,7 +354,7 @@ class Trial(Runner):
     def _run_launch(self, statement: Launch) -> None:
         """Run the items of a launch for the tiles that are computed; the end is a barrier."""
         across, down = statement.counts
-        count, slots, lines = self.tile_count, self.fold.slots, integer(self.kernel, down)
+        count, slots, lines = self.tile_count, self.claim.fold.slots, integer(self.kernel, down)
         items = self.value(across)
         if not isinstance(items, Tile) or items.values.item() not in (count, count // slots):
             raise Unread("a launch of other items than tiles, or than groups of tiles")
@@ -343,131 +375,13 @@ class Trial(Runner):
             raise Wrong("items of a launch read and write one element") from error
         self.turns, self.names = outer
 
-    # ---- integers ------------------------------------------------------------------------------------------
-
-    def _operation(self, value: Expr, args: list[Any]) -> Any:
-        """Return an operation on values."""
-        if any(isinstance(each, Term) for each in args):
-            if value.type.dtype not in ("float32", "bool"):
-                raise Unread(f"{value.op} of floats in tiles")
-            return self._of_floats(value.op, *args)
-        if len(args) != 2:
-            raise Unread(f"{value.op} of integers")
-        return self._of_integers(value.op, *args)
-
-    def _of_integers(self, what: str, a: Any, b: Any) -> Any:
-        """Return what an operation makes of two integers, none beyond 32 bits."""
-        if isinstance(a, Tile) or isinstance(b, Tile):
-            return Tile.operated(what, a, b, self.tile_count, self.fold.slots)
-        if isinstance(a, Place) or isinstance(b, Place):
-            made = Place.compared if what in COMPARES else Place.operated
-            return made(self.lanes, what, a, b, self.mask)
-        return integers(what, a, b, self._wrong)
-
-    def _value_const(self, value: Expr) -> Any:
-        """Return a constant."""
-        if value.type.dtype in ("int32", "bool"):
-            return value.value
-        if value.type.dtype != "float32":
-            raise Unread(f"a constant of type {value.type.dtype} in tiles")
-        if id(value) not in self.numbers:
-            self.numbers[id(value)] = constant(value.value)
-        return self.numbers[id(value)]
-
-    def _value_clamp(self, value: Expr) -> Any:
-        """Return an integer within two others, the first of which is not above the second."""
-        given, low, high = map(self.value, value.args)
-        if any(isinstance(each, Term) for each in (given, low, high)):
-            given, low, high = map(self._float, (given, low, high))
-            return self._of_floats("minimum", self._of_floats("maximum", given, low), high)
-        order = self._of_integers("less_equal", low, high)
-        self._wrong(
-            not order if isinstance(order, bool) else ~order, "a value between two others in no order"
-        )
-        return self._of_integers("minimum", self._of_integers("maximum", given, low), high)
-
-    def _value_select(self, value: Expr) -> Any:
-        """Return one of two values, for each lane and turn."""
-        where, a, b = map(self.value, value.args)
-        if isinstance(where, Term):
-            return select(self._folded(where), *(self._folded(self._float(each)) for each in (a, b)))
-        where = self._truth(where)
-        if isinstance(where, bool):
-            return a if where else b
-        if isinstance(a, Term) and isinstance(b, Term):
-            if a.shape is None or b.shape is None or not (a.sums is b.sums is None):
-                raise Unread("a choice of sums on their way")
-            if where.shape[0] > 1 and a.shape.shape[-2] == b.shape.shape[-2] == 1:
-                raise Unread("a choice, by lanes, of numbers of all lanes")
-            return Term(np.where(where, a.shape, b.shape))
-        if isinstance(a, Term) or isinstance(b, Term):
-            raise Wrong("it mixes coordinates, or truths, and numbers of the image")
-        return chosen(self.lanes, where, a, b)
-
-    def _value_logical_and(self, value: Expr) -> Any:
-        """Return whether both hold; the second is not asked where the first does not."""
-        return self._logical(value, True)
-
-    def _value_logical_or(self, value: Expr) -> Any:
-        """Return whether one holds."""
-        return self._logical(value, False)
-
-    def _logical(self, value: Expr, both: bool) -> Any:
-        a = self._truth(self.value(value.args[0]))
-        if isinstance(a, bool) and a is not both:
-            return a
-        b = self._truth(self.value(value.args[1]))
-        if isinstance(a, bool):
-            return b
-        return np.logical_and(a, b) if both else np.logical_or(a, b)
-
-    def _value_logical_not(self, value: Expr) -> Any:
-        """Return whether something does not hold."""
-        found = self._truth(self.value(value.args[0]))
-        return not found if isinstance(found, bool) else ~found
-
-    # ---- floats --------------------------------------------------------------------------------------------
-
-    def _float(self, value: Any) -> Term:
-        if not isinstance(value, Term):
-            raise Wrong("it mixes coordinates, or truths, and numbers of the image")
-        return value
-
-    def _of_floats(self, what: str, *args: Any) -> Term:
-        """Return what an operation makes of floats."""
-        terms = [self._folded(self._float(each)) for each in args]
-        if what in ("add", "subtract", "multiply"):
-            a, b = terms
-            found = operate(what, a, b, self.dual)
-            return self._found(found) if what == "add" and found.sums is not None else found
-        if what in ("convert", "bits", "pack4", "dot4"):
-            raise Unread(f"{what} of floats in tiles")
-        if what in COMPARES:
-            if not what.startswith("less"):
-                terms, what = terms[::-1], what.replace("greater", "less")
-            return Term(expression(what, *terms))
-        return Term(expression(what, *terms, commutes=what in ("minimum", "maximum")))
-
-    def _found(self, term: Term) -> Term:
-        """Return a sum, where it is one of the program as the number that this is."""
-        assert term.sums is not None
-        value = term.sums % P
-        word = value[0] << np.uint64(32) | value[1]
-        at = np.minimum(np.searchsorted(self.keys, word), len(self.keys) - 1)
-        good = self.keys[at] == word
-        if not good.any():
-            return term
-        for first in np.unique(self.keys[at[good]][:: max(1, good.sum() // 8)]).tolist():
-            self.claim.found.add(self.claim.first[first])
-        return Term(np.where(good, hashed("found", *value), term.known))
+    # ---- memory --------------------------------------------------------------------------------------------
 
     def _value_load(self, value: Expr) -> Any:
         """Return an element of an array."""
         return self._load(value.value, [self.value(each) for each in value.args], value.type)
 
     def _load(self, array: str, index: Sequence[Any], kind: Type) -> Any:
-        if kind.dtype != "float32":
-            raise Unread(f"{array} as {kind.dtype}")
         if array in self.images:
             return self._pixel(array, index, kind)
         if array == RESULT:
@@ -475,7 +389,9 @@ class Trial(Runner):
         if array == WEIGHTS:
             return self._of_weights(index, kind)
         cells, place = self._place_of(array, index, kind)
-        return cells.load(place, kind.lanes, self.turns, self.active, self._readable)
+        if isinstance(cells, Shared):
+            return cells.load(place, self.mask)
+        return cells.load(place, kind.lanes, self.turns, self.active, self)
 
     def _of_weights(self, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of the file: of spectra no sums are made."""
@@ -483,18 +399,21 @@ class Trial(Runner):
         place = np.asarray(place * (1 if self.kernel.weights.lanes == 1 else kind.lanes))
         if place.ndim and place.shape[0] != 1:
             raise Wrong("the weights have an index that differs between lanes")
-        numbers, spectra = self.weights.numbers, self.weights.spectra
-        bad = (place < 0) | (place > self.weights.size - kind.lanes)
-        self._wrong(bad, f"the weights are read at {np.max(place)}: there are {self.weights.size}")
+        weights, spectra = self.claim.weights, self.claim.spectra
+        size = weights.size if isinstance(weights, Stored) else weights.known.shape[-1]
+        bad = (place < 0) | (place > size - kind.lanes)
+        self._wrong(bad, f"the weights are read at {np.max(place)}: there are {size}")
         place = np.where(bad, 0, place).reshape(1, -1)
         at = place + np.arange(kind.lanes)[:, None]
-        shape: Words = numbers.known[0][at]
-        draw = numbers.value[:, 0][:, at]
+        at = at if kind.lanes == 1 else at[:, None]
+        if isinstance(weights, Stored):
+            return weights.at(at, kind.dtype)
+        if kind.dtype != "float32":
+            raise Unread(f"weights as {kind.dtype}")
         inside = (at >= spectra.start) & (at < spectra.stop)
         if inside.any() and not inside.all():
             raise Wrong("numbers of spectra and others in one vector, or loop")
-        own = None if inside.any() else draw if kind.lanes == 1 else draw[:, :, None]
-        return Term(shape if kind.lanes == 1 else shape[:, None], draw=own)
+        return Term(weights.known[0][at], draw=None if inside.any() else weights.draw[:, 0][:, at])
 
     def _pixel(self, array: str, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of an image: of a row, a column, and a channel or what lies behind."""
@@ -513,29 +432,15 @@ class Trial(Runner):
         beyond, first, across, *_ = self.pixels[key]
         self._wrong(beyond, f"image {array} is read beyond its ends")  # other lanes may be active now
         size = self.lanes.known[1][:, None] * channels
-        shapes = []
+        shapes: list[Words] = []
         for k in range(kind.lanes):
             at = across + (channel + k)
             self._wrong((at < 0) | (at >= size), f"image {array} is read beyond its ends")
             shapes.append(hashed(f"image {array.removeprefix(IMAGE)}", first + (channel + k)))
-        return Term(shapes[0]) if kind.lanes == 1 else Term(np.stack(shapes))
-
-    def _value_component(self, value: Expr) -> Any:
-        """Return one number of a vector."""
-        given = self.value(value.args[0])
-        return given.part(value.value) if isinstance(given, Term) and given.known.ndim == 3 else given
-
-    def _value_stack(self, value: Expr) -> Any:
-        """Return a vector of numbers."""
-        key = id(value)
-        if key in self.numbers:
-            return self.numbers[key]
-        found = stacked([self._float(self.value(each)) for each in value.args])
-        if all(each.op == "const" for each in value.args):
-            if self.dual and any(each.value for each in value.args):  # a column of weights
-                found = Term(found.shape, draw=found.value)
-            self.numbers[key] = found
-        return found
+        ends = self.spans.get(array.removeprefix(IMAGE))
+        size = (1, 1) if kind.lanes == 1 else (kind.lanes, 1, 1)
+        span = ends and (np.full(size, ends[0]), np.full(size, ends[1]))
+        return Term(shapes[0] if kind.lanes == 1 else np.stack(shapes), span=span)
 
     # ---- the result ----------------------------------------------------------------------------------------
 
@@ -553,14 +458,16 @@ class Trial(Runner):
         if (outside & active).any():
             raise Wrong("it writes a result beyond the picture")
         across, down = columns - x, rows - y
+        beside = across % self.claim.stride != 0
+        across = across // self.claim.stride
         first, own = active.argmax(axis=0), np.arange(self.turns.count)
         across_one, down_one = across[first, own], down[first, own]
         claim, there = self.claim, active.any(axis=0)
-        bad = (across != across_one) | (down != down_one)
+        bad = beside | (across != across_one) | (down != down_one)
         bad |= (across < 0) | (across >= claim.pixels) | (down < 0) | (down >= claim.rows)
         if (bad & active).any() or (there & ((channels < 0) | (channels >= self.written.shape[2]))).any():
             raise Wrong("it writes a result that is not its own")
-        term = self._folded(value)
+        term = self.folded(value)
         found = np.broadcast_to(term.known, (1, self.turns.count))[0]
         slot = np.zeros(self.turns.count, int) if self.turns.slot is None else self.turns.slot
         at = tuple(a[there] for a in (slot, down_one * claim.pixels + across_one, channels))
@@ -570,20 +477,14 @@ class Trial(Runner):
             raise Wrong(f"output {channels[there][0]} is not the program's{why}")
         self.written[at] |= active[:, there].T
 
-    def complete(self) -> None:
+    def ended(self) -> None:
         """Refuse a text that leaves a pixel out."""
         claim, lanes = self.claim, self.lanes
         down, across = np.divmod(np.arange(self.written.shape[1]), claim.pixels)
-        due = (lanes.x + across[:, None] < lanes.known[1]) & (lanes.y + down[:, None] < lanes.known[3])
+        there = lanes.x + claim.stride * across[:, None] < lanes.known[1]
+        due = there & (lanes.y + down[:, None] < lanes.known[3])
         if not (self.written | ~due[None, :, None]).all():
             raise Wrong("it leaves a pixel without a result")
-
-
-EVALUATED = (
-    "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
-    "logical_or", "logical_not",
-)  # fmt: skip
-"""Expressions that are not operations on their operands' values."""
 
 
 def _repeated(value: Any, count: int) -> Any:

@@ -11,10 +11,11 @@ from texts import NAME, changed, kernel, model, parts, unnoticed
 from wamnet.compiler import artifact
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.proof.evidence import Refused
-from wamnet.compiler.reading import field
+from wamnet.compiler.reading import field, terms
 from wamnet.compiler.reading.check import check_text, run_text
-from wamnet.compiler.reading.lanes import Place, Unread, Wrong, lanes_for
+from wamnet.compiler.reading.lanes import Unread, Wrong, lanes_for
 from wamnet.compiler.reading.languages import TITLES
+from wamnet.compiler.reading.places import Place
 from wamnet.compiler.reading.trusted import trusted_files, trusted_lines
 from wamnet.compiler.variants import plan_model
 
@@ -94,51 +95,50 @@ def test_planted_faults_are_noticed(target, schedule, count, tmp_path, capsys):
     assert unnoticed(parts(kernel(tmp_path, target, schedule)), count) == []
 
 
-@pytest.fixture
-def one_lane():
-    """Add up over one lane, as while a source is run."""
-    field.add_up_lanes(np.ones(1, bool))
-    yield
-    field.add_up_lanes(None)
+def products(*numbers):
+    """Return products of weights and numbers of an image."""
+    known = [field.hashed(name, np.array([[n]])) for n in numbers for name in ("weight", "image")]
+    pairs = zip(known[::2], known[1::2], strict=True)
+    return [terms.operate("multiply", terms.Term(w, draw=field.drawn(w)), terms.Term(x)) for w, x in pairs]
 
 
-def test_numbers_that_cancel_are_seen(one_lane):
+def test_numbers_that_cancel_are_seen():
     """(a + b) - b is a in a field; its magnitudes say otherwise."""
-    a, b = (field.product(w, x) for w, x in [unknowns(1), unknowns(2)])
-    twice = field.difference(field.total(a, b), b)
-    assert np.array_equal(twice.value[0] % field.P, a.value[0] % field.P)
-    assert not np.array_equal(twice.value[1] % field.P, a.value[1] % field.P)
+    a, b = products(1, 2)
+    twice = terms.operate("subtract", terms.operate("add", a, b), b)
+    assert np.array_equal(twice.value[0], a.value[0])
+    assert not np.array_equal(twice.value[1], a.value[1])
 
 
-def unknowns(n):
-    """Return a weight and a number of an image."""
-    weight = field.leaf(field.hashed("weight", np.array([n])), weight=True)
-    return weight, field.leaf(field.hashed("image", np.array([n])))
-
-
-def test_sums_do_not_depend_on_their_order(one_lane):
-    terms = [field.product(*unknowns(n)) for n in range(5)]
-    one, other = terms[0], terms[-1]
-    for term in terms[1:]:
-        one = field.total(one, term)
-    for term in terms[:-1]:
-        other = field.total(term, other)
-    assert np.array_equal(one.value % field.P, other.value % field.P)
+def test_sums_do_not_depend_on_their_order():
+    each = products(*range(5))
+    one, other = each[0], each[-1]
+    for term in each[1:]:
+        one = terms.operate("add", one, term)
+    for term in each[:-1]:
+        other = terms.operate("add", term, other)
+    assert np.array_equal(one.value, other.value)
 
 
 def test_lanes_decide_what_may_be_compared():
     lanes = lanes_for((4, 2), 1, seed=1)
-    x, width, y = (lanes.place(axis) for axis in (0, 1, 2))
-    assert isinstance(x, Place)
-    assert (x.plus(4).against(width) < 0).any()
+    x, width, y = (Place.of(lanes, axis) for axis in (0, 1, 2))
+
+    def less(a, b):
+        return Place.compared(lanes, "less", a, b, None)
+
+    def more(a, n):
+        return Place.operated(lanes, "add", a, n, None)
+
+    assert less(more(x, 4), width).any()
     with pytest.raises(Wrong, match="beyond 4"):
-        x.plus(5).against(0)
+        less(more(x, 5), 0)
     with pytest.raises(Wrong, match="beyond 2"):
-        y.plus(3).against(0)
+        less(more(y, 3), 0)
     with pytest.raises(Wrong, match="no lane decides"):
-        x.against(y)
+        less(x, y)
     with pytest.raises(Wrong, match="no lane decides"):
-        x.times(width).against(3)
+        less(Place(x.values * width.values, np.full((4, 1, 1), np.nan)), 3)
 
 
 def test_lanes_have_every_case_of_an_axis():

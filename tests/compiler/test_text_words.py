@@ -7,7 +7,7 @@ import pytest
 from texts import changed, parts, planned, unnoticed
 
 from wamnet.compiler.proof.evidence import Refused
-from wamnet.compiler.reading import field, words
+from wamnet.compiler.reading import field, integers, terms
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread, Wrong
 
@@ -48,8 +48,8 @@ def test_texts_of_bytes_compute_what_is_certified(target, schedule, border, size
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        (" + 128);", " + 127);", "never made"),
-        (" + 128);", " + 129);", "never made"),
+        (" + 128);", " + 127);", "never made|by more than an image's"),
+        (" + 128);", " + 129);", "never made|before it is written"),
         ("sum[p][0] = w[18];", "sum[p][0] = w[19];", "beyond 16777216|never made"),
         ("(four).s1, 16)", "(four).s1, 8)", NO_MARKER),
         ("(four).s1, 16)", "(four).s0, 16)", NO_MARKER),
@@ -101,42 +101,54 @@ def test_planted_faults_in_bytes_are_noticed(target, schedule, count, tmp_path):
     assert unnoticed(parts(planned(tmp_path, target, schedule)), count) == []
 
 
-def known(low, high, kind="int32"):
+def number(low, high, kind="int32"):
     """Return a number of an image, an integer between two ends."""
-    return field.leaf(field.hashed("image", np.array([low, high])), kind, span=(low, high))
+    shape = field.hashed("image", np.array([[low]]), high)
+    span = np.full((1, 1), low), np.full((1, 1), high)
+    return terms.Term(shape, field.drawn(shape), kind=kind, span=span)
+
+
+def refuse(bad, why):
+    if np.any(bad):
+        raise Wrong(why)
+
+
+def made(what, a, b):
+    return integers.operate(what, a, b, lambda term: term, refuse)
 
 
 def test_sums_that_may_leave_32_bits_are_refused():
-    weight = words.integers(127, "int32", weight=True)
-    assert words.operate("multiply", weight, known(-127, 127)).span == (-16129, 16129)
-    with pytest.raises(Wrong, match="int32 does not hold"):
-        words.operate("multiply", weight, known(0, 2**25))
-    assert words.operate("add", words.integers(1, "uint32"), known(0, 2**32 - 1, "uint32")) is None
+    weight = terms.constant(127, "int32")
+    assert [end.item() for end in made("multiply", weight, number(-127, 127)).span] == [-16129, 16129]
+    with pytest.raises(Wrong, match="what int32 holds"):
+        made("multiply", weight, number(0, 2**25))
+    assert made("add", terms.constant(1, "uint32"), number(0, 2**32 - 1, "uint32")).span is None
+    assert made("multiply", number(0, 3), number(0, 5)).span is None
 
 
 def test_what_cancels_is_the_same_integer():
     """Nothing rounds: n + 128 - 128 is n, unlike sums of floats."""
-    n, byte = known(-127, 127), words.integers(128, "int32")
-    again = words.operate("subtract", words.operate("add", n, byte), byte)
-    assert np.array_equal(again.value % field.P, n.value % field.P)
+    n, byte = number(-127, 127), terms.constant(128, "int32")
+    again = made("subtract", made("add", n, byte), byte)
+    assert np.array_equal(again.sums, n.sums)
 
 
-def test_bytes_move_as_words_are_shifted():
-    n, by = known(-127, 127), [field.literal(b, "int32") for b in (8, 24, 255)]
-    low = words.moved("bitwise_and", n, by[2])
-    assert low.span is None  # of a negative one it is another number
-    assert words.moved("bitwise_and", known(0, 127), by[2]).span == (0, 127)
-    top = words.moved("left_shift", low, by[1])
-    back = words.moved("right_shift", top, by[1])
-    assert back.span == (-127, 127)
-    assert np.array_equal(back.value, n.value)
-    none = words.moved("right_shift", words.moved("left_shift", low, by[0]), by[1])
-    assert none.parts == (words.ZERO,) * 4
-    assert words.moved("left_shift", low, field.literal(7, "int32")) is None
+def test_words_are_made_of_bytes_with_signs():
+    """TXT-11: what does not fit a byte is another unknown."""
+    parts = [number(-127, 127), number(0, 255), number(-1, 0), number(2, 1)]
+    word = integers.packed(parts, lambda term: term)
+    same = [np.array_equal(word.part(k).sums, part.sums) for k, part in enumerate(parts)]
+    assert same == [True, False, True, False]
+    weights = terms.known_integers(np.array([[0x7F00FE01]]), "int32")
+    found = integers.dots(weights, word, refuse)
+    factors = np.array([1, -2, 0, 127])
+    expected = sum(int(n) * int(w) for n, w in zip(factors, word.sums[0, :, 0, 0], strict=True))
+    assert found.sums[0, 0, 0] == expected % int(field.P)
+    assert [end.item() for end in found.span] == [-127 - 254 - 127 * 128, 127 + 256 + 127 * 127]
 
 
-def test_shifts_of_known_words_wrap():
-    word = words.integers(np.array([-2, 0x7F80]), "int32", weight=True)
-    moved = words.moved("left_shift", word, field.literal(16, "int32"))
-    assert words.known(moved).tolist() == [-(2**17), 0x7F800000]
-    assert words.known(words.moved("right_shift", moved, field.literal(24, "int32"))).tolist() == [-1, 127]
+def test_floats_hold_no_sums_beyond_24_bits():
+    one, other = number(0, 2**24), number(0, 2**24 + 1)
+    assert integers.as_float(one, lambda term: term, refuse).kind == "float32"
+    with pytest.raises(Wrong, match="beyond 16777216"):
+        integers.as_float(other, lambda term: term, refuse)

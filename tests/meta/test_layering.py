@@ -136,9 +136,6 @@ def test_rooms_are_small_and_import_one_way(house):
 
 
 CIRCLES = (
-    {f"compiler.reading.{name}" for name in (
-        "builtins", "claim", "groups", "kinds", "machine", "memory", "together", "words",
-    )},
     {"kernels.devices.opengl_executor", "kernels.devices.registry"},
     {"refimpl.light.scene", "refimpl.light.shapes.box", "refimpl.light.shapes.shape"},
 )  # fmt: skip

@@ -1,0 +1,262 @@
+"""Integers that a text adds up, and words of 32 bits that hold four of them as bytes.
+
+1. An integer with a span [terms.py] lies in it, in every lane, and its two field elements are that integer's.
+   Its sums and products with known integers stay exact while they stay in 32 bits, which the span shows
+   [`operate`]. Nothing rounds: what cancels may, so that both rows have signs.
+2. The weights of such kernels are known: they are read bit by bit, as what a text takes them for [`Stored`].
+3. A word is a vector of its four bytes, with signs, the lowest first [`packed`].
+4. What instructions add to a sum is four products of bytes [`dots`].
+
+Spans come from the claim: those of its images' numbers, and of what its affine maps read [`Ranges`], as the
+checker of the certificate finds them again.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..proof.evidence import INTEGERS
+from ..proof.integer_checker import check_integers
+from .field import P, Words, drawn, hashed
+from .lanes import Unread, Wrong
+from .terms import Span, Term, aligned, constant, expression, known_floats, known_integers, stacked
+
+Wrongs = Callable[[Any, str], None]
+"""Refuses what is wrong in a lane and turn that are active."""
+
+LIMITS: Mapping[str, tuple[int, int]] = {
+    "int8": (-(2**7), 2**7 - 1), "uint8": (0, 2**8 - 1),
+    "int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1),
+}  # fmt: skip
+"""Least and largest of each kind of integer."""
+
+TYPES: Mapping[str, str] = {"int32": "<i4", "uint32": "<u4", "float32": "<f4"}
+"""How numbers of each kind lie in memory."""
+
+EXACT = 2**24
+"""float32 holds all integers up to this magnitude."""
+
+
+def within(span: Span, limits: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return which integers are known to lie between two ends."""
+    low, high = span
+    return (low <= high) & (limits[0] <= low) & (high <= limits[1])
+
+
+def spans(ok: NDArray[np.bool_], low: Any, high: Any) -> Span | None:
+    """Return a span where it holds; None if it does nowhere."""
+    return (np.where(ok, low, 1), np.where(ok, high, 0)) if ok.any() else None
+
+
+def ends(what: str, a: Span, b: Span, kind: Any = np.int64) -> Span:
+    """Return the least and the largest sum, difference or product."""
+    (p, q), (r, s) = ([end.astype(kind) for end in span] for span in (a, b))
+    if what == "add":
+        return p + r, q + s
+    if what == "subtract":
+        return p - s, q - r
+    corners = [x * y for x in (p, q) for y in (r, s)]
+    return reduce(np.minimum, corners), reduce(np.maximum, corners)
+
+
+def operate(what: str, a: Term, b: Term, fold: Callable[[Term], Term], wrong: Wrongs) -> Term:
+    """Return the sum, difference or product of two integers: exact where their spans show that it is."""
+    kind = "uint32" if "uint32" in (a.kind, b.kind) else "int32"
+    if a.span is None or b.span is None or what == "multiply" or b.is_wide or a.leaf is None:
+        a, b = fold(a), fold(b)
+    shape = expression(what, a, b, commutes=what != "subtract")
+    if a.span is None or b.span is None or a.sums is None or b.sums is None:
+        return Term(shape, kind=kind)
+    both = (a.span[0] <= a.span[1]) & (b.span[0] <= b.span[1])
+    far = ends(what, a.span, b.span, np.float64)
+    fits = (far[0] >= LIMITS[kind][0]) & (far[1] <= LIMITS[kind][1])
+    if kind == "int32":
+        wrong(both & ~fits, "an integer may be beyond what int32 holds")
+    both = both & fits
+    if what == "multiply":
+        both = both & ((a.span[0] == a.span[1]) | (b.span[0] == b.span[1]))
+    sums: Words
+    if what == "multiply":
+        sums = aligned(lambda x, y: x % P * (y % P) % P, a.sums, b.sums)
+    else:
+        other = b.sums if what == "add" else P - b.sums % P
+        sums = aligned(np.add, a.sums, other) % P
+    if not both.all():
+        if a.leaf is not None:
+            return operate(what, fold(a), b, fold, wrong)
+        sums = np.where(both, sums, drawn(shape))
+    return Term(shape, sums, kind=kind, span=spans(both, *ends(what, a.span, b.span)), leaf=a.leaf)
+
+
+# ---- conversions ------------------------------------------------------------------------------------------
+
+
+def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term]) -> Term:
+    """Return a number as an integer of a kind: the same where that holds it, else another unknown."""
+    if term.literal is not None:
+        value = int(term.literal)
+        if not LIMITS[kind][0] <= value <= LIMITS[kind][1]:
+            raise Wrong(f"{term.literal} as {kind}")
+        return constant(value, kind)
+    whole = term.kind != "float32"
+    if kind == "int8" or (kind == "uint8" and not whole):
+        raise Unread(f"a {term.kind} as {kind}")
+    if not ranges.stated or (term.span is None and not whole):
+        term = fold(term)
+    span = term.span if whole or not ranges.stated else term.span or ranges.of(term.known)
+    good = np.zeros(term.known.shape, bool) if span is None else within(span, LIMITS[kind])
+    good = good & (term.shape is not None or whole)
+    if term.is_wide and not good.all():
+        return convert(replace(fold(term), span=span), kind, ranges, fold)
+    shape = expression("convert", term)
+    leaf = term.leaf
+    sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
+    if term.is_wide and not whole:
+        leaf = term.shape
+    low, high = span or (1, 0)
+    if kind == "uint8" and not good.all():  # the byte of another integer
+        byte = drawn(hashed("byte", shape))
+        sums = byte if sums is None else np.where(good, sums, byte)
+        low, high = np.where(good, low, 0), np.where(good, high, 255)
+        good = np.ones(shape.shape, bool)
+    if sums is None or not good.any():
+        return Term(shape, kind=kind)
+    if not good.all():
+        sums = np.where(good, sums, drawn(shape))
+    return Term(shape, sums, kind=kind, span=spans(good, low, high), leaf=leaf)
+
+
+def as_float(term: Term, found: Callable[[Term], Term], wrong: Wrongs) -> Term:
+    """Return an integer as a float, which holds it; a sum may be one of the program's."""
+    if term.literal is not None:
+        return constant(term.literal)
+    shape = expression("convert", term)
+    if term.span is None:
+        return Term(shape)
+    beyond = (term.span[0] <= term.span[1]) & ~within(term.span, (-EXACT, EXACT))
+    wrong(beyond, f"a sum may be beyond {EXACT}, where float32 does not hold all integers")
+    return replace(found(Term(shape, term.sums)), sums=None)
+
+
+def bits(term: Term) -> Term:
+    """Return the bits of known words as floats."""
+    if term.span is None or not (term.span[0] == term.span[1]).all():
+        raise Unread("bits of the picture as floats")
+    return known_floats(term.span[0].astype("<i4").view("<f4"))
+
+
+# ---- bytes ------------------------------------------------------------------------------------------------
+
+
+def packed(four: Sequence[Term], fold: Callable[[Term], Term]) -> Term:
+    """Return a word of the low bytes of four integers."""
+    return replace(stacked([_low_byte(each, fold) for each in four]), kind="word")
+
+
+def _low_byte(term: Term, fold: Callable[[Term], Term]) -> Term:
+    """Return an integer's low byte with its sign: the same if it is one, else another unknown."""
+    good = np.zeros(term.known.shape, bool) if term.span is None else within(term.span, LIMITS["int8"])
+    if good.all():
+        return replace(term, kind="int32")
+    if term.is_wide:
+        return _low_byte(fold(term), fold)
+    byte = drawn(hashed("low byte", term.known))
+    if term.span is None or term.sums is None:
+        low, high = (np.full(good.shape, end) for end in LIMITS["int8"])
+        return Term(term.known, byte, span=(low, high), kind="int32")
+    low, high = (np.where(good, end, limit) for end, limit in zip(term.span, LIMITS["int8"], strict=True))
+    return Term(term.known, np.where(good, term.sums, byte), kind="int32", span=(low, high))
+
+
+def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:
+    """Return the products of the bytes of known words, which have a sign, with four bytes, added up."""
+    if weights.span is None or not (weights.span[0] == weights.span[1]).all():
+        raise Unread("products of bytes that are not weights")
+    if four.span is None or four.sums is None or four.kind not in ("uint8", "word"):
+        raise Unread("products of bytes of the picture")
+    wrong(four.span[0] > four.span[1], "it multiplies bytes that are not known")
+    sums: Any = np.uint64(0)
+    low: Any = np.int64(0)
+    high: Any = np.int64(0)
+    for k in range(4):
+        byte = (weights.span[0] >> 8 * k & 255 ^ 128) - 128
+        one = four.part(k)
+        assert one.sums is not None
+        assert one.span is not None
+        row = known_integers(byte, "int32").sums
+        assert row is not None
+        sums = (sums + aligned(lambda x, y: x * y % P, row, one.sums % P)) % P
+        first, last = ends("multiply", (byte, byte), one.span)
+        low, high = low + first, high + last
+    return Term(hashed("sum", *sums), sums, kind="int32", span=(low, high))
+
+
+# ---- what a claim says ------------------------------------------------------------------------------------
+
+
+class Stored:
+    """The file of weights, bit by bit."""
+
+    def __init__(self, raw: NDArray[np.float32]) -> None:
+        self.raw, self.size = np.ascontiguousarray(raw), len(raw)
+
+    def at(self, place: NDArray[np.int64], kind: str) -> Term:
+        """Return its numbers at places, as those of a kind."""
+        if kind not in TYPES:
+            raise Unread(f"weights as {kind}")
+        values = self.raw.view(TYPES[kind])[place]
+        return known_floats(values) if kind == "float32" else known_integers(values, kind)
+
+
+def stated(held: Any) -> dict[str, NDArray[np.float32]]:
+    """Return the parameters that a certificate of integers has itself; none where weights.bin has them."""
+    places = held["parameters"].items()
+    inside = [name for name, place in places if "base64" in place]
+    if not inside or held["schema"] != INTEGERS:
+        return {}
+    if len(inside) < len(places):
+        raise Unread("weights that the file does not hold")
+    return {
+        name: np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4").reshape(place["shape"])
+        for name, place in places
+    }
+
+
+class Ranges:
+    """Which numbers of a program are known to lie in a span, by their shapes."""
+
+    def __init__(self, held: Any, arrays: Mapping[str, NDArray[np.float32]]) -> None:
+        self.stated = bool(arrays)
+        self.noted: dict[int, tuple[int, int]] = {}
+        self.found: Any = check_integers(held, str(held["program"]), arrays) if arrays else []
+
+    def note(self, node: str, numbers: Term) -> None:
+        """Keep the spans of what an affine map reads, as the checker finds them, if it is whole."""
+        low, high, grain = self.found[int(node)] if self.found else ([], [], -1)
+        if grain < 0 or numbers.shape is None:
+            return
+        for k, shape in enumerate(numbers.shape[0].tolist()):
+            one = k % len(low)
+            self.noted.setdefault(shape, (low[one] << grain, high[one] << grain))
+
+    def of(self, shape: Words) -> Span | None:
+        """Return the spans of numbers that have been noted."""
+        keys = np.array(sorted(self.noted), dtype=np.uint64)
+        if not len(keys):
+            return None
+        at = np.minimum(np.searchsorted(keys, shape), len(keys) - 1)
+        table = np.array([self.noted[key] for key in keys.tolist()], dtype=np.int64)
+        return spans(keys[at] == shape, table[at, 0], table[at, 1])
+
+    def images(self, text: str) -> dict[str, tuple[int, int]]:
+        """Return the spans of the images' numbers by name, where a program's text is one of these."""
+        found = re.findall(r"(?m)^  image (\w+): \d+ whole in \[(\S+), (\S+)\]$", text if self.found else "")
+        return {name: (int(float(low)), int(float(high))) for name, low, high in found}

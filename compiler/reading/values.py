@@ -1,0 +1,257 @@
+"""What operations of a kernel under test make of values: run.py's expressions on terms and coordinates.
+
+1. A float, and an integer that is computed from an image, is a `Term` [terms.py]; an index is Python's
+   integer, an array (1, turns), or a `Place` where it depends on coordinates; a truth is Python's, or one for
+   each lane and turn.
+2. Whatever is computed is folded over lanes first, but what is chosen, or made an integer.
+3. A sum that is one of the program's is the number that this is from there on [`_found`].
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel.kernel import Expr, Kernel
+from ..kernel.run import Runner
+from . import integers
+from .cells import Tile, Turns
+from .claim import COMMUTE, Claim, renamed, word_of
+from .field import P, hashed
+from .lanes import Unread, Wrong
+from .places import COMPARES, Place, chosen, indices
+from .terms import Term, compared, constant, expression, operate, select, stacked
+from .terms import chosen as chosen_term
+
+EVALUATED = (
+    "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
+    "logical_or", "logical_not", "convert", "bits", "pack4", "dot4",
+)  # fmt: skip
+"""Expressions that are not operations on their operands' values."""
+
+
+class Values(Runner):
+    """Values of one run of a kernel for a claim, for the lanes and turns that are active (`mask`)."""
+
+    claim: Claim
+    turns: Turns
+    mask: NDArray[np.bool_] | None
+
+    def __init__(self, kernel: Kernel, claim: Claim) -> None:
+        self.kernel, self.claim, self.lanes = kernel, claim, claim.lanes
+        self.dual, self.turns, self.mask = bool(kernel.launches), Turns(1), None
+        self.numbers: dict[Any, Any] = {}
+        self.evaluators = {key: getattr(self, f"_value_{key}") for key in EVALUATED}
+        self.keys = np.array(sorted(claim.first), dtype=np.uint64)
+        self.ids = np.array([claim.first[key] for key in self.keys.tolist()], dtype=np.int64)
+        parts = np.array([kind == "part" for kind, _ in claim.tables], bool)
+        self.is_part = parts[self.ids // claim.together]
+        self.tile_count = 0
+
+    # ---- lanes and turns -----------------------------------------------------------------------------------
+
+    @property
+    def active(self) -> NDArray[np.bool_] | None:
+        """The turns (turns,) that are active in any lane; None for all."""
+        if self.mask is None:
+            return None
+        found: NDArray[np.bool_] = np.broadcast_to(self.mask.any(axis=0), (self.turns.count,))
+        return None if found.all() else found
+
+    def _wrong(self, bad: Any, what: str) -> None:
+        """Refuse what is wrong in a lane and turn that are active."""
+        found = bad is not False and (bad is True or bad.any())
+        if found and (self.mask is None or np.logical_and(bad, self.mask).any()):
+            raise Wrong(what)
+
+    def folded(self, term: Term) -> Term:
+        """Return a number of all lanes together."""
+        slot = self.turns.slot
+        return self.claim.fold.term(term, 0 if slot is None else slot)
+
+    def _truth(self, value: Any) -> Any:
+        if isinstance(value, bool) or (isinstance(value, np.ndarray) and value.dtype == bool):
+            return value
+        raise Wrong("it branches on a number of the image, or on an integer")
+
+    # ---- operations ----------------------------------------------------------------------------------------
+
+    def _operation(self, value: Expr, args: list[Any]) -> Any:
+        """Return an operation on values."""
+        return self.operate(value.op, *args)
+
+    def operate(self, what: str, *args: Any) -> Any:
+        """Return what an operation makes of values: an integer goes with numbers of the image."""
+        kinds = [each.kind for each in args if isinstance(each, Term)]
+        if kinds:
+            return self._of_terms(what, *[self._term(each, kinds[0]) for each in args])
+        if len(args) != 2:
+            raise Unread(f"{what} of integers")
+        return self._of_indices(what, *args)
+
+    def _term(self, value: Any, kind: str) -> Term:
+        """Return a number of the image, or a constant."""
+        if type(value) is int:
+            return constant(value, kind)
+        if not isinstance(value, Term):
+            raise Wrong("it mixes coordinates, or truths, and numbers of the image")
+        return value
+
+    def _of_indices(self, what: str, a: Any, b: Any) -> Any:
+        """Return what an operation makes of two integers, none beyond 32 bits."""
+        if isinstance(a, Tile) or isinstance(b, Tile):
+            return Tile.operated(what, a, b, self.tile_count, self.claim.fold.slots)
+        if isinstance(a, Place) or isinstance(b, Place):
+            made = Place.compared if what in COMPARES else Place.operated
+            return made(self.lanes, what, a, b, self.mask)
+        return indices(what, a, b, self._wrong)
+
+    def _of_terms(self, what: str, *terms: Term) -> Term:
+        """Return what an operation makes of numbers."""
+        arithmetic = what in ("add", "subtract", "multiply")
+        if arithmetic and terms[0].kind != "float32":
+            a, b = terms
+            return integers.operate(what, a, b, self.folded, self._wrong)
+        if any(each.kind == "word" for each in terms):
+            raise Unread(f"{what} of words")
+        terms = tuple(self.folded(each) for each in terms)
+        if arithmetic:
+            a, b = terms
+            found = operate(what, a, b, self.dual)
+            return self._found(found) if what == "add" and found.sums is not None else found
+        if what == "negative" and terms[0].literal is not None:
+            return constant(-terms[0].literal, terms[0].kind)
+        if (
+            what.endswith("shift")
+            and not 0 <= (terms[1].literal if terms[1].literal is not None else -1) < 32
+        ):
+            raise Unread("a shift by anything but a constant below 32")
+        if what in COMPARES:
+            return compared(what, *terms)
+        return Term(expression(what, *terms, commutes=what in COMMUTE), kind=terms[-1].kind)
+
+    def _found(self, term: Term) -> Term:
+        """Return a sum; one of the program as the number that it is, a part as another unknown."""
+        assert term.sums is not None
+        value = term.sums % P
+        word = word_of(value)
+        at = np.minimum(np.searchsorted(self.keys, word), len(self.keys) - 1)
+        good = self.keys[at] == word
+        if not good.any():
+            return term
+        self.claim.found.update(np.unique(self.ids[at[good]]).tolist())
+        part = good & self.is_part[at]
+        if part.any():
+            return Term(None, np.where(part, renamed(value), value))
+        return Term(np.where(good, hashed("found", *value), term.known))
+
+    # ---- expressions ---------------------------------------------------------------------------------------
+
+    def _value_const(self, value: Expr) -> Any:
+        """Return a constant."""
+        kind = value.type.dtype
+        if kind in ("int32", "bool"):
+            return value.value
+        if (kind, value.value) not in self.numbers:
+            self.numbers[kind, value.value] = constant(value.value, kind)
+        return self.numbers[kind, value.value]
+
+    def _value_clamp(self, value: Expr) -> Any:
+        """Return an integer within two others, the first of which is not above the second."""
+        given, low, high = map(self.value, value.args)
+        if any(isinstance(each, Term) for each in (given, low, high)):
+            return self.operate("minimum", self.operate("maximum", given, low), high)
+        order = self._of_indices("less_equal", low, high)
+        self._wrong(
+            not order if isinstance(order, bool) else ~order, "a value between two others in no order"
+        )
+        return self._of_indices("minimum", self._of_indices("maximum", given, low), high)
+
+    def _value_select(self, value: Expr) -> Any:
+        """Return one of two values, for each lane and turn."""
+        where, a, b = map(self.value, value.args)
+        if any(isinstance(each, Term) for each in (where, a, b)) and type(where) is not bool:
+            a, b = (self._term(each, value.type.dtype) for each in (a, b))
+        if isinstance(where, Term):
+            return select(self.folded(where), self.folded(a), self.folded(b))
+        where = self._truth(where)
+        if isinstance(where, bool):
+            return a if where else b
+        return chosen_term(where, a, b) if isinstance(a, Term) else chosen(self.lanes, where, a, b)
+
+    def _value_logical_and(self, value: Expr) -> Any:
+        """Return whether both hold; the second is not asked where the first does not."""
+        return self._logical(value, True)
+
+    def _value_logical_or(self, value: Expr) -> Any:
+        """Return whether one holds."""
+        return self._logical(value, False)
+
+    def _logical(self, value: Expr, both: bool) -> Any:
+        a = self._truth(self.value(value.args[0]))
+        if isinstance(a, bool) and a is not both:
+            return a
+        b = self._truth(self.value(value.args[1]))
+        if isinstance(a, bool):
+            return b
+        return np.logical_and(a, b) if both else np.logical_or(a, b)
+
+    def _value_logical_not(self, value: Expr) -> Any:
+        """Return whether something does not hold."""
+        found = self._truth(self.value(value.args[0]))
+        return not found if isinstance(found, bool) else ~found
+
+    def _value_component(self, value: Expr) -> Any:
+        """Return one number of a vector."""
+        given = self.value(value.args[0])
+        return given.part(value.value) if isinstance(given, Term) and given.known.ndim == 3 else given
+
+    def _value_stack(self, value: Expr) -> Any:
+        """Return a vector of numbers."""
+        key = id(value)
+        if key in self.numbers:
+            return self.numbers[key]
+        found = stacked([self._term(self.value(each), value.type.dtype) for each in value.args])
+        if all(each.op == "const" for each in value.args):
+            if self.dual and any(each.value for each in value.args):  # a column of weights
+                found = Term(found.shape, draw=found.value)
+            self.numbers[key] = found
+        return found
+
+    def _value_convert(self, value: Expr) -> Any:
+        """Return a value as one of another kind."""
+        given, kind = self.value(value.args[0]), value.type.dtype
+        if isinstance(given, Term):
+            return self._converted(given, kind)
+        if kind == "int32":
+            return int(given) if type(given) is bool else given
+        low, high = integers.LIMITS.get(kind, (-integers.EXACT, integers.EXACT))
+        if type(given) is not int or not low <= given <= high:
+            raise Unread(f"a coordinate, or {given!r}, as {kind}")
+        return constant(given, kind)
+
+    def _converted(self, term: Term, kind: str) -> Term:
+        """Return a number as one of another kind."""
+        if term.kind == kind:
+            return term
+        if kind == "float32" and term.kind in integers.LIMITS:
+            return integers.as_float(self.folded(term), self._found, self._wrong)
+        if kind not in integers.LIMITS or term.kind not in ("float32", *integers.LIMITS):
+            raise Unread(f"a {term.kind} as {kind}")
+        return integers.convert(term, kind, self.claim.ranges, self.folded)
+
+    def _value_bits(self, value: Expr) -> Any:
+        """Return the bits of words that are known as floats."""
+        return integers.bits(self._term(self.value(value.args[0]), "int32"))
+
+    def _value_pack4(self, value: Expr) -> Any:
+        """Return the bytes of four floats as a word, the first one the lowest."""
+        four = [self._converted(self._term(self.value(each), "float32"), "int32") for each in value.args]
+        return integers.packed(four, self.folded)
+
+    def _value_dot4(self, value: Expr) -> Any:
+        """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""
+        weights, four = (self.folded(self._term(self.value(each), "int32")) for each in value.args)
+        return integers.dots(weights, four, self._wrong)

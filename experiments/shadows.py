@@ -5,10 +5,13 @@
 1. Frames of the mini cubes are drawn from the ranges of the set `minicubes`, at every time and from moving
    cameras, with the features of each row [`ROWS`]: camera rays, shadow rays of each, paths per pixel.
 2. A network is trained for each row and seed by the preset `best`, whose input is the layer `unshadowed`
-   where there are no shadow rays, and `direct` in its place where there are [`Bench.images`].
-3. Scores are means over test frames that nothing was chosen on, in the penumbra and after a blur too
-   [`scored`]. Milliseconds are those of the kernel of paths and features, 512 x 512 pixels, rows in turn
-   [`milliseconds`]. A picture beside the frames shows a test frame by the rows in `SHOWN`.
+   where there are no shadow rays, and `direct` in its place where there are [`Bench.images`]. `direct` has
+   visible lamps too: a row without shadow rays, with `seen_emission`, has the gain of these alone.
+3. Open Image Denoise gets the same frames. With the same direct light, its colour is `direct` in place of
+   what the path itself has found of that: of the path that ends after one scattering [`Bench.relit`].
+4. Scores are means over seeds and test frames that nothing was chosen on, in the penumbra and after a blur
+   too [`scored`]. Milliseconds are those of a pipeline's frame, paths, features and network, 512 x 512
+   pixels, rows in turn [`milliseconds`]. A picture shows a test frame by the rows in `SHOWN`.
 
 Prints a Markdown table.
 """
@@ -20,11 +23,13 @@ import hashlib
 import json
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 from lab.command import begin
 from lab.scores import mean_scores, score
 from lab.sets import SETS, Counts
@@ -33,11 +38,9 @@ from lab.training import denoised, trained
 
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import write_panels
-from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
-from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
 from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.devices.kernel import Part
+from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
 from wamnet.models.data.frame_plan import TEST, TRAIN
@@ -49,7 +52,9 @@ from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import varied
+from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import BEST
+from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SET = SETS["minicubes"]
 """Where the frames are drawn from."""
@@ -66,36 +71,42 @@ SEED_STEP = 1000
 
 @dataclass(frozen=True)
 class Row:
-    """Camera rays of the features, shadow rays of each, and paths, per pixel; `both`: `unshadowed` too."""
+    """Camera rays of the features, shadow rays of each, and paths, per pixel.
+
+    `emission`: the network sees visible lamps without shadow rays. `oidn`: Open Image Denoise.
+    """
 
     rays: int
     shadow_rays: int = 0
     spp: int = 1
-    both: bool = False
+    emission: bool = False
+    oidn: bool = False
 
     @property
     def layers(self) -> tuple[str, ...]:
         """Return the layers that the network reads."""
-        lit = ("unshadowed",) if self.both or not self.shadow_rays else ()
-        return "color", "normal", "albedo", "position", *lit, *(("direct",) if self.shadow_rays else ())
+        lit = ("direct",) if self.shadow_rays else ("unshadowed",)
+        return "color", "normal", "albedo", "position", *lit, *(("seen_emission",) if self.emission else ())
 
 
 ROWS = {
-    "1 camera ray, no shadow ray": Row(1),
-    "1 camera ray, 1 shadow ray": Row(1, 1),
     "4 camera rays, no shadow ray": Row(4),
+    "4 camera rays, no shadow ray, visible lamps": Row(4, emission=True),
     "4 camera rays, 4 shadow rays": Row(4, 1),
-    "4 camera rays, 16 shadow rays": Row(4, 4),
-    "4 camera rays, 4 shadow rays, both layers": Row(4, 1, both=True),
-    "4 camera rays, 16 shadow rays, both layers": Row(4, 4, both=True),
-    "4 camera rays, no shadow ray, 2 paths": Row(4, 0, 2),
+    "8 camera rays, 8 shadow rays": Row(8, 1),
+    "16 camera rays, no shadow ray": Row(16),
+    "16 camera rays, 16 shadow rays": Row(16, 1),
+    "Open Image Denoise, 16 camera rays, no shadow ray": Row(16, oidn=True),
+    "Open Image Denoise, 4 camera rays, 4 shadow rays": Row(4, 1, oidn=True),
+    "Open Image Denoise, 16 camera rays, 16 shadow rays": Row(16, 1, oidn=True),
 }
 """The rows by name; shadow rays are those of all camera rays together."""
 
 SHOWN = {
     "4 camera rays, no shadow ray": "no shadow ray",
-    "4 camera rays, 4 shadow rays": "4 shadow rays",
-    "4 camera rays, 16 shadow rays": "16 shadow rays",
+    "4 camera rays, 4 shadow rays": "4 and 4",
+    "16 camera rays, 16 shadow rays": "16 and 16",
+    "Open Image Denoise, 16 camera rays, 16 shadow rays": "OIDN, 16 and 16",
 }
 """Rows of the picture, and their labels."""
 
@@ -139,20 +150,44 @@ class Bench:
         """Return noisy frames and references; those of tests have the layer `direct`."""
         size, found = self.options.size, []
         for index, scene in enumerate(self.scenes(split)):
-            number = 2 * (SEED_STEP * seed + index) + (SEED_STEP if split == TEST else 0)
-            noisy = Job(size, size, row.spp, number, feature_spp=row.rays, shadow_rays=row.shadow_rays)
+            noisy = self.noisy(split, row, seed, index)
             clean = Job(size, size, self.options.spp, 2 * index + 1)
             if split == TEST:
                 clean = replace(clean, spp=4 * clean.spp, seed=2 * index + 1 + SEED_STEP, shadow_rays=4)
             found.append((self.frame(scene, noisy), self.frame(scene, clean)))
         return found
 
+    def noisy(self, split: str, row: Row, seed: int, index: int) -> Job:
+        """Return the job of a noisy frame."""
+        number = 2 * (SEED_STEP * seed + index) + (SEED_STEP if split == TEST else 0)
+        more = {"feature_spp": row.rays, "shadow_rays": row.shadow_rays, "seen": row.emission}
+        return Job(self.options.size, self.options.size, row.spp, number, **more)  # type: ignore[arg-type]
+
+    def model(self, row: Row, seed: int) -> Model:
+        """Return the network of a row."""
+        recipe = replace(BEST, features=row.layers, steps=self.options.steps, seed=seed)
+        pairs = self.pairs(TRAIN, row, seed)
+        return trained(recipe, pairs, self.options.cache / "models", self.options.executor)[0]
+
     def images(self, name: str, seed: int) -> list[Floats]:
         """Return the denoised test frames of a row."""
-        row, executor = ROWS[name], self.options.executor
-        recipe = replace(BEST, features=row.layers, steps=self.options.steps, seed=seed)
-        model, _ = trained(recipe, self.pairs(TRAIN, row, seed), self.options.cache / "models", executor)
-        return denoised(model, [noisy for noisy, _ in self.pairs(TEST, row, seed)], executor)
+        row = ROWS[name]
+        noisy = [frame for frame, _ in self.pairs(TEST, row, seed)]
+        if not row.oidn:
+            return denoised(self.model(row, seed), noisy, self.options.executor)
+        relit = self.relit(noisy, row, seed) if row.shadow_rays else noisy
+        found = [filtered(frame, prefiltered(frame), clean=True) for frame in relit]
+        return [to_display(image) for image in found]
+
+    def relit(self, frames: Sequence[Frame], row: Row, seed: int) -> list[Frame]:
+        """Return test frames whose colour has the layer `direct` for what its path has found of that."""
+        found = []
+        for index, (scene, frame) in enumerate(zip(self.scenes(TEST), frames, strict=True)):
+            job = replace(self.noisy(TEST, row, seed, index), feature_spp=0, shadow_rays=0)
+            own = self.frame(scene, replace(job, settings=Settings(max_depth=1)))["color"]
+            color = np.maximum(frame["color"] - own, 0.0) + frame["direct"]
+            found.append(Frame({**frame.layers, "color": color}, frame.info))
+        return found
 
 
 def scored(image: Floats, reference: Frame) -> dict[str, float]:
@@ -167,30 +202,26 @@ def scored(image: Floats, reference: Frame) -> dict[str, float]:
     }
 
 
-def milliseconds(executor: Executor) -> dict[str, float]:
-    """Return the median milliseconds of each row's kernel of paths and features."""
-    scene, part = canonical(SET.scene), Part(TIMED_PX, TIMED_PX, 0, TIMED_PX, 0, 1, 0)
-    launches: dict[str, Callable[[], object]] = {}
-    for name, row in ROWS.items():
-        rays = FeatureRays(row.rays, "net") if row.rays > 1 else None
-        programs = lower_scene(
-            scene, Settings(), forms_of(executor.name), rays=rays, shadow_rays=row.shadow_rays
-        )
-        kernel = compile_path(programs, executor.name, "native", executor.lanes, row.layers)
-        executor.build(kernel)
-        launches[name] = partial(executor.trace, kernel, replace(part, samples=row.spp))
-    found: dict[str, list[float]] = {name: [] for name in launches}
-    for number in range(ROUNDS + 1):
-        for name, launch in launches.items():
-            started = time.perf_counter()
-            launch()
-            if number:
-                found[name].append(1000.0 * (time.perf_counter() - started))
+def milliseconds(executor: Executor, models: Mapping[str, Model]) -> dict[str, float]:
+    """Return the median milliseconds of a frame by each row's pipeline."""
+    scene, size = canonical(SET.scene), (TIMED_PX, TIMED_PX)
+    found: dict[str, list[float]] = {name: [] for name in models}
+    with ExitStack() as stack:
+        opened = {
+            name: stack.enter_context(Pipeline(executor, scene, model, size, feature_spp=ROWS[name].rays))
+            for name, model in models.items()
+        }
+        for number in range(ROUNDS + 1):
+            for name, pipeline in opened.items():
+                started = time.perf_counter()
+                pipeline.run(number, ROWS[name].spp)
+                if number:
+                    found[name].append(1000.0 * (time.perf_counter() - started))
     return {name: statistics.median(times) for name, times in found.items()}
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Train, measure, draw and print."""
+def options_of(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Return the options."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -201,25 +232,40 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--spp", type=int, default=256, help="samples of references; those of tests: four times"
     )
     parser.add_argument("--steps", type=int, default=12_000)
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--executor", default="opencl")
     parser.add_argument("--cache", type=Path, default=Path("out/shadows"))
-    bench = Bench(parser.parse_args(arguments))
-    with open_executor(bench.options.executor) as executor:
-        times = milliseconds(executor)
-    today = bench.pairs(TEST, ROWS[next(iter(SHOWN))], 0)
-    references, rows = [clean for _, clean in today], []
-    panels = [("one path", to_display(today[0][0]["color"]))]
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Train, measure, draw and print."""
+    bench = Bench(options_of(arguments))
+    seeds = range(bench.options.seeds)
+    references = [clean for _, clean in bench.pairs(TEST, ROWS[next(iter(SHOWN))], 0)]
+    panels = [("one path", to_display(bench.pairs(TEST, ROWS[next(iter(SHOWN))], 0)[0][0]["color"]))]
+    scores: dict[str, list[dict[str, float]]] = {}
     for name in ROWS:
-        images = [image for seed in range(bench.options.seeds) for image in bench.images(name, seed)]
-        each = [scored(image, references[n % len(references)]) for n, image in enumerate(images)]
-        found = mean_scores(each)
-        rows.append([name, *(f"{found[key]:.{digits}f}" for key, (_, digits) in COLUMNS.items())])
-        rows[-1].append(f"{times[name]:.0f}")
-        panels += [(SHOWN[name], images[0])] if name in SHOWN else []
+        images = [bench.images(name, seed) for seed in seeds]
+        each = [[scored(*pair) for pair in zip(found, references, strict=True)] for found in images]
+        scores[name] = list(map(mean_scores, each))
+        panels += [(SHOWN[name], images[0][0])] if name in SHOWN else []
     panels.append(("reference", to_display(references[0]["color"])))
     write_panels(bench.options.cache / "shadows.png", panels, "experiments/shadows.py")
-    print(markdown(["features", *(head for head, _ in COLUMNS.values()), "ms"], rows))
+    # What is seen past mirrors and glass has no further camera rays in a pipeline: no time of that row.
+    timed = {name: bench.model(row, 0) for name, row in ROWS.items() if not (row.oidn or row.emission)}
+    with open_executor(bench.options.executor) as executor:
+        times = milliseconds(executor, timed)
+    heads = ["features", *(head for head, _ in COLUMNS.values()), "PSNR, range of seeds", "ms"]
+    print(markdown(heads, [shown(name, found, times) for name, found in scores.items()]))
+
+
+def shown(name: str, found: Sequence[dict[str, float]], times: Mapping[str, float]) -> list[str]:
+    """Return the line of a row: means over its seeds, the range of their PSNR, milliseconds if timed."""
+    means, each = mean_scores(found), [scores["psnr"] for scores in found]
+    line = [f"{means[key]:.{digits}f}" for key, (_, digits) in COLUMNS.items()]
+    milliseconds = f"{times[name]:.0f}" if name in times else ""
+    return [name, *line, f"{min(each):.2f} to {max(each):.2f}", milliseconds]
 
 
 if __name__ == "__main__":

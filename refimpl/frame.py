@@ -70,7 +70,7 @@ LAYERS: Mapping[str, Layer] = {
         Layer("history", 3, "linear radiance: mean of this colour and those of the pictures before"),
         Layer("history_weight", 1, "share of the pictures before in the history, in [0, 1); 0: it is new"),
         Layer("sun", 3, "unit direction in world space towards the sun of the sky: the same in all pixels"),
-        Layer("direct", 3, "the layer unshadowed with its shadows, as few shadow rays estimate it"),
+        Layer("direct", 3, "emission of the first hit, and unshadowed with its shadows, by few shadow rays"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""

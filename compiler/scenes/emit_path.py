@@ -4,13 +4,13 @@
         start: the path at the camera
         for depth = 0, 1, ... MAX_DEPTH
             arrive: the next surface; radiance of the paths that are alive
-            depth 0: look, add the features of the first surface; shadow, for each shadow ray
+            depth 0: look, add the features of the first surface; its emission, and shadow, for each ray
             while the path is followed: see, add the features of what is seen past mirrors and glass
             depth MAX_DEPTH: done
             scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
     for each ray of the features beyond the first sample's [`_Builder._rays`]
-        ray: the path at the camera; arrive; look; shadow, for each shadow ray
+        ray: the path at the camera; arrive; look; its emission, and shadow, for each shadow ray
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
    [`_Builder.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
@@ -362,7 +362,9 @@ class _Builder:
         if set(self.groups) & set(FIRST):
             found = self.block("look", comment, summed=True)
         program = self.programs.parts.get("shadow")
-        # Without lamps the layer is 0, and no ray is sent.
+        if program:  # the radiance so far is what the first surface emits
+            found += tuple(self._added(f"direct_{c}", self.of(f"radiance_{c}")) for c in "rgb")
+        # Without lamps no ray is sent.
         if program and any(program.nodes[index].op != "constant" for _, index in program.outputs):
             number = Let("shadow_number", self.all(apply("convert", name("shadow"), value="uint32")))
             body = (number, *self.block("shadow", "a lamp's light, if nothing is in between", summed=True))

@@ -135,12 +135,14 @@ def looked(programs: PathPrograms, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def lit(programs: PathPrograms, state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parts of the layer `direct`, by plane lists over the shadow rays of first surfaces."""
-    found: dict[str, Any] = {}
-    for number in range(programs.shadow_rays if "shadow" in programs.parts else 0):
+    """Return the parts of the layer `direct`, by plane: first surfaces' emission, then their shadow rays."""
+    if "shadow" not in programs.parts:
+        return {}
+    found: dict[str, Any] = {f"direct_{c}": [state[f"radiance_{c}"]] for c in "rgb"}
+    for number in range(programs.shadow_rays):
         given = {**state, "shadow_number": np.full(state["x"].shape, number, np.uint32)}
         for plane, part in interpret(programs.parts["shadow"], given).items():
-            found[plane] = [*found.get(plane, ()), part]
+            found[plane].append(part)
     return found
 
 

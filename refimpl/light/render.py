@@ -10,7 +10,8 @@
    [`with_own_features`], whose rays are spread evenly over a pixel and begin with the colour's first one.
 5. Features of what is seen past mirrors and glass are layers of their own, on request (following.py). They
    follow the same paths; those of more camera rays end where the features do.
-6. On request each camera ray sends shadow rays to the lamps, for the layer `direct`.
+6. On request each camera ray sends shadow rays to the lamps, for the layer `direct`: their light, and what
+   the first hit emits itself.
 """
 
 from __future__ import annotations
@@ -275,9 +276,10 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
         if depth == 0:
             layers = first_hit_layers(world, surface, hit, direction)
             layers |= {n: np.zeros((len(x), LAYERS[n].channels), dtype) for n in SEEN if n in job.layers}
+            layers[DIRECT] = path.radiance  # what the first hit emits
             for number in map(np.uint32, range(job.shadow_rays)):
                 part = transport.direct(world, surface, hit, counters, job.shadow_rays, number)
-                layers[DIRECT] = layers[DIRECT] + part if number else part
+                layers[DIRECT] = layers[DIRECT] + part
         if job.seen:
             way, seen = following.see(world, way, path, surface, hit, rng.counter(depth), most)
             for name, values in seen.items():

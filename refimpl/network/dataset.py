@@ -267,7 +267,8 @@ FEATURES: Mapping[str, Feature] = {
     **SMOOTHED,
     SUN: Feature(SUN, SUN, 3, -1.0, 1.0, encode_signed, "unit direction in world space towards the sun"),
     DIRECT: Feature(
-        *(DIRECT, DIRECT, 3, 0.0, 1.0, encode_color, "unshadowed with its shadows: " + DISPLAY_FORMULA)
+        *(DIRECT, DIRECT, 3, 0.0, 1.0, encode_color),
+        "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA,
     ),
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of

@@ -11,8 +11,8 @@ from wamnet.refimpl.frame import Frame
 def test_direct_light_takes_the_place_of_the_unshadowed_one():
     found = {name: row.layers[4:] for name, row in shadows.ROWS.items()}
     assert found["4 camera rays, no shadow ray"] == ("unshadowed",)
-    assert found["4 camera rays, 16 shadow rays"] == ("direct",)
-    assert found["4 camera rays, 16 shadow rays, both layers"] == ("unshadowed", "direct")
+    assert found["4 camera rays, no shadow ray, visible lamps"] == ("unshadowed", "seen_emission")
+    assert found["16 camera rays, 16 shadow rays"] == ("direct",)
     assert set(shadows.SHOWN) <= set(shadows.ROWS)
 
 
@@ -25,3 +25,20 @@ def test_scores_are_of_the_penumbra_too():
     found = shadows.scored(target + 0.1 * (half < 1.0), reference)
     assert abs(found["penumbra"] - 25.5) <= 255.0 * 2.0**-20  # float32 in, a tenth of 255
     assert 0.0 < found["blurred"] < found["penumbra"]
+
+
+def test_the_same_direct_light_takes_the_place_of_the_path_s_own(tmp_path):
+    """What is left of a path's own colour is light after two scatterings or more, nowhere negative."""
+    options = shadows.options_of(
+        ["--tests", "1", "--size", "16", "--executor", "numpy", "--cache", str(tmp_path)]
+    )
+    bench, row = shadows.Bench(options), shadows.Row(2, 1)
+    noisy = bench.frame(bench.scenes("test")[0], bench.noisy("test", row, 0, 0))
+    (found,) = bench.relit([noisy], row, 0)
+    more = found["color"] - noisy["direct"]
+    assert np.all(more >= 0.0)
+    assert more.any()
+    # Where the path has met a lamp at once, nothing is left of it but that.
+    lamps = noisy["color"].max(axis=-1) > 4.0
+    assert lamps.any()
+    assert np.array_equal(found["color"][lamps], noisy["direct"][lamps])

@@ -374,9 +374,15 @@ def test_the_layer_changes_no_other():
         assert "direct" not in without
         assert (without.info.get("shadow_rays"), found.info["shadow_rays"]) == (None, "2")
         assert all(np.array_equal(found[name], without[name]) for name in without.layers)
-        light, most = found["direct"], found["unshadowed"]
-        assert 0.0 < light.sum() < most.sum()
-    dark = R.render(scenes.canonical("furnace"), R.Job(4, 4, shadow_rays=1)).frame
-    assert not dark["direct"].any()
+        first = R.feature_job(plain) or plain
+        first = replace(first, settings=replace(first.settings, max_depth=0), color=True)
+        light = found["direct"].sum() - R.render(scene, first).frame["color"].sum()  # less what is emitted
+        assert 0.0 < light < found["unshadowed"].sum()
+    for name in ("furnace", "daylight"):  # without lamps, and with a sky: what the first hits emit
+        dark = R.render(scenes.canonical(name), R.Job(8, 8, shadow_rays=1)).frame["direct"]
+        assert np.array_equal(
+            dark, R.render(scenes.canonical(name), R.Job(8, 8, settings=Settings(0))).frame["color"]
+        )
+        assert dark.any()
     with pytest.raises(InputError, match="shadow_rays 65: must be an integer from 0 to 64"):
         R.Job(4, 4, shadow_rays=65)

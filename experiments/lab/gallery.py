@@ -1,4 +1,4 @@
-"""Plots of the records, by name: [`PLOTS`]."""
+"""Plots of the records, by name [`PLOTS`]. Those of decided questions are pictures that records name."""
 
 from __future__ import annotations
 
@@ -33,57 +33,8 @@ def draw_quality(records: Records) -> Any:
     return figure
 
 
-ABLATED = {
-    "window": "window (px)",
-    "width": "width (neurons)",
-    "depth": "depth (layers)",
-    "frames": "training frames",
-}
-"""Factors of the ablations that are drawn, with the labels of their axes."""
-
-
-def draw_ablations(records: Records) -> Any:
-    """Draw the PSNR against window, width, depth and training frames, on one scale."""
-    found = records["ablations"]
-    figure, axes = plots.axes(len(ABLATED), (10.0, 2.8))
-    for axis, (factor, label) in zip(axes, ABLATED.items(), strict=True):
-        names = {
-            float(name.partition(" = ")[2]): name
-            for name in found.configurations()
-            if name.startswith(f"{factor} = ")
-        }
-        line = plots.points(found, dict(sorted(names.items())), "psnr")
-        plots.lines(axis, {factor: line}, (label, ""), ticks=sorted(names))
-        axis.sharey(axes[0])
-        axis.tick_params(labelleft=axis is axes[0])
-    axes[0].set_ylabel("PSNR, dB")
-    axes[0].autoscale(axis="y")
-    return figure
-
-
-def draw_learning_curve(records: Records) -> Any:
-    """Draw the PSNR against the seconds of training."""
-    found, shown = records["learning_curve"], {}
-    for name in found.configurations():
-        curves = zip(*found.of(name, "curve"), strict=False)
-        shown[name] = [
-            (
-                sum(p["seconds"] for p in at) / len(at),
-                sum(p["psnr"] for p in at) / len(at),
-                min(p["psnr"] for p in at),
-                max(p["psnr"] for p in at),
-            )
-            for at in curves
-        ]
-    figure, (axis,) = plots.axes(1, (6.0, 3.5))
-    plots.lines(axis, shown, ("seconds of training", "PSNR on unseen times, dB"), ticks=(1, 3, 10, 30, 100))
-    return figure
-
-
 PLOTS: Mapping[str, Plot] = {
     "quality": Plot(draw_quality, ("quality",)),
-    "ablations": Plot(draw_ablations, ("ablations",)),
-    "learning-curve": Plot(draw_learning_curve, ("learning_curve",)),
     "speed-against-error": Plot(draw_speed("bench-minicubes"), ("bench-minicubes",)),
     "speed-short": Plot(draw_speed_short("bench-minicubes"), ("bench-minicubes",)),
 }

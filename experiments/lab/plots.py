@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 from .records import FOLDER, ROOT, Records, pending
-from .results import Results
 
 IMAGES = "docs/images"
 """The folder of the plots."""
@@ -94,17 +93,8 @@ def axes(columns: int, inches: tuple[float, float]) -> tuple[Any, Sequence[Any]]
     return figure, figure.subplots(1, columns, squeeze=False)[0]
 
 
-def points(found: Results, names: Mapping[float, str], value: str) -> Line:
-    """Return the points of a line: by x the configuration whose mean and interval are there."""
-    made = []
-    for x, name in names.items():
-        if (at := found.interval(name, value)) is not None:
-            made.append((x, at.mean, at.low, at.high))
-    return made
-
-
-def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], ticks: Sequence[float] = ()) -> None:
-    """Draw lines of means with bands of their intervals; `ticks`: those of a logarithmic axis."""
+def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str]) -> None:
+    """Draw lines of means with bands of their intervals."""
     for number, (name, points) in enumerate(found.items()):
         if not points:
             continue
@@ -115,13 +105,6 @@ def lines(axis: Any, found: Mapping[str, Line], labels: tuple[str, str], ticks: 
     axis.set_xlabel(labels[0])
     axis.set_ylabel(labels[1])
     axis.grid(visible=True, alpha=0.2, linewidth=0.6)
-    if ticks:
-        from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
-
-        axis.set_xscale("log")
-        axis.xaxis.set_major_locator(FixedLocator(ticks))
-        axis.xaxis.set_major_formatter(ScalarFormatter())
-        axis.xaxis.set_minor_locator(NullLocator())
     if len(found) > 1:
         axis.legend(frameon=False, fontsize=8)
 

@@ -5,8 +5,8 @@
 2. Only what can be trusted becomes one: its command is known, it has records, all numbers are finite, each
    configuration has the same seeds, and nothing in it names a place of one machine [`checked`]. The check
    comes before the writing, numbers have six digits [`rounded`].
-3. A record may name pictures of frames, with their digests; plots are drawn from records instead
-   [`pictures`].
+3. A record may name pictures of frames, and plots whose code is gone, with their digests; other plots are
+   drawn from records [`pictures`].
 4. A text that shows a record which is still to be made is listed in `pending.txt`, with the command that
    makes it [`pending`]; figures that need no record in `quoted.txt`, with the reason [`quoted`].
 """

@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,6 +129,14 @@ class Artifact:
         if self.certificate:
             own[CERTIFICATE_NAME] = (json.dumps(self.certificate, allow_nan=False) + "\n").encode()
         return {**{f"{FIRST_PASS}{name}": data for name, data in first.items()}, **own}
+
+
+class SmoothKernels(NamedTuple):
+    """What runs one after another: `guide`, `smooth` once a level, `encode`."""
+
+    guide: Artifact
+    smooth: Artifact
+    encode: Artifact
 
 
 def weight_bytes(artifact: Artifact) -> bytes:

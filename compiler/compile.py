@@ -40,6 +40,7 @@ from .proof.whole import has_one_zero
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
 from .schedules.schedules import PLAIN
+from .targets import Language
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
@@ -128,10 +129,10 @@ def header(title: str, dialect: Dialect, entries: Sequence[Entry]) -> list[str]:
 
 
 def compile_program(
-    program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
+    program: Program, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
 ) -> Artifact:
     """Return the kernel of a program that reads a window and writes one output [`plan_program`]."""
-    return compile_plan(plan_program(program, target, profile, schedule, rank))
+    return compile_plan(plan_program(program, language, profile, schedule, rank))
 
 
 def compile_plan(plan: Plan) -> Artifact:

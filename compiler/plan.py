@@ -38,7 +38,7 @@ from .schedules import schedules
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
-from .targets import Target, target_named
+from .targets import Language, language_named
 
 BLOCK_NUMBERS = 2**20
 """Numbers in the windows of one block of rows: a bound holds some copies of them, 8 MiB each."""
@@ -82,7 +82,7 @@ class Plan:
     """
 
     analysed: Program
-    target: Target
+    target: Language
     profile: Profile
     asked: str = PLAIN
     cut: Cut | None = None
@@ -235,19 +235,19 @@ def analysed(program: Program) -> Program:
     return pipeline.run(program, pipeline.COMMON)
 
 
-def sine_contract(profile: str, target: str) -> SineContract:
+def sine_contract(profile: str, language: Language | str) -> SineContract:
     """Return what is promised of a sine under this profile on this target."""
-    return target_named(target).sine(profiles.profile_named(profile))
+    return language_named(language).sine(profiles.profile_named(profile))
 
 
 def plan_program(
-    program: Program, target: str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
+    program: Program, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
 ) -> Plan:
     """Return the plan of a program that reads a window and writes one output, or refuse it.
 
     With a `rank` the first layer is cut to it, and there are two kernels [factor.py].
     """
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = language_named(language), profiles.profile_named(profile)
     if kernel_gather(program).whole and rank:
         raise CompileError(f"rank {rank}: needs a float network, not an integer one (leave it out)")
     common = analysed(program)

@@ -45,7 +45,7 @@ HERE, SHOWN = "here", "shown"
 
 
 @dataclass(frozen=True)
-class Target:
+class Language:
     """Something that runs kernels: its language, and what there is for it.
 
     `paths` are the numbers of paths that path kernels follow at once, none where there are no path kernels,
@@ -82,7 +82,7 @@ class Target:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
-        return target_named, (self.name,)
+        return language_named, (self.name,)
 
 
 TILES = {
@@ -147,13 +147,13 @@ def groups(dialect: Dialect) -> tuple[Schedule, ...]:
     return tuple(found)
 
 
-def _of(dialect: Dialect, *ladder: Schedule) -> Target:
+def _of(dialect: Dialect, *ladder: Schedule) -> Language:
     """Return the target of a language; `ladder` are its schedules after the plain one."""
     paths = (1,) if PATH in dialect.said else ()
-    return Target(dialect, (Plain(dialect), *ladder), paths)
+    return Language(dialect, (Plain(dialect), *ladder), paths)
 
 
-def processor(dialect: Dialect) -> Target:
+def processor(dialect: Dialect) -> Language:
     """Return the target of a language for processors, and for graphics processors where it has groups."""
     shared = groups(dialect) if dialect.group else ()
     spectra = ffts(dialect) if dialect.transforms else passes(dialect)
@@ -187,10 +187,10 @@ to four times slower than statements; but it compiles the statements of 100 prim
 take 8,000 operations, in 1 to 5 s, those of 300 in 9 to 60 s. A walk is slower still than a loop
 (`wamnet bench primitives --executors opengl`)."""
 
-LANGUAGES: Mapping[str, Target] = {
+LANGUAGES: Mapping[str, Language] = {
     target.name: target
     for target in (
-        Target(Listing(), (Printed(Listing()),), paths=(1,), planes=(1,), runs=SHOWN),
+        Language(Listing(), (Printed(Listing()),), paths=(1,), planes=(1,), runs=SHOWN),
         replace(processor(OpenCL()), paths=LANES, planes=LANES, forms=Forms(trees=True), runs=SHOWN),
         replace(
             _of(GLSL(), Inline(GLSL()), *passes(GLSLCompute(), "inlined"), *groups(GLSLCompute())),
@@ -201,7 +201,7 @@ LANGUAGES: Mapping[str, Target] = {
         replace(processor(C()), planes=(1,), forms=Forms(trees=True), runs=HERE),
         replace(_of(GLSLES(), Inline(GLSLES()), Packed(GLSLES())), forms=MESA),
         *(processor(dialect()) for dialect in (Compute, Vulkan, WGSL, CUDA, Metal)),
-        Target(ShadertoyDenoise(), (Inline(ShadertoyDenoise()),)),
+        Language(ShadertoyDenoise(), (Inline(ShadertoyDenoise()),)),
         _of(GodotDenoise()),
         *(
             _of(language().placed(home, weight, where))
@@ -225,13 +225,15 @@ ALIASES = {"glsl": "opengl"}
 """Other names of targets: those of their languages."""
 
 
-def target_named(name: str) -> Target:
-    """Return the target, or say which ones there are."""
+def language_named(name: Language | str) -> Language:
+    """Return the language of a target by name, or say which ones there are; one that is known is returned."""
+    if isinstance(name, Language):
+        return name
     if (known := ALIASES.get(name, name)) not in LANGUAGES:
         raise CompileError(f"target {name!r}: unknown ({choice(name, LANGUAGES)})")
     return LANGUAGES[known]
 
 
-def schedule_named(target: str, name: str) -> Schedule:
-    """Return the schedule of this name of a target."""
-    return {schedule.name: schedule for schedule in target_named(target).schedules}[name]
+def schedule_named(language: Language | str, name: str) -> Schedule:
+    """Return the schedule of this name in a language."""
+    return {schedule.name: schedule for schedule in language_named(language).schedules}[name]

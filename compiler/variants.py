@@ -44,6 +44,7 @@ from .proof import bounds
 from .proof.bounds import Enclosure
 from .schedules.common import kernel_gather
 from .schedules.schedules import PLAIN
+from .targets import Language
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -503,11 +504,11 @@ def bound_of(plan: VariedPlan) -> Array | None:
 
 
 def plan_model(
-    model: Model, target: str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
+    model: Model, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
 ) -> VariedPlan:
     """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
     varied = vary(parse(variant), model)
-    found = plan_program(lower(varied.model), target, varied.profile(profile), schedule, varied.rank)
+    found = plan_program(lower(varied.model), language, varied.profile(profile), schedule, varied.rank)
     return VariedPlan(**found.__getstate__(), varied=varied)
 
 

@@ -39,7 +39,7 @@ from wamnet.cli.files.outputs import write_text
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.schedules.schedules import PLAIN
-from wamnet.compiler.targets import target_named
+from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
@@ -341,7 +341,7 @@ def oidn(row: Row, frame: Frame) -> Floats:
 
 def certified(bench: Bench, kept: Results, rows: Sequence[str], seed: int) -> None:
     """Keep what the certificates of networks say: how far a colour may be off, over all pictures."""
-    known = [schedule.name for schedule in target_named(bench.executor).schedules]
+    known = [schedule.name for schedule in language_named(bench.executor).schedules]
     wanted = {PLAIN: "", **({SPECTRA: ", by spectra"} if SPECTRA in known else {})}
     for row in rows:
         for schedule, end in wanted.items():

@@ -13,21 +13,18 @@ from numpy.typing import NDArray
 from .compiler import artifact as artifacts
 from .compiler.artifact import Artifact
 from .compiler.core import ir
-from .compiler.targets import DENOISERS, EXPORTED
+from .compiler.targets import ALIASES, LANGUAGES
 from .refimpl.errors import InputError, WamnetError, choice
 
 PLAIN = "plain"
 """The schedule that every target has."""
 
-LANGUAGES = {"glsl": "opengl"}
-"""Names of languages beside those of the targets."""
-
 
 def target_of(language: str) -> str:
     """Return the compiler's target for a language; raise InputError for an unknown one."""
-    target = LANGUAGES.get(language, language)
-    if target not in {**DENOISERS, **EXPORTED}:
-        raise InputError("target", language, "unknown", choice(language, [*LANGUAGES, *DENOISERS, *EXPORTED]))
+    target = ALIASES.get(language, language)
+    if target not in LANGUAGES:
+        raise InputError("target", language, "unknown", choice(language, [*ALIASES, *LANGUAGES]))
     return target
 
 

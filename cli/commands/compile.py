@@ -27,6 +27,7 @@ from .choose import Request, check_request, choose
 
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
+    from ...compiler.targets import Language
     from ...refimpl.network.denoise import Model
 
 EXAMPLES = """Examples:
@@ -43,9 +44,6 @@ wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
 HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 """What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
 
-EXECUTOR_OF = {"opencl": "opencl", "glsl": "opengl", "c": "c"}
-"""The compiler names a target by the executor that runs it; people know the language."""
-
 
 @dataclass(frozen=True)
 class OfScene:
@@ -61,10 +59,10 @@ class OfScene:
         None, "Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
     )
 
-    def compiled(self, name: str, target: str, profile: str) -> Artifact:
+    def compiled(self, name: str, language: Language, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
         from ...compiler.scenes.lower_scene import lower_scene
-        from ...compiler.scenes.path_kernel import compile_path, forms_of
+        from ...compiler.scenes.path_kernel import compile_path
         from ...refimpl.light.transport import Settings
 
         scene = load_scene(name, self.time, self.parameters or [])
@@ -73,8 +71,8 @@ class OfScene:
         settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)
-        programs = lower_scene(scene, settings, forms_of(target))
-        return compile_path(programs, target, profile, 1 if self.lanes is None else self.lanes)
+        programs = lower_scene(scene, settings, language.forms)
+        return compile_path(programs, language, profile, 1 if self.lanes is None else self.lanes)
 
 
 def compile_model(
@@ -100,18 +98,19 @@ def compile_model(
     limits (--max-error, --max-ms, --max-loss-db): they choose the variant from a speed-error curve that
     is measured once per device.
     """
-    folder, name = output or Path(target), EXECUTOR_OF[target]
-    kernel: Artifact
+    from ...compiler.targets import language_named
+
+    folder, language = output or Path(target), language_named(target)
     if is_scene(model):
         of_models = given(network, "schedule", "variant") | {"--here": here or None} | given(limits)
         rule = f"{model} is a scene, whose kernels have one schedule, no variants"
         refuse(of_models, rule, "leave it out, or name a model")
-        check_folder(folder, name, of_scene=True)
-        kernel = of_scene.compiled(model, name, network.profile)
+        check_folder(folder, language.name, of_scene=True)
+        kernel = of_scene.compiled(model, language, network.profile)
     else:
         _check_name(model, given(of_scene))
-        check_folder(folder, name)
-        kernel = _compiled_model(Path(model), name, network, limits, here)
+        check_folder(folder, language.name)
+        kernel = _compiled_model(Path(model), language, network, limits, here)
     _write(kernel, folder)
 
 
@@ -141,7 +140,9 @@ def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
     return schedule
 
 
-def _compiled_model(path: Path, target: str, network: KernelRequest, limits: Request, here: bool) -> Artifact:
+def _compiled_model(
+    path: Path, language: Language, network: KernelRequest, limits: Request, here: bool
+) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
     from ...compiler.compile import compile_plan
 
@@ -152,11 +153,11 @@ def _compiled_model(path: Path, target: str, network: KernelRequest, limits: Req
             rule = "limits are measured on frames, which an imported network does not read"
             raise InputError("limits", NO_VALUE, rule, "leave them out")
         refuse({"--here": NO_VALUE if here else None}, "limits choose the schedule too")
-        variant, schedule = choose(model, limits, target, network.profile, network.schedule)
+        variant, schedule = choose(model, limits, language.name, network.profile, network.schedule)
         network = replace(network, variant=variant, schedule=schedule)
     elif here:
-        network = replace(network, schedule=_chosen_here(model, target, network))
-    return compile_plan(network.plan(model, target))
+        network = replace(network, schedule=_chosen_here(model, language.name, network))
+    return compile_plan(network.plan(model, language))
 
 
 def is_scene(name: str) -> bool:
@@ -179,7 +180,7 @@ def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
         raise InputError("model or scene", name, "not found", f"{choice(name, known)}, or give a file")
 
 
-def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
+def check_folder(folder: Path, name: str, of_scene: bool = False) -> None:
     """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
     from ...compiler import artifact
     from ...compiler.scenes import path_kernel
@@ -203,8 +204,8 @@ def check_folder(folder: Path, target: str, of_scene: bool = False) -> None:
     if schema != wanted:
         rule = f"holds {kinds[schema]}, and this is {kinds[wanted]}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
-    if data.get("target") != target:
-        rule = f"holds a kernel for {data.get('target')}, and this one is for {target}"
+    if data.get("target") != name:
+        rule = f"holds a kernel for {data.get('target')}, and this one is for {name}"
         raise InputError("output folder", str(folder), rule, "choose another with -o")
 
 

@@ -12,10 +12,11 @@ from ..common.inputs import load_model, load_scene
 from ..common.options import Target
 from ..common.terminal import say
 from ..files.outputs import check_output, write_text
-from .compile import EXECUTOR_OF, is_scene
+from .compile import is_scene
 
 if TYPE_CHECKING:
     from ...compiler.core.listing import Line
+    from ...compiler.targets import Language
 
 EXAMPLES = """Examples:
 wamnet listing model.safetensors --target glsl
@@ -39,11 +40,11 @@ def listing(
     Denoisers use the plain schedule; scenes trace one path at a time. Only -o writes a file.
     """
     from ...compiler.core.listing import as_text
+    from ...compiler.targets import language_named
 
     if output is not None:
         check_output(output, inputs=[Path(model)])
-    name = EXECUTOR_OF[target]
-    text = as_text(_lines(model, name, profile), _reference)
+    text = as_text(_lines(model, language_named(target), profile), _reference)
     if output is None:
         for line in text.rstrip("\n").split("\n"):
             say(line)
@@ -52,21 +53,22 @@ def listing(
         say(str(output))
 
 
-def _lines(model: str, target: str, profile: str) -> list[Line]:
+def _lines(model: str, language: Language, profile: str) -> list[Line]:
     """Return the lines of the kernel of a model or a scene, with their places."""
     from ...compiler.compile import compile_program
     from ...compiler.core.listing import lines_of
     from ...compiler.core.lower import lower
     from ...compiler.scenes.lower_scene import lower_scene
-    from ...compiler.scenes.path_kernel import compile_path, forms_of
+    from ...compiler.scenes.path_kernel import compile_path
     from ...refimpl.light.transport import Settings
 
     if is_scene(model):
         scene = load_scene(model, None, [])
-        programs = lower_scene(scene, Settings(), forms_of(target), keep_places=True)
-        path_kernel = compile_path(programs, target, profile)
+        programs = lower_scene(scene, Settings(), language.forms, keep_places=True)
+        path_kernel = compile_path(programs, language, profile)
         return lines_of(path_kernel.source, path_kernel.programs.parts)
-    kernel = compile_program(lower(load_model(Path(model), imported=True), keep_places=True), target, profile)
+    program = lower(load_model(Path(model), imported=True), keep_places=True)
+    kernel = compile_program(program, language, profile)
     return lines_of(kernel.source, {"": kernel.programs})
 
 

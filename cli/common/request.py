@@ -15,6 +15,7 @@ from ...refimpl.errors import InputError
 from . import options
 
 if TYPE_CHECKING:
+    from ...compiler.targets import Language
     from ...compiler.variants import VariedPlan
     from ...refimpl.network.denoise import Model
 
@@ -37,12 +38,12 @@ class KernelRequest:
 
         return with_rank(self.variant or FULL, rank)
 
-    def plan(self, model: Model, target: str) -> VariedPlan:
-        """Return the plan of a model's kernel for a target."""
+    def plan(self, model: Model, language: Language | str) -> VariedPlan:
+        """Return the plan of a model's kernel in a language."""
         from ...compiler.schedules.schedules import PLAIN
         from ...compiler.variants import plan_model
 
-        return plan_model(model, target, self.profile, self.schedule or PLAIN, self.network())
+        return plan_model(model, language, self.profile, self.schedule or PLAIN, self.network())
 
 
 def given(request: Any, *names: str) -> dict[str, object]:

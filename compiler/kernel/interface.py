@@ -11,8 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from ..core.ir import Image
 
 DENOISE, PATH, ENCODE = "denoise", "path", "encode"
@@ -188,8 +186,8 @@ class Interface:
         return sorted(self.arrays, key=lambda array: numbers[array.name])
 
 
-def _image(image: Image, access: str) -> Array:
-    """Return an image."""
+def image_of(image: Image, access: str) -> Array:
+    """Return the image of a feature, or of a layer."""
     return Array(f"{IMAGE}{image.name}", access, ("height", "width", image.channels))
 
 
@@ -197,58 +195,13 @@ def denoiser(
     images: Sequence[Image], weights: int, channels: int, home: str, integers: Sequence[str]
 ) -> Interface:
     """Return what a denoiser is given: images, so many weights at their home, and a result."""
-    found = [_image(image, READ) for image in images]
+    found = [image_of(image, READ) for image in images]
     if home != TABLE:
         found.append(Array(WEIGHTS, READ, (weights,), home))
     found.append(Array(RESULT, WRITE, ("height", "width", channels)))
     return Interface(DENOISE, tuple(found), tuple(integers))
 
 
-def paths(planes: int, integers: Sequence[str], numbers: int = 0, images: Sequence[Image] = ()) -> Interface:
-    """Return what a path kernel is given: what it writes, and numbers of the scene if any move.
-
-    It writes planes of sums, or the encoded images that it makes of them.
-    """
-    written = [Array(f"{IMAGE}{image.name}", WRITE, ("rows", "width", image.channels)) for image in images]
-    sums = Array(SUMS, WRITE, (planes, "rows", "width"))
-    moving = [Array(SCENE_NUMBERS, READ, (numbers,))] if numbers else []
-    return Interface(PATH, (*(written or [sums]), *moving), tuple(integers))
-
-
-def encoding(planes: int, images: Sequence[Image], integers: Sequence[str]) -> Interface:
-    """Return what an encoding is given: planes of sums, and images to write."""
-    found = [Array(SUMS, READ, (planes, "height", "width")), *(_image(image, WRITE) for image in images)]
-    return Interface(ENCODE, tuple(found), tuple(integers))
-
-
-def guiding(layers: Sequence[Image], guides: int, light: int, integers: Sequence[str]) -> Interface:
-    """Return what prepares a filter: layers of a frame, and so many planes of guides and light to write."""
-    planes = (_planes(GUIDES, WRITE, guides), _planes(LIGHT, WRITE, light))
-    return Interface(GUIDE, (*(_image(layer, READ) for layer in layers), *planes), tuple(integers))
-
-
-def smoothing(guides: int, light: int, integers: Sequence[str]) -> Interface:
-    """Return what a level of a filter is given: planes of guides and of light, and a result like light."""
-    planes = (_planes(GUIDES, READ, guides), _planes(LIGHT, READ, light), _planes(RESULT, WRITE, light))
-    return Interface(SMOOTH, planes, tuple(integers))
-
-
-def following(counts: Mapping[str, int], integers: Sequence[str]) -> Interface:
-    """Return what a history is given: so many planes of first hits and of the last picture, as many to write.
-
-    Beside them are the new colour, rows of so many numbers of a motion, and numbers of cameras.
-    """
-    arrays = (
-        _planes(FIRST, READ, counts["first"]),
-        _planes(PAST, READ, counts["past"]),
-        _image(Image("color", 3, -np.inf, np.inf), READ),
-        Array(MOTIONS, READ, (PRIMITIVES, counts["motion"])),
-        Array(CAMERAS, READ, (counts["cameras"],)),
-        _planes(RESULT, WRITE, counts["past"]),
-    )
-    return Interface(FOLLOW, arrays, tuple(integers))
-
-
-def _planes(name: str, access: str, count: int) -> Array:
+def planes_of(name: str, access: str, count: int) -> Array:
     """Return so many planes, whose rows may be longer than the picture's."""
     return Array(name, access, (count, "height", "row_stride"))

@@ -462,7 +462,7 @@ class Renderer:
             return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY
         return self._operation(value)
 
-    def _vector_call(self, target: str, value: Expr, add: bool, starts: bool = True) -> None:
+    def _vector_call(self, into: str, value: Expr, add: bool, starts: bool = True) -> None:
         """Write a change of a vector as a call of one of the language's own functions.
 
         `starts`: words of weights are where a sum begins, not factors.
@@ -482,7 +482,7 @@ class Renderer:
             place = self.element(value.value, value.args, value.type.lanes)
             call = "add" if add else "load" if value.value in self.mixed else "store"
             given = [place if value.value in self.mixed else f"&{place}"]
-        self._line(f"wamnet_{call}({', '.join([target, *given])});")
+        self._line(f"wamnet_{call}({', '.join([into, *given])});")
 
     def _result(self, index: Sequence[Expr], value: Expr) -> None:
         """Write a channel of the result."""

@@ -480,9 +480,9 @@ def lines_of(source: str) -> str:
 
 
 @cache
-def frame(target: str) -> re.Pattern[str]:
+def frame(language: str) -> re.Pattern[str]:
     """Return the pattern of a target's frame; groups of one name are numbered [`parts_of`]."""
-    text = lines_of(FRAMES[target])
+    text = lines_of(FRAMES[language])
     pieces = re.split(r"@([^@\n]+)@(\n?)", text)
     pattern, last = "", {}
     for literal, place, end in zip(pieces[::3], [*pieces[1::3], ""], [*pieces[2::3], ""], strict=True):

@@ -34,8 +34,8 @@ from ...refimpl.errors import CompileError, choice
 from ..core.ir import Image, Node, Program
 from ..core.loops import Loop, Part, Walk, loops
 from ..core.weights import tables
-from ..kernel import interface
-from ..kernel.interface import IMAGE, INTEGERS, PATH, SCENE_NUMBERS, SUMS
+from ..kernel.interface import IMAGE, INTEGERS, PATH, READ, SCENE_NUMBERS, SUMS, WRITE, Interface
+from ..kernel.interface import Array as Memory
 from ..kernel.kernel import (
     BOOL,
     FLOAT,
@@ -266,7 +266,11 @@ class _Builder:
         self.planes = planes(self.groups)
         self.tables: dict[tuple[str, bytes], tuple[str, NDArray[Any]]] = {}  # equal ones have one name
         images = self.encoding.images if self.encoding else ()
-        bound = interface.paths(len(self.planes), INTEGERS[PATH], len(self.programs.inputs), images)
+        count, numbers = len(self.planes), len(self.programs.inputs)
+        written = [Memory(f"{IMAGE}{i.name}", WRITE, ("rows", "width", i.channels)) for i in images]
+        written = written or [Memory(SUMS, WRITE, (count, "rows", "width"))]
+        moving = [Memory(SCENE_NUMBERS, READ, (numbers,))] if numbers else []
+        bound = Interface(PATH, (*written, *moving), INTEGERS[PATH])
         self.column, self.row = map(name, bound.place)
         depth = self.programs.settings.max_depth if self.followed or not self.short else 0
         body = (*self._begin(), self._samples(), *self._rays(), *self._end())

@@ -23,14 +23,13 @@ from ..artifact import Artifact
 from ..core import profiles
 from ..core.lower import images_of
 from ..core.passes import pipeline
-from ..kernel import interface
-from ..kernel.interface import ENCODE, IMAGE, INTEGERS
+from ..kernel.interface import ENCODE, IMAGE, INTEGERS, READ, WRITE, Array, Interface, image_of
 from ..kernel.interface import SUMS as SUMS_ARRAY
 from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
 from ..plan import sine_contract
 from ..proof import bounds
 from ..schedules.common import X, Y, lets
-from ..targets import target_named
+from ..targets import Language, language_named
 from .emit_path import Encoding
 from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
 from .plane_kernel import compiled, reads
@@ -42,7 +41,7 @@ SCHEMA = "wamnet-encode-kernel-1"
 def compile_encode(
     features: Sequence[str],
     normalization: Normalization,
-    target: str,
+    language: Language | str,
     profile: str = "ieee",
     planes: Sequence[str] | None = None,
     whole: bool = False,
@@ -53,7 +52,7 @@ def compile_encode(
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
     images are those of a network of integers. `rays`: those of features [lower_encode].
     """
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = language_named(language), profiles.profile_named(profile)
     encoding = encoding_of(features, normalization, profile, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
@@ -65,7 +64,7 @@ def compile_encode(
         )
     if not chosen.encodes:
         raise CompileError(
-            f"target {target} has no kernels that encode features: use one that has them, such as opencl"
+            f"target {chosen.name} has no kernels that encode features: use one that has them, such as opencl"
         )
     if len(images) > (most := chosen.dialect.max_images):
         raise CompileError(
@@ -106,7 +105,9 @@ def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
             for c in range(image.channels)
         ),
     )
-    return Kernel(interface.encoding(len(planes), encoding.images, INTEGERS[ENCODE]), body)
+    sums = Array(SUMS_ARRAY, READ, (len(planes), "height", "width"))
+    arrays = (sums, *(image_of(image, WRITE) for image in encoding.images))
+    return Kernel(Interface(ENCODE, arrays, INTEGERS[ENCODE]), body)
 
 
 def encoding_of(

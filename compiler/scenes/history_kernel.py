@@ -13,20 +13,34 @@ in the definition. How far rounding takes a history is said by HIS-6.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
+
+import numpy as np
 
 from ..artifact import Artifact
 from ..core import profiles
+from ..core.ir import Image
 from ..core.passes import pipeline
-from ..kernel import interface
 from ..kernel.interface import CAMERAS as CAMERAS_ARRAY
 from ..kernel.interface import FIRST as FIRST_ARRAY
-from ..kernel.interface import FOLLOW, IMAGE, INTEGERS, MOTIONS, RESULT
+from ..kernel.interface import (
+    FOLLOW,
+    IMAGE,
+    INTEGERS,
+    MOTIONS,
+    PRIMITIVES,
+    READ,
+    RESULT,
+    WRITE,
+    Interface,
+    image_of,
+    planes_of,
+)
 from ..kernel.interface import PAST as PAST_ARRAY
+from ..kernel.interface import Array as Memory
 from ..kernel.kernel import FLOAT, Array, Body, Expr, For, If, Kernel, Let, Store, apply, const, load, name
 from ..schedules.common import HEIGHT, WIDTH, X, Y, lets, loop
-from ..targets import target_named
+from ..targets import Language, language_named
 from .lower_history import (
     BEYOND,
     CAMERAS,
@@ -62,11 +76,11 @@ NOTES = {
 
 
 @lru_cache
-def compile_history(target: str, profile: str = "ieee") -> Artifact:
+def compile_history(language: Language | str, profile: str = "ieee") -> Artifact:
     """Return the kernel that adds a picture to a history."""
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = language_named(language), profiles.profile_named(profile)
     check_lanes(chosen, 1, "the history", "follow pictures by refimpl/light/history.py")
-    programs = _of_profile(lower_history(), promised.passes)
+    programs = pipeline.run_each(lower_history(), promised.passes)
     lists = {"first": FIRST, "past": PAST, "motion": MOTION, "cameras": CAMERAS}
     facts = {"schema": SCHEMA, "passes": [*PASSES, *promised.passes]}
     return compiled(
@@ -79,13 +93,6 @@ def compile_history(target: str, profile: str = "ieee") -> Artifact:
         NOTES,
         (chosen, promised),
         programs,
-    )
-
-
-def _of_profile(programs: HistoryPrograms, passes: Sequence[str]) -> HistoryPrograms:
-    """Return the programs after the passes of a profile."""
-    return HistoryPrograms(
-        *(pipeline.run(each, passes) for each in (programs.find, programs.take, programs.blend))
     )
 
 
@@ -113,8 +120,15 @@ def history_kernel(programs: HistoryPrograms) -> Kernel:
         *blend,
         *(Store(RESULT, (const(plane), Y, X), values[each]) for plane, each in enumerate(PAST)),
     )
-    counts = {"first": len(FIRST), "past": len(PAST), "motion": len(MOTION), "cameras": len(CAMERAS)}
-    return Kernel(interface.following(counts, INTEGERS[FOLLOW]), body)
+    arrays = (
+        planes_of(FIRST_ARRAY, READ, len(FIRST)),
+        planes_of(PAST_ARRAY, READ, len(PAST)),
+        image_of(Image("color", 3, -np.inf, np.inf), READ),
+        Memory(MOTIONS, READ, (PRIMITIVES, len(MOTION))),
+        Memory(CAMERAS_ARRAY, READ, (len(CAMERAS),)),
+        planes_of(RESULT, WRITE, len(PAST)),
+    )
+    return Kernel(Interface(FOLLOW, arrays, INTEGERS[FOLLOW]), body)
 
 
 def _taken(programs: HistoryPrograms, found: dict[str, Expr]) -> For:

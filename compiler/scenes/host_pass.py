@@ -111,10 +111,10 @@ def feature_pass(
     programs: PathPrograms,
     feature: str,
     normalization: Normalization,
-    target: str,
+    language: str,
     header: Sequence[str],
     whole: bool = False,
 ) -> str:
     """Return the pass that traces one sample a pixel and writes one encoded feature; `whole`: in integers."""
     encoding = encoding_of((feature,), normalization, whole=whole)
-    return renderer_of(programs, HOSTS[target], layers_of((feature,)), encoding=encoding).source(header)
+    return renderer_of(programs, HOSTS[language], layers_of((feature,)), encoding=encoding).source(header)

@@ -1,7 +1,7 @@
 """Compile a scene's paths for a target: passes, source, artifact.
 
 1. Run the passes of the profile on each program (lower_scene.py has run the common ones).
-2. Emit the source in the target's dialect for a number of paths at once [targets.py: Target.paths].
+2. Emit the source in the target's dialect for a number of paths at once [targets.py: Language.paths].
 3. Put both together with a manifest [`compile_path`].
 
 A path kernel has no error bound: its decisions may fall differently from the reference's where a path passes
@@ -24,7 +24,6 @@ from ..artifact import Artifact
 from ..compile import Draft, Entry, asdict_finite, assemble
 from ..core import ir, profiles
 from ..core.ir import Image
-from ..core.loops import Forms
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
@@ -32,7 +31,7 @@ from ..languages.dialect import Dialect
 from ..languages.listing import Listing, listed
 from ..languages.openings import IMAGES
 from ..languages.renderer import Renderer
-from ..targets import target_named
+from ..targets import Language, language_named
 from . import emit_path
 from .emit_path import Encoding
 from .forms import as_statements
@@ -63,23 +62,13 @@ OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the numbe
 """What else is to be known where features have rays of their own."""
 
 
-def forms_of(target: str) -> Forms:
-    """Return the forms of a scene's primitives from which a target gains."""
-    return target_named(target).forms
+def can_move(language: Language | str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
+    """Tell whether one kernel in a language should take so many numbers of a scene that is laid out.
 
-
-def most_planes(target: str) -> int:
-    """Return how many planes a path kernel of a target adds up at most."""
-    return target_named(target).dialect.max_planes
-
-
-def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
-    """Tell whether one kernel of a target should take so many numbers of a scene that is laid out.
-
-    A language takes so many, and tables with inputs are not loops: where a target would make loops of a
+    A language takes so many, and tables with inputs are not loops: where it would make loops of a
     scene's primitives, these do not move.
     """
-    chosen = target_named(target)
+    chosen = language_named(language)
     if len(inputs.places) > chosen.dialect.most_numbers:
         return False
     if not inputs.move_rows(tables):
@@ -89,7 +78,7 @@ def can_move(target: str, scene: Scene, tables: Tables, inputs: SceneInputs) -> 
 
 def compile_path(
     programs: PathPrograms,
-    target: str,
+    language: Language | str,
     profile: str = "ieee",
     lanes: int = 1,
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
@@ -99,12 +88,12 @@ def compile_path(
 
     With an encoding of these planes it writes its images, at their places in the whole picture.
     """
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = language_named(language), profiles.profile_named(profile)
     if not chosen.paths:
-        raise CompileError(f"target {target} has no path kernels: use one that has them, such as opencl")
+        raise CompileError(f"target {chosen.name} has no path kernels: use one that has them, such as opencl")
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
-        raise CompileError(f"target {target} cannot trace {lanes} paths at once (choose one of {known})")
+        raise CompileError(f"target {chosen.name} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
     passed = {name: pipeline.run(part, promised.passes) for name, part in programs.parts.items()}
     emitted, dialect = replace(programs, parts=passed), chosen.dialect

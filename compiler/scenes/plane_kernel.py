@@ -22,7 +22,7 @@ from ..kernel.interface import ENCODE
 from ..kernel.kernel import Expr, Kernel, Let
 from ..languages.listing import Listing, listed
 from ..languages.renderer import Renderer
-from ..targets import Target
+from ..targets import Language
 
 
 def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = "") -> list[Let]:
@@ -30,13 +30,13 @@ def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = ""
     return [Let(f"{prefix}{each}", element(number)) for number, each in enumerate(names)]
 
 
-def check_lanes(target: Target, lanes: int, what: str, remedy: str) -> None:
-    """Refuse a target that has no kernels of so many pixels in a work item."""
-    if lanes not in target.planes:
-        known = ", ".join(map(str, target.planes)) or "none"
+def check_lanes(language: Language, lanes: int, what: str, remedy: str) -> None:
+    """Refuse a language that has no kernels of so many pixels in a work item."""
+    if lanes not in language.planes:
+        known = ", ".join(map(str, language.planes)) or "none"
         raise CompileError(
-            f"target {target.name}, {lanes} pixels in a work item: there are kernels of {what} for {known}; "
-            f"{remedy}"
+            f"target {language.name}, {lanes} pixels in a work item: there are kernels of {what} for "
+            f"{known}; {remedy}"
         )
 
 
@@ -48,7 +48,7 @@ def compiled(
     bound: str,
     lists: Mapping[str, Sequence[str]],
     notes: Mapping[str, str],
-    how: tuple[Target, Profile],
+    how: tuple[Language, Profile],
     programs: Any,
     images: Sequence[Image] = (),
 ) -> Artifact:

@@ -13,8 +13,7 @@ tap and level by level, give one for every channel of every pixel [`error_at`].
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,12 +21,24 @@ from numpy.typing import NDArray
 
 from ...refimpl.network import smoothing
 from ...refimpl.network.dataset import Normalization
-from ..artifact import Artifact
+from ..artifact import Artifact, SmoothKernels
 from ..core import profiles
 from ..core.ir import Program
 from ..core.passes import pipeline
-from ..kernel import interface
-from ..kernel.interface import GUIDE, GUIDES, IMAGE, INTEGERS, LIGHT, RESULT, SMOOTH
+from ..kernel.interface import (
+    GUIDE,
+    GUIDES,
+    IMAGE,
+    INTEGERS,
+    LIGHT,
+    READ,
+    RESULT,
+    SMOOTH,
+    WRITE,
+    Interface,
+    image_of,
+    planes_of,
+)
 from ..kernel.kernel import (
     FLOAT,
     INT,
@@ -47,7 +58,7 @@ from ..plan import sine_contract
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
-from ..targets import target_named
+from ..targets import Language, language_named
 from .encode_kernel import compile_encode
 from .lower_encode import SAMPLES, channel_name
 from .lower_smooth import (
@@ -78,22 +89,13 @@ TABLE = "SPLINE"
 """Name of the table of the spline along an axis."""
 
 
-@dataclass(frozen=True)
-class SmoothKernels:
-    """What runs one after another: `guide`, `smooth` once a level, `encode`."""
-
-    guide: Artifact
-    smooth: Artifact
-    encode: Artifact
-
-
 def compile_smoothing(
-    normalization: Normalization, target: str, profile: str = "ieee", lanes: int = 1
+    normalization: Normalization, language: Language | str, profile: str = "ieee", lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    chosen, promised = target_named(target), profiles.profile_named(profile)
+    chosen, promised = language_named(language), profiles.profile_named(profile)
     check_lanes(chosen, lanes, "the filter", "smooth by refimpl/network/smoothing.py")
-    programs = _of_profile(lower_smooth(normalization), promised.passes)
+    programs = pipeline.run_each(lower_smooth(normalization), promised.passes)
     facts = {
         "schema": SCHEMA,
         "passes": [*PASSES, *promised.passes],
@@ -113,14 +115,8 @@ def compile_smoothing(
 
     guide = made(guide_kernel(programs), programs.guide)
     smooth = made(smooth_kernel(programs, lanes), programs.tap, programs.mean)
-    encode = compile_encode((FEATURE,), normalization, target, profile, LIGHT_PLANES)
+    encode = compile_encode((FEATURE,), normalization, chosen, profile, LIGHT_PLANES)
     return SmoothKernels(guide, smooth, encode)
-
-
-def _of_profile(programs: SmoothPrograms, passes: Sequence[str]) -> SmoothPrograms:
-    """Return the programs after the passes of a profile."""
-    guide, tap, mean = (pipeline.run(each, passes) for each in (programs.guide, programs.tap, programs.mean))
-    return SmoothPrograms(guide, tap, mean, programs.guides)
 
 
 # ---- kernels ------------------------------------------------------------------------------------------
@@ -136,8 +132,10 @@ def guide_kernel(programs: SmoothPrograms) -> Kernel:
     body += lines
     for array, planes in ((LIGHT, LIGHT_PLANES), (GUIDES, programs.guides)):
         body += [Store(array, (const(i), Y, X), outputs[each]) for i, each in enumerate(planes)]
-    counts = len(programs.guides), len(LIGHT_PLANES)
-    return Kernel(interface.guiding(LAYERS_READ, *counts, INTEGERS[GUIDE]), tuple(body))
+    layers = (image_of(layer, READ) for layer in LAYERS_READ)
+    guides = planes_of(GUIDES, WRITE, len(programs.guides))
+    arrays = (*layers, guides, planes_of(LIGHT, WRITE, len(LIGHT_PLANES)))
+    return Kernel(Interface(GUIDE, arrays, INTEGERS[GUIDE]), tuple(body))
 
 
 def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
@@ -173,7 +171,8 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
         *means,
         *(Store(RESULT, (const(i), Y, X), mean[each]) for i, each in enumerate(LIGHT_PLANES)),
     )
-    made = interface.smoothing(len(programs.guides), len(LIGHT_PLANES), INTEGERS[SMOOTH])
+    light = (planes_of(name, access, len(LIGHT_PLANES)) for name, access in ((LIGHT, READ), (RESULT, WRITE)))
+    made = Interface(SMOOTH, (planes_of(GUIDES, READ, len(programs.guides)), *light), INTEGERS[SMOOTH])
     tables = ((TABLE, np.array(smoothing.SPLINE, np.float32)),)
     return Kernel(made, body, step=(const(lanes), const(1)), tables=tables)
 

@@ -257,9 +257,9 @@ class Spectral(Tiled):
             weights=self.vector,
         )
 
-    def transform(self, function: str, source: View, target: View) -> Call:
+    def transform(self, function: str, source: View, into: View) -> Call:
         """Return a call of a transform."""
-        return Call(function, (source, target))
+        return Call(function, (source, into))
 
     def rows_forward(self) -> list[Statement]:
         """Return the gathering and transformation of rows."""

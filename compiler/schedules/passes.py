@@ -214,9 +214,9 @@ class Passes(Inlined):
             loop("pair", PAIRS, *kept(lets), *puts),
         ]
 
-    def turned(self, source: Path, target: Path, sign: int) -> list[Statement]:
+    def turned(self, source: Path, result: Path, sign: int) -> list[Statement]:
         """Return the transformation of a line: arrays, first place and step of what is read and written."""
-        (array, start, step), (into, to, leap) = source, target
+        (array, start, step), (into, to, leap) = source, result
         reads: list[Statement] = [Let("first", start), Let("to", to)]
         parts = []
         for n in range(self.points):

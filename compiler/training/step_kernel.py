@@ -21,7 +21,7 @@ from ..core.profiles import PROFILES
 from ..kernel.interface import BOTH, INTEGERS, READ, TRAIN, Array, Interface
 from ..kernel.kernel import Constant, Kernel, const
 from ..languages.renderer import Renderer
-from ..targets import target_named
+from ..targets import language_named
 from .derivatives import Derivatives
 from .lower_step import lower_step
 from .step import SQUARES, Split, Step
@@ -50,7 +50,7 @@ def compile_step(
 
 def compile_lowered(step: Step, size: int) -> Artifact:
     """Return the kernel of a step; its window has `size` runs. Its `programs` are the step, analysed."""
-    dialect, profile, digest = target_named("opencl").dialect, PROFILES["ieee"], ir.digest(step.program)
+    dialect, profile, digest = language_named("opencl").dialect, PROFILES["ieee"], ir.digest(step.program)
     renderer = Renderer(dialect, step_kernel(step, size), False)
     draft = Draft(
         "training step",

@@ -34,7 +34,7 @@ from wamnet.compiler.kernel.verify import KernelError, verify
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.parsing.canonical import canonical
 from wamnet.compiler.parsing.parse import Unread, parse
-from wamnet.compiler.targets import target_named
+from wamnet.compiler.targets import language_named
 
 from ..frame import Check, Wrong, hold, spread
 from ..wire import Node, Program
@@ -251,7 +251,7 @@ def read_back(source: Any, kernel: Kernel, language: str, what: str, likely: str
     """Refuse a source of statements that is not read back to the kernel."""
     good = isinstance(source, str) and len(source) <= LONGEST
     hold("KER-26", f"the result of render, {what}", good, "a string", type(source).__name__)
-    dialect = target_named(language).dialect
+    dialect = language_named(language).dialect
     assert dialect is not None
     own = Renderer(dialect, kernel, False, np.zeros(0, np.float32))
     whole = own.source([])

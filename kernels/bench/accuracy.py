@@ -68,13 +68,13 @@ class Crop:
         crop: Array = self.cut(found)
         return crop
 
-    def rounding(self, variant: Variant, target: str | None, schedule: str = "") -> tuple[Array, float]:
+    def rounding(self, variant: Variant, language: str | None, schedule: str = "") -> tuple[Array, float]:
         """Return what a variant computes in float64, and the largest bound of a kernel's rounding.
 
-        `schedule` of `target`: whose sums; a peer without a target is checked against the interpreter's.
+        `schedule` of `language`: whose sums; a peer without one is checked against the interpreter's.
         """
         plan = plan_program(
-            variant.program(self.model), target or "numpy", variant.profile, schedule or PLAIN, variant.rank
+            variant.program(self.model), language or "numpy", variant.profile, schedule or PLAIN, variant.rank
         )
         # Most schedules of all targets share one bound, which takes seconds to compute.
         key = variant.name, plan.sine, None if plan.shares_bound else plan.schedule.name

@@ -26,7 +26,7 @@ import numpy as np
 from ...compiler.artifact import Artifact
 from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path
 from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene, primitives
@@ -145,7 +145,7 @@ def forms(executor: Executor | None, name: str, scene: Scene, part: Part) -> lis
         shape = (scene, part.width, part.rows, Settings())
         follow = lambda render: render(part.samples, 0)  # noqa: E731
         return [_form(VARIANT, lambda: peers.table().renderers[name](*shape), follow, follow)]
-    chosen = _compiled(executor, scene, forms_of(executor.name)).source
+    chosen = _compiled(executor, scene, executor.language.forms).source
     few, found = primitives(scene) <= MOST_STATEMENTS + 1, dict[str, Entry]()
     for form in FORMS if few else [form for form in FORMS if form != "unrolled"]:
 
@@ -179,4 +179,4 @@ def _form(
 
 def _compiled(executor: Executor, scene: Scene, forms: Forms) -> Artifact:
     """Return the kernel of a scene for an executor."""
-    return compile_path(lower_scene(scene, Settings(), forms), executor.name, lanes=executor.lanes)
+    return compile_path(lower_scene(scene, Settings(), forms), executor.language, lanes=executor.lanes)

@@ -48,6 +48,7 @@ from .kernel import Memory, Part, Size, numbers_for, plane_integers, plane_shape
 
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
+    from ...compiler.targets import Language
 
 KEPT_KERNELS = 64
 """Kernels that an executor keeps built: programs use a few; a process that makes thousands stays small."""
@@ -104,6 +105,13 @@ class Executor(ABC):
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}
+
+    @property
+    def language(self) -> Language:
+        """Return the language of its kernels, with what there is for it."""
+        from ...compiler.targets import language_named
+
+        return language_named(self.name)
 
     # ---- what a device provides --------------------------------------------------------------------------
 

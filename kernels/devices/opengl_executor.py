@@ -339,24 +339,24 @@ class OpenGLExecutor(Executor):
         """Return a kernel's numbers under its uniforms' names."""
         return integers
 
-    def _dispatch(self, prepared: _Prepared, textures: Mapping[str, Any], target: Any) -> None:
+    def _dispatch(self, prepared: _Prepared, textures: Mapping[str, Any], into: Any) -> None:
         """Run a compute shader, which writes a texture."""
         self._bind(prepared.program, textures, {})
         prepared.weights.bind_to_storage_buffer(0)
-        target.bind_to_image(0, read=False, write=True)
+        into.bind_to_image(0, read=False, write=True)
         tile = prepared.tile or (1, 1)
-        groups = (-(-n // size) for n, size in zip(target.size, tile, strict=True))
+        groups = (-(-n // size) for n, size in zip(into.size, tile, strict=True))
         prepared.program.run(*groups, 1)
         self._context.memory_barrier()
 
-    def _launch(self, prepared: _Prepared, textures: Mapping[str, Any], target: Any) -> None:
+    def _launch(self, prepared: _Prepared, textures: Mapping[str, Any], into: Any) -> None:
         """Run passes for one batch of tiles after another, with memory for the largest."""
-        schedule, (width, height) = prepared.schedule, target.size
+        schedule, (width, height) = prepared.schedule, into.size
         batch, firsts = batches(schedule, (height, width))
         self._reserve([4 * count * batch for count in schedule["memory"].values()])
         for number, buffer in enumerate((prepared.weights, *self._between_passes)):
             buffer.bind_to_storage_buffer(number)
-        target.bind_to_image(0, read=False, write=True)
+        into.bind_to_image(0, read=False, write=True)
         for first in firsts:
             for program, launch in zip(prepared.passes, schedule["launches"], strict=True):
                 self._bind(program, textures, {"first_tile": first, "tile_count": batch})

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
+from ...compiler.artifact import Artifact, SmoothKernels
 from ...compiler.kernel.interface import GUIDES, IMAGE, LIGHT, PAST, RESULT
-from ...compiler.scenes.smooth_kernel import FEATURE, SmoothKernels
+from ...compiler.scenes.smooth_kernel import FEATURE
 from ...refimpl.network.dataset import known
 from ...refimpl.network.smoothing import LEVELS
 from .executor import Executor
@@ -39,7 +39,7 @@ def smoothed(
     """
     with np.errstate(over="ignore"):
         layers = {name: known(values.astype(np.float32)) for name, values in layers.items()}
-    for kernel in (kernels.guide, kernels.smooth, kernels.encode):
+    for kernel in kernels:
         executor._check_target(kernel)
         executor.build(kernel)
     height, width = layers[FEATURE].shape[:2]

@@ -27,7 +27,7 @@ from ...compiler.kernel.interface import (
 )
 from ...compiler.scenes.history_kernel import compile_history
 from ...compiler.scenes.smooth_kernel import compile_smoothing
-from ...compiler.targets import target_named
+from ...compiler.targets import Language
 from ...refimpl.frame import HISTORY
 from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
@@ -191,22 +191,22 @@ class Input:
     features: tuple[str, ...]
 
 
-def inputs_of(model: Model, target: str) -> list[Input]:
+def inputs_of(model: Model, language: Language) -> list[Input]:
     """Return the kernels of a model's inputs, in the order in which they run; none where there are none."""
-    if 1 not in target_named(target).planes:
+    if 1 not in language.planes:
         return []
     smoothed = tuple(name for name in model.features if FEATURES[name].guides)
     before = tuple(name for name in model.features if FEATURES[name].layer in HISTORY)
     found = []
     if smoothed:
-        kernels = compile_smoothing(model.normalization, target)
+        kernels = compile_smoothing(model.normalization, language)
         found += [
             Input(kernels.guide, "guide", "Light and guides of a frame's layers, once a frame.", smoothed),
             Input(kernels.smooth, "smooth", f"A level of the filter: with gap {GAPS}, in turn.", smoothed),
             Input(kernels.encode, "encode", "The feature's image, of the last level's light.", smoothed),
         ]
     if before:
-        found.append(Input(compile_history(target), "follow", "A history with one picture more.", before))
+        found.append(Input(compile_history(language), "follow", "A history with one picture more.", before))
     return found
 
 

@@ -26,7 +26,7 @@ from . import onnx_export
 from .check_pair import SEED
 from .package import Export
 from .runners import opened
-from .targets import ONNX, TARGETS
+from .targets import ONNX, TARGETS, Row
 
 OPERATIONS = 10_000
 """Operations of a path of six surfaces, rounded up: sums may be off by so many roundings of values near 1."""
@@ -153,13 +153,13 @@ def _sources(export: Export, suffix: str) -> list[str]:
     return [name for name in named if name.endswith(suffix)]
 
 
-def runner(target: str, kernel: str) -> Executor:
+def runner(row: Row, kernel: str) -> Executor:
     """Return what runs a target's kernels here; `kernel` is the compiler's name of target and place."""
-    found = opened(*TARGETS[target].opens)
+    found = opened(*row.opens)
     home = kernel.partition(":")[2]
     if home and home not in found.homes:
         found.close()
-        raise ExecutorUnavailable(f"no runner for {target} with this storage of the weights is installed")
+        raise ExecutorUnavailable(f"no runner for {row.name} with this storage of the weights is installed")
     return found
 
 
@@ -170,9 +170,10 @@ def _executed(export: Export) -> tuple[str, NDArray[np.float32], float | None]:
         data = export.files["denoise/denoise.onnx"]
         device, found = onnx_export.run_graph(data, pair.images)
         return device, found, None
-    with runner(export.target, export.denoiser.target) as device:
+    row = TARGETS[export.target]
+    with runner(row, export.denoiser.target) as device:
         found = device.run(export.denoiser, pair.images)
-        return TARGETS[export.target].route + device.device, found, _paths(export, device)
+        return row.route + device.device, found, _paths(export, device)
 
 
 def _paths(export: Export, device: Any) -> float | None:

@@ -32,8 +32,9 @@ from ...compiler.scenes.encode_kernel import compile_encode
 from ...compiler.scenes.host_pass import feature_pass
 from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.schedules.names import remedy
+from ...compiler.targets import Language, language_named
 from ...compiler.variants import FULL, parse, plan_model, vary
 from ...refimpl.errors import InputError, choice
 from ...refimpl.light.scene import Scene
@@ -347,12 +348,12 @@ def _schedule(row: Row, how: str, place: Place, wanted: str) -> str:
     return wanted or place.schedules[0]
 
 
-def _check(limit: Limit | None, needs: float, target: str) -> list[dict[str, Any]]:
+def _check(limit: Limit | None, needs: float, name: str) -> list[dict[str, Any]]:
     """Return what a manifest says about a limit, or refuse what exceeds it."""
     if limit is None:
         return []
     if needs > limit.most:
-        rule = f"{target} takes at most {limit.most}"
+        rule = f"{name} takes at most {limit.most}"
         raise InputError(limit.name, int(np.ceil(needs)), rule, limit.way_out)
     return [{"name": limit.name, "needs": int(np.ceil(needs)), "most": limit.most}]
 
@@ -391,14 +392,14 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
     seen = sees(request.model.features)
     # A pass of a host writes a feature of one sample.
     rays = None if row.single else learned_rays(request.model, request.settings)
-    forms = forms_of(_usual(row))
+    forms = _usual(row).forms
     more = {"seen": seen, "rays": rays, "shadow_rays": learned_shadow_rays(request.model)}
     return lower_scene(request.scene, request.settings, forms, moving, **more)  # type: ignore[arg-type]
 
 
-def _usual(row: Row) -> str:
-    """Return the compiler's name of a target, wherever weights are."""
-    return next(iter(row.places.values())).kernel.partition(":")[0]
+def _usual(row: Row) -> Language:
+    """Return the language of a target, wherever weights are."""
+    return language_named(next(iter(row.places.values())).kernel.partition(":")[0])
 
 
 def _of_scene(
@@ -407,23 +408,23 @@ def _of_scene(
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}
-    model, target = vary(parse(request.variant), request.model).model, _usual(row)
+    model, language = vary(parse(request.variant), request.model).model, _usual(row)
     if row.single:
         header = [f"wamnet: a noisy feature of scene {_plain(request.scene.name)}, one sample a pixel."]
         return (
             None,
             None,
             {
-                name: feature_pass(programs, name, model.normalization, target, header, model.is_whole)
+                name: feature_pass(programs, name, model.normalization, row.name, header, model.is_whole)
                 for name in model.features
             },
         )
     path = compile_path(
-        programs, target, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
+        programs, language, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
     )
     rays = programs.rays.count if programs.rays else 0
     scales, whole = model.normalization, model.is_whole
-    encoder = compile_encode(model.features, scales, target, request.profile, path.planes, whole, rays)
+    encoder = compile_encode(model.features, scales, language, request.profile, path.planes, whole, rays)
     return path, encoder, {}
 
 

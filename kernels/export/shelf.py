@@ -84,7 +84,7 @@ def contents(models: Mapping[str, Model]) -> Mapping[str, bytes]:
             assert made.denoiser is not None, "every target of the shelf has a kernel"
             files |= _files(f"{name}/{target}", made.denoiser)
             files[f"{name}/{WEIGHTS_NAME}"] = weight_bytes(made.denoiser)
-            lines.append(_row(name, target, made.denoiser))
+            lines.append(_row(f"{name}/{target}", made.denoiser))
     files[INDEX] = ("\n".join([*lines, ""])).encode()
     return files
 
@@ -97,17 +97,18 @@ def _files(folder: str, made: Artifact) -> dict[str, bytes]:
     return {f"{folder}/{name}": data for name, data in own.items()}
 
 
-def _row(name: str, target: str, made: Artifact) -> str:
-    """Return the line of one kernel."""
+def _row(folder: str, made: Artifact) -> str:
+    """Return the line of one kernel, by its folder."""
     assert made.certificate is not None, "every kernel of the shelf has a certificate"
     schedule = made.manifest["schedule"]["name"]
+    name, target = folder.split("/")
     cells = (
         name,
-        f"[{target}]({name}/{target}/{made.source_name})",
+        f"[{target}]({folder}/{made.source_name})",
         f"{len(made.source.encode()) / 1000:.1f} kB",
         f"{products_of(made.programs):,}",
         schedule,
-        f"[{max(made.certificate['bound']['output']):g}]({name}/{target}/{CERTIFICATE_NAME})",
+        f"[{max(made.certificate['bound']['output']):g}]({folder}/{CERTIFICATE_NAME})",
         f"yes, as {made.manifest['language'].partition(',')[0]}" if is_read(made.manifest) else "no",
     )
     return f"| {' | '.join(cells)} |"

@@ -72,7 +72,7 @@ def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Seq
     assert export.denoiser is not None, "targets that are measured have kernels"
     denoiser = _unseen(export.denoiser)
     images = {name: repeated(image, size) for name, image in export.pair.images.items()}
-    with runner(export.target, denoiser.target) as opened:
+    with runner(TARGETS[export.target], denoiser.target) as opened:
         if isinstance(opened, HostRunner):
             opened.last = options
 

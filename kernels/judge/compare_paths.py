@@ -30,7 +30,7 @@ from ...compiler.proof import ranges
 from ...compiler.proof.ranges import Arithmetic, Range
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
-from ...compiler.scenes.path_kernel import compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path
 from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
@@ -149,7 +149,7 @@ class PathReport:
 
 def kernel_of_states(programs: PathPrograms, executor: Executor) -> Artifact:
     """Return the kernel that follows paths to the programs' depth and tells their state."""
-    return compile_path(programs, executor.name, "ieee", executor.lanes, tuple(END))
+    return compile_path(programs, executor.language, "ieee", executor.lanes, tuple(END))
 
 
 def compare_paths(
@@ -166,7 +166,7 @@ def compare_paths(
 
     on_progress is called with 1 after each depth.
     """
-    programs = lower_scene(scene, settings, forms_of(executor.name))
+    programs = lower_scene(scene, settings, executor.language.forms)
     given = _given(view)
     before: State | None = None
     together = np.ones(view.width * view.height, bool)

@@ -51,7 +51,7 @@ def wrong_words(
     executor: Executor, given: Mapping[str, NDArray[Any]], max_depth: int, width: int, height: int
 ) -> int:
     """Return for how many paths (P,) of an image the executor's generator gives other words."""
-    kernel = compile_path(_programs(max_depth), executor.name, "ieee", executor.lanes, CARRIERS)
+    kernel = compile_path(_programs(max_depth), executor.language, "ieee", executor.lanes, CARRIERS)
     sample, seed = (int(given[name][0]) for name in ("sample_number", "seed"))
     found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(
         len(kernel.planes), -1

@@ -21,7 +21,7 @@ from ...compiler.compile import compile_plan
 from ...compiler.core.ir import OUTPUT_ENCODING, Program, Type
 from ...compiler.core.lower import lower
 from ...compiler.core.trace import trace
-from ...compiler.targets import target_named
+from ...compiler.targets import language_named
 from ...refimpl.network.activation import SINE, activation_named
 from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
@@ -174,7 +174,7 @@ def first_stage(
     compiled: Compile = compile_plan,
 ) -> tuple[Stage, Verdict] | None:
     """Return the first stage whose kernel deviates on images (H, W, C), or None if none does by itself."""
-    most = target_named(runner.target).dialect.max_output_channels
+    most = language_named(runner.target).dialect.max_output_channels
     size = next(iter(images.values())).shape[:2]
     for stage in stages(model.siren, most):
         program = stage_program(model, stage)

@@ -25,7 +25,7 @@ from ...compiler.compile import compile_plan
 from ...compiler.core import ir
 from ...compiler.core.ir import Program
 from ...compiler.plan import Expected, Plan, plan_program
-from ...compiler.targets import target_named
+from ...compiler.targets import language_named
 from ...refimpl.errors import CompileError
 from ..devices.images import Images
 from .apart import Apart, Outcome
@@ -120,12 +120,15 @@ def kernels_of(
     known: dict[tuple[str, str], Artifact | str] = {}
     kernels = []
     for runner in runners:
-        every = [schedule.name for schedule in target_named(runner.target).schedules]
+        every = [schedule.name for schedule in language_named(runner.target).schedules]
         named = which if which != PICKED else instead.get(runner.target) or runner.picked(size)
         for schedule in every if which == EVERY else [named]:
             key = (runner.target, schedule)
             if key not in known:
-                known[key] = _compiled(compiled, program, profile, *key)
+                try:
+                    known[key] = compiled(plan_program(program, runner.target, profile, schedule))
+                except CompileError as error:
+                    known[key] = str(error)
             found = known[key]
             if isinstance(found, str):
                 kernels.append(Kernel(runner, schedule, None, found))
@@ -135,16 +138,6 @@ def kernels_of(
             if actual == schedule or which != EVERY:
                 kernels.append(Kernel(runner, actual, found))
     return kernels
-
-
-def _compiled(
-    compiled: Compile, program: Program, profile: str, target: str, schedule: str
-) -> Artifact | str:
-    """Return a kernel, or why there is none."""
-    try:
-        return compiled(plan_program(program, target, profile, schedule))
-    except CompileError as error:
-        return str(error)
 
 
 class Judge:

@@ -16,13 +16,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact, schedule_text
+from ...compiler.artifact import Artifact, SmoothKernels, schedule_text
 from ...compiler.kernel.interface import FULL, PLAIN
 from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
@@ -39,7 +38,6 @@ from .tune import Subject, pick
 if TYPE_CHECKING:
     from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
-    from ...compiler.scenes.smooth_kernel import SmoothKernels
 
 BLOCK_PIXELS = 2**14
 """Pixels of a block of rows that is encoded at once: some copies of it fit a processor's cache."""
@@ -106,30 +104,24 @@ def filter_of(
     if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
         return None
     kernels = _filter(model.normalization, executor.name, profile, executor.lanes, keeps)
-    for kernel in (kernels.guide, kernels.smooth, kernels.encode):
+    for kernel in kernels:
         executor.build(kernel)
     return kernels
 
 
 @lru_cache(maxsize=16)
 def _filter(
-    normalization: Normalization, target: str, profile: str, lanes: int, keeps: bool
+    normalization: Normalization, language: str, profile: str, lanes: int, keeps: bool
 ) -> SmoothKernels:
     """Return the kernels of the filter, which all models with these scales share."""
 
-    def compiled() -> Sequence[Any]:
+    def compiled() -> SmoothKernels:
         from ...compiler.scenes.smooth_kernel import compile_smoothing
 
-        kernels = compile_smoothing(normalization, target, profile, lanes)
-        return (kernels.guide, kernels.smooth, kernels.encode)
+        return compile_smoothing(normalization, language, profile, lanes)
 
-    if keeps:
-        kernels: Sequence[Any] = kept_kernels(
-            "filter", (asdict(normalization), target, profile, lanes), compiled
-        )
-    else:
-        kernels = compiled()
-    return cast("SmoothKernels", SimpleNamespace(guide=kernels[0], smooth=kernels[1], encode=kernels[2]))
+    key = asdict(normalization), language, profile, lanes
+    return SmoothKernels(*(kept_kernels("filter", key, compiled) if keeps else compiled()))
 
 
 def images_on(
@@ -181,7 +173,9 @@ class Denoiser:
         """Return the plan."""
         from ...compiler.variants import plan_model
 
-        plan = plan_model(self.full, self.executor.name, self.profile, self.schedule or PLAIN, self.variant)
+        plan = plan_model(
+            self.full, self.executor.language, self.profile, self.schedule or PLAIN, self.variant
+        )
         return replace(plan, proves=not self.keeps)
 
     def kernel(self, size: Size) -> tuple[Artifact, str]:

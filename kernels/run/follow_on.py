@@ -61,7 +61,7 @@ def follow_on(
         MOTIONS: _motions(moves, limits),
         CAMERAS: _cameras(scene, before.scene),
     }
-    number, *normal, red, green, blue, count = followed(executor, compile_history(executor.name), arrays)
+    number, *normal, red, green, blue, count = followed(executor, compile_history(executor.language), arrays)
     mean = np.stack([red, green, blue], axis=-1)
     return History(scene, number.astype(np.int32), np.stack(normal, axis=-1), mean, count)
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.scenes.path_kernel import can_move
 from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
+from ...compiler.targets import Language
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 
@@ -56,9 +57,13 @@ class MovingPaths:
     """The kernels of scenes on a target; `compiled` makes one, `moving` are scenes to come, or inputs."""
 
     def __init__(
-        self, target: str, compiled: Compiler, settings: Settings, moving: Sequence[Scene] | SceneInputs = ()
+        self,
+        language: Language,
+        compiled: Compiler,
+        settings: Settings,
+        moving: Sequence[Scene] | SceneInputs = (),
     ) -> None:
-        self._target, self._compiled, self._settings = target, compiled, settings
+        self._language, self._compiled, self._settings = language, compiled, settings
         self._families: dict[tuple[object, ...], _Family] = {}
         self._inputs = moving if isinstance(moving, SceneInputs) else SceneInputs(settings, ())
         if not isinstance(moving, SceneInputs):
@@ -76,7 +81,7 @@ class MovingPaths:
             family.inputs = family.inputs.widened([family.tables, tables])
             family.kernel = family.moves = None
         if family.moves is None:
-            family.moves = can_move(self._target, family.scene, family.tables, family.inputs)
+            family.moves = can_move(self._language, family.scene, family.tables, family.inputs)
         if not family.moves:
             return Moment(self._compiled(scene, SceneInputs(self._settings, ())), np.zeros(0, np.float32))
         if family.kernel is None:

@@ -29,7 +29,7 @@ from ...compiler.scenes.emit_path import FRAME_GROUPS, planes
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
 from ...compiler.scenes.lower_encode import layers_of, sees
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
-from ...compiler.scenes.path_kernel import compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import NO_VALUE, InputError
@@ -106,7 +106,7 @@ class Pipeline:
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
         # The first picture does not wait for a proof that nobody reads.
-        plan = replace(plan_model(model, executor.name, profile, variant=variant), proves=False)
+        plan = replace(plan_model(model, executor.language, profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
         self._executor, self._profile = executor, profile
@@ -131,12 +131,12 @@ class Pipeline:
         )
         groups = layers_of(self._features)
         self._groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
-        self._paths = MovingPaths(executor.name, self._compiled, self._settings, moving)
+        self._paths = MovingPaths(executor.language, self._compiled, self._settings, moving)
         self.set_scene(scene)
         self.encode = compile_encode(
             self._features,
             model.normalization,
-            executor.name,
+            executor.language,
             profile,
             planes(self._groups),
             model.is_whole,
@@ -155,11 +155,11 @@ class Pipeline:
         """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
         executor, profile = self._executor, self._profile
         seen = sees(self._features)
-        forms = forms_of(executor.name)
+        forms = executor.language.forms
         more = {"seen": seen, "rays": self._rays, "shadow_rays": self._shadow_rays}
         programs = lower_scene(scene, self._settings, forms, inputs, **more)  # type: ignore[arg-type]
         lanes, groups = executor.lanes, self._groups
-        kernel = compile_path(programs, executor.name, profile, lanes, groups, self._encoding)
+        kernel = compile_path(programs, executor.language, profile, lanes, groups, self._encoding)
         executor.build(kernel)
         return kernel
 

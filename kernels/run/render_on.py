@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import compile_path, forms_of, most_planes
+from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import DIRECT, SEEN, Frame
@@ -77,15 +77,14 @@ class Frames:
         settings, groups = job.settings, tuple(groups) or groups_of(job)
         key = (executor.name, executor.lanes, profile, settings, groups, job.shadow_rays)
         if key not in self._paths:
-            target, lanes = executor.name, executor.lanes
+            language, lanes = executor.language, executor.lanes
+            more: dict[str, Any] = {"seen": job.seen, "shadow_rays": job.shadow_rays}
 
             def compiled(scene: Scene, inputs: SceneInputs) -> Artifact:
-                programs = lower_scene(
-                    scene, settings, forms_of(target), inputs, seen=job.seen, shadow_rays=job.shadow_rays
-                )
-                return compile_path(programs, target, profile, lanes, groups)
+                programs = lower_scene(scene, settings, language.forms, inputs, **more)
+                return compile_path(programs, language, profile, lanes, groups)
 
-            self._paths[key] = MovingPaths(target, compiled, settings, self._scenes)
+            self._paths[key] = MovingPaths(language, compiled, settings, self._scenes)
         return self._paths[key].of(scene)
 
 
@@ -116,7 +115,7 @@ def render_on(
     if feature_job(job) is not None:
         options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
-    if job.seen and job.color and len(planes(groups_of(job))) > most_planes(executor.name):
+    if job.seen and job.color and len(planes(groups_of(job))) > executor.language.dialect.max_planes:
         # The same paths twice, for layers that no kernel of this device writes at once.
         again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
         color = again(replace(job, seen=False, shadow_rays=0), on_progress=on_progress)

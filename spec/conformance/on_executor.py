@@ -26,9 +26,9 @@ from ...compiler.core.profiles import profile_named
 from ...compiler.core.trace import trace
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import compile_path, forms_of
+from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import DENOISERS, target_named
+from ...compiler.targets import DENOISERS, language_named
 from ...kernels.devices.executor import Executor
 from ...kernels.devices.kernel import Part
 from ...kernels.run.denoise_on import denoise_on
@@ -59,7 +59,7 @@ class OnExecutor:
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
         own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
-        if target_named(executor.name).paths:
+        if language_named(executor.name).paths:
             own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
         self._own: Mapping[str, Own] = own
         self.kinds = [*FUNCTIONS, *self._own]
@@ -109,7 +109,7 @@ class OnExecutor:
 
     def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
         """Return the programs of a path, which do not depend on the depth."""
-        return lower_scene(scene_module.from_json(scene), settings, forms_of(self.executor.name))
+        return lower_scene(scene_module.from_json(scene), settings, language_named(self.executor.name).forms)
 
     def _denoised(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return a denoised picture."""

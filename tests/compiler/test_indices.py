@@ -15,7 +15,7 @@ from targets import tiny_model
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.targets import DENOISERS, EXPORTED, target_named
+from wamnet.compiler.targets import DENOISERS, EXPORTED, language_named
 from wamnet.refimpl.errors import CompileError
 
 LIMIT = 2**31
@@ -66,7 +66,7 @@ CASES = [
     (target, schedule.name)
     for target in {**DENOISERS, **EXPORTED}
     if target != "numpy"
-    for schedule in target_named(target).schedules
+    for schedule in language_named(target).schedules
 ]
 
 

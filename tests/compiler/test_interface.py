@@ -12,7 +12,7 @@ from wamnet.compiler.kernel import interface
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.targets import DENOISERS, EXPORTED, target_named
+from wamnet.compiler.targets import DENOISERS, EXPORTED, language_named
 from wamnet.kernels.export import package
 from wamnet.kernels.export.targets import TARGETS
 from wamnet.refimpl.errors import CompileError
@@ -44,10 +44,10 @@ def model():
 def kernels(target, model):
     """Yield one kernel of each role that a target has."""
     yield compile_program(lower(model), target)
-    if target_named(target).paths:
+    if language_named(target).paths:
         programs = lower_scene(canonical("lone_light"), Settings(max_depth=1))
         yield compile_path(programs, target, groups=("color", "normal"))
-    if target_named(target).encodes:
+    if language_named(target).encodes:
         yield compile_encode(FEATURES, Normalization(), target)
 
 

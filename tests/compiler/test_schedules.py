@@ -17,7 +17,7 @@ from wamnet.compiler.schedules.inlined import LARGEST_WEIGHTS
 from wamnet.compiler.schedules.names import FORMER, parse, split
 from wamnet.compiler.schedules.schedules import Tile
 from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
-from wamnet.compiler.targets import TARGETS, schedule_named, target_named
+from wamnet.compiler.targets import TARGETS, language_named, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -238,7 +238,7 @@ def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
 
 @given(
     schedule=st.sampled_from(
-        [s for t in ("opencl", "c") for s in target_named(t).schedules if type(s) is Tile]
+        [s for t in ("opencl", "c") for s in language_named(t).schedules if type(s) is Tile]
     ),
     channels=st.lists(st.integers(1, 4), min_size=1, max_size=3),
     size=st.integers(1, 3),

@@ -19,7 +19,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import attributes
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.schedules import schedules
-from wamnet.compiler.targets import DENOISERS, target_named
+from wamnet.compiler.targets import DENOISERS, language_named
 
 EXAMPLES = max(settings.default.max_examples // 10, 1)
 """Each example compiles a kernel: a tenth of what other tests draw."""
@@ -228,7 +228,7 @@ def test_variants_of_variants_agree_within_the_bound(denoiser, kit, drawn):
     variant = original = Case(kit.network(widths, (3.0, 9.0), seed), images, size)
     for change in chosen:
         variant = change(variant)
-    schedules = target_named(denoiser.name).schedules
+    schedules = language_named(denoiser.name).schedules
     schedule = schedules[number % len(schedules)].name
     artifact = compile_program(variant.program(kit, border), denoiser.name, "ieee", schedule)
     assert excess(kit, denoiser, original, variant, border, artifact) <= 1

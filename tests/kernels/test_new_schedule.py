@@ -46,7 +46,7 @@ class Backwards(Plain):
 def test_a_builder_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, executor_named, kit, target):
     """In each language its kernels compute what plain ones do, to the bit, within the same bound."""
     executor = executor_named("opengl-egl" if target == "opengl" else target)
-    known = targets.target_named(target)
+    known = targets.language_named(target)
     added = replace(known, schedules=(*known.schedules, Backwards(known.dialect)))
     monkeypatch.setitem(targets.LANGUAGES, target, added)
     program = kit.denoiser(kit.network([54, 6, 3], (3.0, 3.0)), {"color": 3, "normal": 3}, 3, "clamp")
@@ -63,7 +63,7 @@ def test_a_builder_and_a_line_are_all_that_a_new_schedule_needs(monkeypatch, exe
 @pytest.mark.parametrize("target", GRAMMARS)
 def test_it_is_in_every_language_at_once(kit, target):
     """Each language's source of it is read back to its kernel, which is not the plain one."""
-    dialect = targets.target_named(target).dialect
+    dialect = targets.language_named(target).dialect
     network = kit.network([54, 6, 3], (3.0, 3.0))
     program = kit.denoiser(network, {"color": 3, "normal": 3}, 3, "clamp")
     program = plan_program(program, target).emitted

@@ -11,7 +11,7 @@ import pytest
 from wamnet.compiler.scenes.emit_path import FRAME_GROUPS
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.targets import target_named
+from wamnet.compiler.targets import language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.run.render_on import frames_of, render_on
 from wamnet.refimpl import frame
@@ -92,7 +92,7 @@ def test_all_schedules_give_the_same_image(executor_named):
     """On one device vectors compute what numbers compute; 1e-5 leaves room for contraction."""
     executor = executor_named("opencl")
     programs, part = lower_scene(scene("cornell"), Settings(max_depth=3)), Part(29, 11, 0, 11, 0, 3, 1)
-    schedules = tuple(target_named("opencl").paths)
+    schedules = tuple(language_named("opencl").paths)
     assert schedules == (1, 4, 8, 16)
     kernels = [compile_path(programs, "opencl", lanes=lanes) for lanes in schedules]
     images = [executor.trace(kernel, part) for kernel in kernels]

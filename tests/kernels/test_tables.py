@@ -15,7 +15,8 @@ from wamnet.compiler.core.verify import verify
 from wamnet.compiler.scenes import forms, hierarchy
 from wamnet.compiler.scenes.forms import list_cost, row_cost
 from wamnet.compiler.scenes.lower_scene import lower_scene
-from wamnet.compiler.scenes.path_kernel import compile_path, forms_of
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.targets import language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.run.render_on import frames_of, render_on
 from wamnet.refimpl import vectors
@@ -128,7 +129,7 @@ def shown(executor, scene, trips):
 @pytest.mark.parametrize("more", [0, 1])
 def test_loops_begin_above_the_threshold(executor, more):
     """As many spheres, beside a light, as are statements, and one more, for which there is a loop."""
-    few = forms_of(executor.name).few
+    few = language_named(executor.name).forms.few
     light, sphere = (row_cost(intersection.build(crowd(*p)).groups[0]) for p in ((), (("sphere", 2),)))
     scene = crowd(("sphere", int((few - light) // sphere) + more))
     assert (list_cost(intersection.build(scene)) > few) == bool(more)
@@ -137,11 +138,11 @@ def test_loops_begin_above_the_threshold(executor, more):
 
 def test_thresholds():
     """What is known to be worth it: the canonical scenes are statements on every target."""
-    assert forms_of("numpy") == USUAL
-    assert forms_of("opencl") == forms_of("c") == replace(USUAL, trees=True)
-    assert forms_of("opengl") == Forms(few=10000.0)
+    assert language_named("numpy").forms == USUAL
+    assert language_named("opencl").forms == language_named("c").forms == replace(USUAL, trees=True)
+    assert language_named("opengl").forms == Forms(few=10000.0)
     for name in CANONICAL:
-        programs = lower_scene(canonical(name), SETTINGS, forms_of("opencl")).parts.values()
+        programs = lower_scene(canonical(name), SETTINGS, language_named("opencl").forms).parts.values()
         assert not any(node.op == "loop" for program in programs for node in program.nodes), name
 
 

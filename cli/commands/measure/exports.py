@@ -70,22 +70,22 @@ def exports(
         raise typer.Exit(STATUS_WRONG)
 
 
-def places_of(target: str, every: bool) -> list[str]:
+def places_of(language: str, every: bool) -> list[str]:
     """Return the requested places of the weights; nothing is the usual one."""
     from ....kernels.export.targets import ONNX, TARGETS
 
-    return [*TARGETS[target].places] if every and target != ONNX else [""]
+    return [*TARGETS[language].places] if every and language != ONNX else [""]
 
 
-def judged(model: Model, target: str, place: str, scene: Scene | None) -> Verdict:
+def judged(model: Model, language: str, place: str, scene: Scene | None) -> Verdict:
     """Return the verdict of one export; a limit or a missing translator is one too."""
     from ....kernels.export.check import Verdict, check
     from ....kernels.export.package import Request, export
     from ....kernels.export.targets import ONNX
 
     try:
-        return check(export(Request(model, target, None if target == ONNX else scene, weights=place)))
+        return check(export(Request(model, language, None if language == ONNX else scene, weights=place)))
     except ExecutorUnavailable as error:
-        return Verdict(target, place, 0, f"missing: {error}", "-")
+        return Verdict(language, place, 0, f"missing: {error}", "-")
     except InputError as error:
-        return Verdict(target, place, 0, f"beyond a limit: {error.what} {error.value}", "-")
+        return Verdict(language, place, 0, f"beyond a limit: {error.what} {error.value}", "-")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from functools import partial
+from typing import TypeVar
 
 from ....refimpl.errors import CompileError, choice
 from ..ir import Program
@@ -41,3 +43,14 @@ def run(program: Program, names: Sequence[str]) -> Program:
             raise CompileError(f"pass {name!r}: unknown ({choice(name, PASSES)})")
         program = verify(PASSES[name](program), f"after pass {name}")
     return program
+
+
+Programs = TypeVar("Programs")
+
+
+def run_each(programs: Programs, names: Sequence[str]) -> Programs:
+    """Return an object whose fields are programs, with these after the named passes."""
+    found = copy(programs)
+    held = {key: run(each, names) for key, each in vars(programs).items() if isinstance(each, Program)}
+    vars(found).update(held)
+    return found

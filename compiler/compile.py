@@ -41,6 +41,7 @@ from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import HORIZONTAL, Cut, left
 from .schedules.schedules import PLAIN
 from .targets import Language
+from .variants import variation
 
 KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on_scene")
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
@@ -141,7 +142,7 @@ def compile_plan(plan: Plan) -> Artifact:
     Another schedule replaces one that cannot hold the program; the manifest says so.
     """
     found = _of_one_pass(plan, plan.bound) if plan.cut is None else _of_two_passes(plan, plan.cut)
-    variant = plan.variation
+    variant = variation(plan)
     return replace(found, manifest={**found.manifest, "variant": variant}) if variant else found
 
 

@@ -17,7 +17,7 @@ Everything is computed when it is first needed, and then kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -78,7 +78,7 @@ class Plan:
 
     `analysed`: the program after the passes that bounds see, each sine one node; `asked`: the name of the
     schedule that was requested; `cut`: both passes of a first layer of low rank; `proves`: whether a proof is
-    looked for, which takes seconds.
+    looked for, which takes seconds; `varied`: the network that the program is, if it is one.
     """
 
     analysed: Program
@@ -87,6 +87,7 @@ class Plan:
     asked: str = PLAIN
     cut: Cut | None = None
     proves: bool = True
+    varied: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Travel to other processes without what is computed when it is needed."""
@@ -98,13 +99,9 @@ class Plan:
 
     @property
     def model(self) -> Model:
-        """Return the network that the program is: of plans that were made of one [variants.VariedPlan]."""
-        raise TypeError("the plan was made of a program, not of a network")
-
-    @property
-    def variation(self) -> Mapping[str, Any] | None:
-        """Return what a manifest says about the variant of a network that the program is, if it is one."""
-        return None
+        """Return the network that the program is, where the plan was made of one [variants.py]."""
+        found: Model = self.varied.model
+        return found
 
     @cached_property
     def sine(self) -> SineContract:

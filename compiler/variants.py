@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -160,37 +160,6 @@ class Varied:
     def profile(self, base: str) -> str:
         """Return the name of the profile that has the variant's sine."""
         return base if self.degree == sine.DEGREE else f"{base}-sine{self.degree}"
-
-
-@dataclass(frozen=True)
-class VariedPlan(Plan):
-    """The plan of a network, or of a variant of it."""
-
-    varied: Varied = field(kw_only=True)
-
-    @property
-    def model(self) -> Model:
-        """Return the network that the program is."""
-        return self.varied.model
-
-    @property
-    def variation(self) -> Mapping[str, Any] | None:
-        """Return what a manifest says about the variant: what was done, and what it moves."""
-        variant, full = self.varied.variant, self.varied.full
-        if not variant.steps:
-            return None
-        bound = bound_of(self)
-        return {
-            "name": variant.name,
-            "approximations": [f"{kind}{value}" for kind, value in variant.steps],
-            "program": digest_of(full),
-            "products": self.varied.products,
-            "products_of_full": vary(Variant(), full).products,
-            "bound": {
-                "output": None if bound is None else [round_up(float(error)) for error in bound],
-                "against": "float64 reference of the full network, for all images, in display-encoded colour",
-            },
-        }
 
 
 # ---- approximations ---------------------------------------------------------------------------------------
@@ -485,7 +454,7 @@ def _first_error(varied: Varied, plan: Plan, error: Array) -> Array:
     return errors
 
 
-def bound_of(plan: VariedPlan) -> Array | None:
+def bound_of(plan: Plan) -> Array | None:
     """Return how far each channel (3,) of a variant's kernel may be from the full network; None: no bound.
 
     In display-encoded colour, over all images, against float64.
@@ -505,11 +474,29 @@ def bound_of(plan: VariedPlan) -> Array | None:
 
 def plan_model(
     model: Model, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, variant: str = FULL
-) -> VariedPlan:
+) -> Plan:
     """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
     varied = vary(parse(variant), model)
     found = plan_program(lower(varied.model), language, varied.profile(profile), schedule, varied.rank)
-    return VariedPlan(**found.__getstate__(), varied=varied)
+    return replace(found, varied=varied)
+
+
+def variation(plan: Plan) -> Mapping[str, Any] | None:
+    """Return what a manifest says about a variant: what was done, and what it moves; nothing of all else."""
+    if plan.varied is None or not plan.varied.variant.steps:
+        return None
+    variant, full, bound = plan.varied.variant, plan.varied.full, bound_of(plan)
+    return {
+        "name": variant.name,
+        "approximations": [f"{kind}{value}" for kind, value in variant.steps],
+        "program": digest_of(full),
+        "products": plan.varied.products,
+        "products_of_full": vary(Variant(), full).products,
+        "bound": {
+            "output": None if bound is None else [round_up(float(error)) for error in bound],
+            "against": "float64 reference of the full network, for all images, in display-encoded colour",
+        },
+    }
 
 
 def digest_of(model: Model) -> str:

@@ -15,8 +15,8 @@ from ...refimpl.errors import InputError
 from . import options
 
 if TYPE_CHECKING:
+    from ...compiler.plan import Plan
     from ...compiler.targets import Language
-    from ...compiler.variants import VariedPlan
     from ...refimpl.network.denoise import Model
 
 
@@ -38,7 +38,7 @@ class KernelRequest:
 
         return with_rank(self.variant or FULL, rank)
 
-    def plan(self, model: Model, language: Language | str) -> VariedPlan:
+    def plan(self, model: Model, language: Language | str) -> Plan:
         """Return the plan of a model's kernel in a language."""
         from ...compiler.schedules.schedules import PLAIN
         from ...compiler.variants import plan_model

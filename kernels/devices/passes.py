@@ -89,19 +89,17 @@ class Passes:
 
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
-        executor = self._executor
-        with executor._session(self.size):
-            if name == PICTURE:
-                return executor._fetch(RESULT, self._written[-1])
-            return executor._fetch(f"{IMAGE}{name}", self._images[name])
+        with self._executor._session(self.size):
+            return self._executor._fetch(*self._held(name))
 
     def read_later(self, name: str) -> Callable[[], NDArray[np.float32]]:
         """Begin to copy an image to the host, and return what waits for it: passes may start meanwhile."""
-        executor = self._executor
-        with executor._session(self.size):
-            if name == PICTURE:
-                return executor._fetch_later(RESULT, self._written[-1])
-            return executor._fetch_later(f"{IMAGE}{name}", self._images[name])
+        with self._executor._session(self.size):
+            return self._executor._fetch_later(*self._held(name))
+
+    def _held(self, name: str) -> tuple[str, Memory]:
+        """Return a kernel's name for an image, and its memory."""
+        return (RESULT, self._written[-1]) if name == PICTURE else (f"{IMAGE}{name}", self._images[name])
 
     def finish(self) -> None:
         """Wait until all passes that were started have ended; reading waits by itself."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 from ...models.writing import signals_wait
@@ -16,43 +17,15 @@ CONTEXT_VARIABLE = "WAMNET_OPENGL_CONTEXT"
 """Environment variable that names the kind of OpenGL's context, egl or osmesa, where the caller does not."""
 
 
-def _numpy(**options: Any) -> Executor:
-    """Open the interpreter."""
-    from .numpy_executor import NumpyExecutor
-
-    return NumpyExecutor(**options)
-
-
-def _opencl(**options: Any) -> Executor:
-    """Open an OpenCL device; option `device`: a part of its name."""
-    with signals_wait():
-        from .opencl_executor import OpenCLExecutor
-
-    return OpenCLExecutor(**options)
-
-
-def _opengl(**options: Any) -> Executor:
-    """Open an OpenGL context; option `context`: auto, egl or osmesa."""
-    with signals_wait():
-        from .opengl_executor import OpenGLExecutor
-
-    return OpenGLExecutor(**options)
-
-
-def _c(**options: Any) -> Executor:
-    """Open the system's C compiler."""
-    from .c_executor import CExecutor
-
-    return CExecutor(**options)
-
-
-EXECUTORS: Mapping[str, Callable[..., Executor]] = {
-    "numpy": _numpy,
-    "opencl": _opencl,
-    "opengl": _opengl,
-    "c": _c,
+EXECUTORS: Mapping[str, str] = {
+    "numpy": "NumpyExecutor",
+    "opencl": "OpenCLExecutor",
+    "opengl": "OpenGLExecutor",
+    "c": "CExecutor",
 }
-"""How to open each executor; the name is also the target that the compiler takes."""
+"""The class of each executor, whose module begins with its name; that is also the target of its kernels.
+
+OpenCL's takes the option `device`, a part of a device's name, and OpenGL's `context`: auto, egl or osmesa."""
 
 OPTIONS: Mapping[str, tuple[Mapping[str, str], ...]] = {"opengl": ({"context": "egl"}, {"context": "osmesa"})}
 """Options of executors that can be opened in several ways, each perhaps another driver."""
@@ -76,7 +49,10 @@ def open_executor(name: str, **options: Any) -> Executor:
         widen_stacks()
         protect_caches()
     try:
-        return EXECUTORS[name](**options)
+        with signals_wait():
+            module = import_module(f".{name}_executor", __package__)
+        found: Executor = getattr(module, EXECUTORS[name])(**options)
+        return found
     except ImportError as error:
         missing = error.name or error
         fix = f"pip install 'wamnet[{name}]'"

@@ -146,7 +146,6 @@ def _untimed(
 ) -> Point:
     """Return the point of a variant's kernel, which lacks its time."""
     plan, model = artifact.plan, artifact.plan.model
-    assert isinstance(plan, variants.VariedPlan), "plan_model makes plans of variants"
     pictures = [executor.run(artifact, images_of(model, noisy)) for noisy, _ in pairs]
     targets = [dataset.target_image(clean, model.normalization) for _, clean in pairs]
     found, bound = quality(pictures, full, targets), variants.bound_of(plan)

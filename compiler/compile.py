@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -30,10 +30,9 @@ from .core.ir import OUTPUT_ENCODING, Gather, Image, Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
 from .core.sums import is_split
-from .kernel import interface
-from .kernel.interface import DENOISE, Interface
-from .kernel.kernel import Kernel
 from .languages.dialect import Dialect
+from .languages.listing import Listing, listed
+from .languages.renderer import Renderer
 from .plan import Bound, Plan, plan_program
 from .proof import bounds, certificate
 from .proof.whole import has_one_zero
@@ -72,23 +71,20 @@ Entry = tuple[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class Draft:
-    """What is particular to a kernel: `emit` prints its source below a header of these entries.
+    """What is particular to a kernel: what prints it, the entries of its header, and facts of its manifest.
 
-    `programs` are kept for an interpreter, `facts` are those of its manifest. `part`: what a language calls
-    it whose hosts join it with the denoiser's other kernel. All else is what its artifact has.
+    `listed` are its programs by name, which are printed where no language is, `programs` what is kept for an
+    interpreter. `part`: what a language calls it whose hosts join it with the denoiser's other kernel.
     """
 
     title: str
-    dialect: Dialect
     profile: Profile
-    interface: Interface
-    emit: Callable[[Sequence[str]], str]
+    renderer: Renderer
+    listed: Sequence[tuple[str, Program]]
     entries: Sequence[Entry]
     arguments: str
     facts: Mapping[str, Any]
     programs: Any
-    target: str = ""
-    kernel: Kernel | None = None
     images: Sequence[Image] = ()
     weights: NDArray[np.float32] | None = None
     part: str = ""
@@ -96,8 +92,10 @@ class Draft:
 
 def assemble(draft: Draft) -> Artifact:
     """Return a kernel with its source and its manifest."""
-    dialect, role, profile = draft.dialect, draft.interface.role, draft.profile
-    source, entry = draft.emit(header(draft.title, dialect, draft.entries)), dialect.entries[role]
+    dialect, profile, kernel = draft.renderer.dialect, draft.profile, draft.renderer.kernel
+    role, lines = kernel.interface.role, header(draft.title, dialect, draft.entries)
+    is_listed, entry = isinstance(dialect, Listing), dialect.entries[role]
+    source = listed(lines, draft.listed) if is_listed else draft.renderer.source(lines)
     if draft.part:
         source, entry = dialect.apart(source, draft.part), dialect.apart(entry, draft.part)
     files = {f"{role}{dialect.suffix}": source.encode()}
@@ -105,7 +103,7 @@ def assemble(draft: Draft) -> Artifact:
         files[artifact.WEIGHTS_NAME] = draft.weights.astype("<f4").tobytes()
     manifest = {
         "digest": ir.sha256(*files.values()),
-        "target": draft.target or dialect.target,
+        "target": dialect.target,
         "language": dialect.language,
         "entry_point": entry,
         "profile": {"name": profile.name, "text": profile.text},
@@ -118,7 +116,7 @@ def assemble(draft: Draft) -> Artifact:
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
     weights = artifact.NONE if draft.weights is None else draft.weights
     images, programs = tuple(draft.images), draft.programs
-    return Artifact(source, manifest, draft.interface, images, programs, draft.kernel, weights)
+    return Artifact(source, manifest, kernel.interface, images, programs, kernel, weights)
 
 
 def header(title: str, dialect: Dialect, entries: Sequence[Entry]) -> list[str]:
@@ -199,24 +197,19 @@ def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Art
 def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: str = "") -> Artifact:
     """Return the kernel of a plan without a cut; `notes` are further entries of its header."""
     emitted, schedule = plan.emitted, plan.schedule
-    images, dialect, weights = kernel_gather(emitted).images, schedule.dialect, schedule.pack(emitted)
-    taken = dialect.integers[DENOISE]
-    bound_to = interface.denoiser(images, weights.size, output_channels(emitted), dialect.home, taken)
-    memory = plan.picked.details.get("memory")
+    weights = schedule.pack(emitted)
     # Where nothing rounds, a language need not keep the order of operations.
     is_ordered = bound.output is not None and not bound.exact
     draft = Draft(
         "denoiser",
-        dialect,
         plan.profile,
-        bound_to.handing_on(memory) if memory else bound_to,
-        lambda lines: schedule.emit(emitted, lines, is_ordered),
+        schedule.renderer(emitted, is_ordered),
+        [("", emitted)],
         [*_entries(plan, bound), *notes, _entry_of_weights(plan)],
         schedule.arguments(emitted),
         _facts(plan, bound, weights),
         emitted,
-        plan.target.name,
-        images=images,
+        images=kernel_gather(emitted).images,
         weights=weights,
         part=part,
     )
@@ -226,7 +219,7 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
     elif bound.proof:
         of = plan.analysed, bound.proof, plan.sine, schedule, emitted, found.manifest
         proven = certificate.certificate(*of)
-    return replace(found, plan=plan, certificate=proven)
+    return replace(found, plan=plan, kernel=None, certificate=proven)
 
 
 def _entries(plan: Plan, bound: Bound) -> list[Entry]:

@@ -15,7 +15,6 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from typing import Any
 
 from ...refimpl.errors import CompileError
@@ -28,7 +27,7 @@ from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
 from ..languages.dialect import Dialect
-from ..languages.listing import Listing, listed
+from ..languages.listing import Listing
 from ..languages.openings import IMAGES
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named
@@ -101,7 +100,6 @@ def compile_path(
     renderer = renderer_of(emitted, dialect, groups, lanes, encoding)
     written = (*(_written(images) if images else SUMS), *_notes(programs, bool(images)))
     arguments = _arguments(dialect, lanes, () if images else planes, len(programs.inputs))
-    is_listed = isinstance(dialect, Listing)
     at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
     entries = _entries(programs, promised, at_once, written)
     facts = {
@@ -120,15 +118,13 @@ def compile_path(
     }
     draft = Draft(
         "path tracer",
-        dialect,
         promised,
-        renderer.kernel.interface,
-        partial(listed, programs=list(passed.items())) if is_listed else renderer.source,
-        [*entries, ("arguments", [] if is_listed else arguments.split("\n"))],
+        renderer,
+        list(passed.items()),
+        [*entries, ("arguments", [] if isinstance(dialect, Listing) else arguments.split("\n"))],
         arguments,
         facts,
         emitted,
-        kernel=renderer.kernel,
         images=images,
     )
     return assemble(draft)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from ...refimpl.errors import CompileError
@@ -20,7 +19,6 @@ from ..core.ir import Image, Program
 from ..core.profiles import Profile
 from ..kernel.interface import ENCODE
 from ..kernel.kernel import Expr, Kernel, Let
-from ..languages.listing import Listing, listed
 from ..languages.renderer import Renderer
 from ..targets import Language
 
@@ -70,18 +68,15 @@ def compiled(
     ]
     several = {"role": role, "programs": digests, "lanes": kernel.step[0].value}
     own = {"program": digests[0]} if role == ENCODE else several
-    lines = partial(listed, programs=[("", each) for each in used])
     draft = Draft(
         title,
-        dialect,
         profile,
-        kernel.interface,
-        lines if isinstance(dialect, Listing) else renderer.source,
+        renderer,
+        [("", each) for each in used],
         entries,
         arguments,
         {**own, **facts},
         programs,
-        kernel=kernel,
         images=images,
     )
     return assemble(draft)

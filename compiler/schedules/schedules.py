@@ -30,7 +30,7 @@ from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes, shared_bytes
 from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
-from ..languages.listing import listed
+from ..languages.listing import Listing
 from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
@@ -123,13 +123,14 @@ class Schedule:
         """Return the kernel of a program."""
         raise NotImplementedError
 
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the kernel's source; `header` are the lines of the comment at its top.
+    def renderer(self, program: Program, bounded: bool) -> Renderer:
+        """Return what prints the kernel of a program.
 
         `bounded`: an error bound is stated, and the language must keep the order of operations.
         """
-        _check_channels(program, self.dialect)
-        return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program)).source(header)
+        if not isinstance(self.dialect, Listing):
+            _check_channels(program, self.dialect)
+        return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program))
 
     def extent(self, program: Program) -> tuple[int, int]:
         """Return the columns and rows of pixels that a work item computes."""
@@ -534,10 +535,6 @@ class Printed(Plain):
     """The program as text, which is all that the interpreter needs."""
 
     idea = "one operation after another, all pixels at once"
-
-    def emit(self, program: Program, header: Sequence[str], bounded: bool) -> str:
-        """Return the text, under the header as comments."""
-        return listed(header, [("", program)])
 
 
 @dataclass(frozen=True)

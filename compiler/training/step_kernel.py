@@ -54,15 +54,13 @@ def compile_lowered(step: Step, size: int) -> Artifact:
     renderer = Renderer(dialect, step_kernel(step, size), False)
     draft = Draft(
         "training step",
-        dialect,
         profile,
-        renderer.kernel.interface,
-        renderer.source,
+        renderer,
+        [("", step.program)],
         [("program", [digest[:32]])],
         "by the launches of the kernel: see spec/train_kernel.md",
         {"program": digest, "passes": profile.passes},
         step,
-        kernel=renderer.kernel,
     )
     return assemble(draft)
 

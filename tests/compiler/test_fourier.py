@@ -338,7 +338,7 @@ def emitted(program):
 def test_private_bytes_are_those_of_its_arrays() -> None:
     """Read the sizes of all arrays in the source; those of sums in registers are not counted."""
     made = emitted(paper())
-    source = FFT32.emit(made, [], True)
+    source = FFT32.renderer(made, True).source([])
     sizes = dict(re.findall(r"#define ([A-Z_]+) (\d+)", source))
     sizes |= {"OUT": "21", "STRIDE": "66"}
     body = source[source.index("__kernel") :]
@@ -364,7 +364,9 @@ def test_golden_spectra(golden) -> None:
     idea = "small tiles"
     for dialect in (OpenCL(), C()):
         tiny = schedules.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
-        golden(f"fft4.denoise{dialect.suffix}", tiny.emit(analysed(traced), ["a tiny kernel"], True))
+        golden(
+            f"fft4.denoise{dialect.suffix}", tiny.renderer(analysed(traced), True).source(["a tiny kernel"])
+        )
 
 
 @given(channels=st.integers(1, 7), size=st.integers(1, 5), neurons=st.integers(1, 40))

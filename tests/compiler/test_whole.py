@@ -169,7 +169,7 @@ def smallest(channels) -> Program:
 @pytest.mark.parametrize("dialect", [CUDA(), WGSL(), Vulkan(), OpenCL()])
 def test_the_text_of_grouped_dots(golden, dialect) -> None:
     tiny = GroupDot("groupdot:1", "a tiny group", dialect, 1, (4, 2))
-    found = tiny.emit(smallest({"a": 3, "b": 2}), ["a tiny kernel"], False)
+    found = tiny.renderer(smallest({"a": 3, "b": 2}), False).source(["a tiny kernel"])
     golden(f"groupdot.denoise{dialect.suffix}", found)
 
 
@@ -210,7 +210,7 @@ def test_the_text_of_dots(golden) -> None:
     found = smallest(CHANNELS)
     for dialect in (C(), OpenCL()):
         tiny = Dot("dot:4", "a tiny tile", dialect, 4, 2)
-        golden(f"dot4.denoise{dialect.suffix}", tiny.emit(found, ["a tiny kernel"], True))
+        golden(f"dot4.denoise{dialect.suffix}", tiny.renderer(found, True).source(["a tiny kernel"]))
 
 
 def test_the_bytes_of_dots_are_the_weights() -> None:

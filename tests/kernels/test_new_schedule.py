@@ -68,7 +68,7 @@ def test_it_is_in_every_language_at_once(kit, target):
     program = kit.denoiser(network, {"color": 3, "normal": 3}, 3, "clamp")
     program = plan_program(program, target).emitted
     schedule = Backwards(dialect)
-    source = schedule.emit(program, ["a schedule of nobody's own"], True)
+    source = schedule.renderer(program, True).source(["a schedule of nobody's own"])
     channels = {"image_color": 3, "image_normal": 3, "result": 3}
     found = parse(source, target, channels)
     assert found == canonical(schedule.kernel(program))

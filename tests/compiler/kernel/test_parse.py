@@ -120,7 +120,8 @@ def emitted(target, schedule, border="clamp"):
     assert plan.schedule.name == schedule
     details = plan.schedule.details(plan.emitted)
     passes = passes_of(details)
-    return plan.schedule.kernel(plan.emitted), plan.schedule.emit(plan.emitted, ["a comment"], True), passes
+    source = plan.schedule.renderer(plan.emitted, True).source(["a comment"])
+    return plan.schedule.kernel(plan.emitted), source, passes
 
 
 def read_back(source, target, kernel, passes=None):

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..models.writing import making_parents, write_together
 from .core.ir import Image
-from .kernel import interface
-from .kernel.interface import Interface
+from .kernel.interface import Interface, staged
 
 SCHEMA = "wamnet-artifact-1"
 """Name and version of the manifest's form; described in spec/kernel_interface.md."""
@@ -117,8 +116,13 @@ class Artifact:
     @property
     def launches(self) -> tuple[Artifact, ...]:
         """Return a kernel of several launches as one of each, with its source and entry point; else none."""
-        found = interface.launches(self.source, self.manifest)
-        return tuple(replace(self, source=source, manifest=manifest) for source, manifest in found)
+        found, schedule = [], self.manifest.get("schedule", {})
+        for number, entry in enumerate(schedule.get("entries", ())):
+            parts = {name: [schedule[name][number]] for name in ("launches", "entries", "arrays")}
+            own = {"entry_point": entry, "schedule": {**schedule, **parts}}
+            text = self.source if str(number) in entry else staged(self.source, number)
+            found.append(replace(self, source=text, manifest={**self.manifest, **own}))
+        return tuple(found)
 
     def contents(self) -> Mapping[str, bytes]:
         """Return all files except the manifest, by name."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from ..core.ir import Image
 
@@ -84,17 +83,6 @@ def staged(source: str, number: int) -> str:
     """Return a source of GLSL, which has one entry point, for one of several launches."""
     defined = rf"\g<0>\n#define STAGE {number}\n#define ITEMS {ITEMS}"
     return re.sub(r"^#version .*$", defined, source, count=1, flags=re.MULTILINE)
-
-
-def launches(source: str, manifest: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Return the source and the manifest of each launch of a kernel that is several, as if it were one."""
-    found, schedule = [], manifest.get("schedule", {})
-    for number, entry in enumerate(schedule.get("entries", ())):
-        parts = {name: [schedule[name][number]] for name in ("launches", "entries", "arrays")}
-        own = {"entry_point": entry, "schedule": {**schedule, **parts}}
-        text = source if str(number) in entry else staged(source, number)
-        found.append((text, {**manifest, **own}))
-    return found
 
 
 @dataclass(frozen=True)
@@ -191,15 +179,10 @@ def image_of(image: Image, access: str) -> Array:
     return Array(f"{IMAGE}{image.name}", access, ("height", "width", image.channels))
 
 
-def denoiser(
-    images: Sequence[Image], weights: int, channels: int, home: str, integers: Sequence[str]
-) -> Interface:
-    """Return what a denoiser is given: images, so many weights at their home, and a result."""
-    found = [image_of(image, READ) for image in images]
-    if home != TABLE:
-        found.append(Array(WEIGHTS, READ, (weights,), home))
-    found.append(Array(RESULT, WRITE, ("height", "width", channels)))
-    return Interface(DENOISE, tuple(found), tuple(integers))
+def denoiser(images: Sequence[Image], channels: int) -> Interface:
+    """Return what a denoiser is given: images, weights, which a language puts where it has them, a result."""
+    weights, result = Array(WEIGHTS, READ, (0,)), Array(RESULT, WRITE, ("height", "width", channels))
+    return Interface(DENOISE, (*(image_of(image, READ) for image in images), weights, result), ())
 
 
 def planes_of(name: str, access: str, count: int) -> Array:

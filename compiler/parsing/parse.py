@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from ..core.ir import Image
-from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
+from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.kernel import (
     BYTE,
     FLOAT,
@@ -159,7 +159,7 @@ class Parser(Expressions):
             raise Unread(f"the channels of {missing[0]} are not stated")
         declared = [Image(key.removeprefix(IMAGE), self.channels[key], -np.inf, np.inf) for key in images]
         return Kernel(
-            denoiser(declared, 0, self.channels[RESULT], BUFFER, ()),
+            denoiser(declared, self.channels[RESULT]),
             body,
             constants,
             tuple(self.functions.values()),

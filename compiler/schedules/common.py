@@ -16,7 +16,7 @@ from ...refimpl.errors import CompileError
 from ..core.ir import Gather, Image, Node, Program, users
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
-from ..kernel.interface import BUFFER, IMAGE, RESULT, WEIGHTS, denoiser
+from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.kernel import (
     FLOAT,
     INT,
@@ -152,7 +152,7 @@ class Nest:
 
     def kernel(self, body: Sequence[Statement], constants: Sequence[Constant], **more: object) -> Kernel:
         """Return the kernel of statements; where its weights are is a matter of the language."""
-        interface = denoiser(self.gather.images, 0, output_channels(self.program), BUFFER, ())
+        interface = denoiser(self.gather.images, output_channels(self.program))
         found = tuple(tables(self.program).items())
         return Kernel(interface, tuple(body), tuple(constants), tables=found, **more)  # type: ignore[arg-type]
 

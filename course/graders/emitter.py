@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from wamnet.compiler.core.ir import Image
-from wamnet.compiler.kernel.interface import BUFFER, denoiser
+from wamnet.compiler.kernel.interface import denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     FLOAT,
@@ -170,7 +170,7 @@ def kernel_of(body: Any, rows: bool = False) -> Kernel:
         more: dict[str, Any] = {}
         if rows:
             more = {"constants": (Constant("PIXELS", const(PIXELS)),), "step": (name("PIXELS"), const(1))}
-        kernel = Kernel(denoiser(images, 0, 1, BUFFER, ()), tuple(body), **more)
+        kernel = Kernel(denoiser(images, 1), tuple(body), **more)
         verify(kernel)
     except KernelError as error:
         likely = _reason(str(error), rows)

@@ -199,11 +199,8 @@ def _fragment(kernel: str, rows: int) -> dict[str, Place]:
 UNIFORM_RANGE = (16 * KILOBYTE, "maxUniformBufferRange")
 """What Vulkan promises of a uniform block."""
 
-VULKAN_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED_BYTES, PASSES))
-"""Places of weights for Vulkan."""
-
 TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED, PASSES))
-"""The same for what is made of its GLSL by way of SPIR-V 1.0, which has no products of bytes."""
+"""Places of weights for what is made of GLSL for Vulkan by way of SPIR-V 1.0, without products of bytes."""
 
 DISPATCH = "dispatch(ceil(width / {across}), ceil({height} / {down}), 1)"
 """How kernels on buffers are started, in groups that compute so many pixels."""
@@ -319,7 +316,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         "glsl-vulkan",
         "GLSL 4.50 for Vulkan, compute shader",
-        VULKAN_PLACES,
+        _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED_BYTES, PASSES)),
         _as(".comp"),
         "numbered",
         _buffers_code("VkPipeline"),

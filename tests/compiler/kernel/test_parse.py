@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.core.ir import Image
 from wamnet.compiler.core.weights import pack
-from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     FLOAT,
@@ -145,7 +145,7 @@ def small(*body, **more):
     """Return a kernel with two images and one channel of a result."""
     images = [Image("a", 3, -2.0, 2.0), Image("b", 1, -2.0, 2.0)]
     first = [Let(each, load(f"image_{each}", Y, X, 0)) for each in "ab"]
-    return Kernel(denoiser(images, 0, 1, BUFFER, ()), (*first, *body), **more)
+    return Kernel(denoiser(images, 1), (*first, *body), **more)
 
 
 WRITE = Store(RESULT, (Y, X, const(0)), F)

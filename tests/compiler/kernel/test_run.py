@@ -16,7 +16,7 @@ from wamnet.compiler.core.ir import Gather, Image
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.weights import pack
 from wamnet.compiler.kernel.domain import Domain
-from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     BYTE,
@@ -101,7 +101,7 @@ def pictures(channels, size, seed=1):
 
 def small(*body, images=1, **more):
     """Return a kernel with one image and one channel of a result."""
-    interface = denoiser([Image("a", images, -2.0, 2.0)], 0, 1, BUFFER, ())
+    interface = denoiser([Image("a", images, -2.0, 2.0)], 1)
     return Kernel(interface, body, **more)
 
 

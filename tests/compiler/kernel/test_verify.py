@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.core.ir import Image
-from wamnet.compiler.kernel.interface import BUFFER, RESULT, denoiser
+from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
     FLOAT,
@@ -49,7 +49,7 @@ TABLES = (("table", np.zeros(2, np.float32)),)
 
 def small(*body, **more):
     """Return a kernel with an image of three channels and one channel of a result."""
-    interface = denoiser([Image("a", 3, -2.0, 2.0)], 0, 1, BUFFER, ())
+    interface = denoiser([Image("a", 3, -2.0, 2.0)], 1)
     return Kernel(interface, body, **more)
 
 

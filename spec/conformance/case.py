@@ -56,9 +56,16 @@ Expect = Callable[[Mapping[str, Any], Mapping[str, Any], Mapping[str, Any]], Map
 """(inputs, the reference's answer, the outputs that the file has) -> outputs with bounds."""
 
 
+def within(bound: Callable[[Mapping[str, Any], Any], Any], source: str) -> Expect:
+    """Return what expects answers within a bound, a function of the inputs and the value."""
+    return lambda inputs, wanted, told: {
+        name: Output(value, bound(inputs, value), source) for name, value in wanted.items()
+    }
+
+
 def exact(source: str = "exact") -> Expect:
     """Return what expects answers to the bit."""
-    return lambda inputs, wanted, told: {name: Output(value, 0.0, source) for name, value in wanted.items()}
+    return within(lambda inputs, value: 0.0, source)
 
 
 EXACT = exact()

@@ -25,7 +25,7 @@ from ....refimpl.errors import InputError
 from ....refimpl.frame import LAYERS, Frame, validate
 from ....refimpl.network import dataset, smoothing
 from ....refimpl.network.dataset import Normalization, Window
-from ..case import Kind, Output
+from ..case import Kind, within
 from .tables import kind
 
 Array = NDArray[Any]
@@ -66,11 +66,6 @@ def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"image": dataset.feature_image(frame, names, normalization_of(inputs))}
 
 
-def _of_features(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return the feature image with its bound."""
-    return {"image": Output(wanted["image"], ULP, ENCODED)}
-
-
 # ---- the filter -------------------------------------------------------------------------------------------
 
 
@@ -82,9 +77,10 @@ def _smoothed(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"color": smoothing.smooth(layers["color"], guides, int(inputs["levels"]))}
 
 
-def _bound_of(color: Array, layers: Mapping[str, Array], levels: int) -> Array:
+def _bound_of(inputs: Mapping[str, Any], _value: Any) -> Any:
     """Return how far off colours (H, W, 3) may be after some levels."""
-    guides, factors = smoothing.guides_of(layers)
+    color, levels = inputs["color"], int(inputs["levels"])
+    guides, factors = smoothing.guides_of(inputs)
     height, width = color.shape[:2]
     error = np.zeros_like(color)
     for level in range(levels):
@@ -101,12 +97,6 @@ def _bound_of(color: Array, layers: Mapping[str, Array], levels: int) -> Array:
         error = 1.001 * (moved / total + 54.0 * UNIT * largest)
         color = mean
     return error
-
-
-def _of_smoothed(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return smoothed colour with its bound."""
-    bound = _bound_of(inputs["color"], inputs, int(inputs["levels"]))
-    return {"color": Output(wanted["color"], bound, "roundings of float64, level by level (DAT-3)")}
 
 
 # ---- windows ----------------------------------------------------------------------------------------------
@@ -189,21 +179,18 @@ MOST_NUMBERS = 13 * 12 * 3
 def _metric(name: str) -> Kind:
     """Return the kind of a metric."""
     function, bound = METRICS[name]
-
-    def expect(inputs: Any, wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-        value = wanted["value"]
-        return {"value": Output(value, bound(value, MOST_NUMBERS), "roundings of float64, any order")}
-
     return kind(
-        f"metric.{name}", lambda inputs: {"value": function(inputs["image"], inputs["reference"])}, expect
+        f"metric.{name}",
+        lambda inputs: {"value": function(inputs["image"], inputs["reference"])},
+        within(lambda inputs, value: bound(value, MOST_NUMBERS), "roundings of float64, any order"),
     )
 
 
 KINDS = (
-    kind("image.features", _features, _of_features),
+    kind("image.features", _features, within(lambda inputs, value: ULP, ENCODED)),
     kind("image.window", _window),
     kind("image.draws", _draws),
     *map(_metric, METRICS),
-    kind("image.smoothed", _smoothed, _of_smoothed),
+    kind("image.smoothed", _smoothed, within(_bound_of, "roundings of float64, level by level (DAT-3)")),
 )
 """The kinds of this module."""

@@ -12,7 +12,7 @@ from ....refimpl.light import camera, environment, sampling
 from ....refimpl.light.scene import Camera, Light, Quad, Sky, Sphere
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK
-from ..case import Kind, Output
+from ..case import Kind, within
 from ..functions import Numbers
 from .tables import direct, function, kind
 
@@ -28,13 +28,9 @@ def _layout(name: str, call: Callable[..., Any]) -> Kind:
     def answer(given: Mapping[str, Any]) -> dict[str, Any]:
         return dict(call(*(np.asarray(value, np.float64).tolist() for value in given.values())))
 
-    return kind(name, answer, _rounded)
-
-
-def _rounded(inputs: Any, wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return numbers with the bounds of one rounding."""
-    bounds = {name: np.maximum(2.0**-23 * np.abs(value), 2.0**-26) for name, value in wanted.items()}
-    return {name: Output(value, bounds[name], ROUNDED) for name, value in wanted.items()}
+    return kind(
+        name, answer, within(lambda inputs, value: np.maximum(2.0**-23 * np.abs(value), 2.0**-26), ROUNDED)
+    )
 
 
 def _axes(position: Any, look_at: Any, up: Any, fov: float) -> dict[str, Any]:

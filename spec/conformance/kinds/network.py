@@ -38,14 +38,6 @@ STEPS = "ranges of single precision under profile ieee, from step to step (compi
 """Where the bounds of Adam's runs come from."""
 
 
-def as_inputs(network: Siren) -> dict[str, Any]:
-    """Return a network as inputs of a case."""
-    found: dict[str, Any] = {"omega_0_first": network.omega_0_first, "omega_0_hidden": network.omega_0_hidden}
-    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        found |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
-    return found
-
-
 def network_of(inputs: Mapping[str, Any]) -> Siren:
     """Return the network of a case in float64."""
     count = sum(name.startswith("weight_") for name in inputs)
@@ -81,14 +73,14 @@ def _single(inputs: Mapping[str, Any]) -> Siren:
 def _init(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters in float32."""
     widths = [int(width) for width in np.ravel(inputs["widths"])]
-    drawn_ones = siren.init(
-        widths,
-        float(inputs["omega_0_first"]),
-        float(inputs["omega_0_hidden"]),
-        int(inputs["seed"]),
-        np.float32,
-    )
-    return {name: value for name, value in as_inputs(drawn_ones).items() if not name.startswith("omega")}
+    first, hidden = (float(inputs[f"omega_0_{part}"]) for part in ("first", "hidden"))
+    made = siren.init(widths, first, hidden, int(inputs["seed"]), np.float32)
+    pairs = enumerate(zip(made.weights, made.biases, strict=True))
+    return {
+        f"{name}_{layer}": part
+        for layer, pair in pairs
+        for name, part in zip(("weight", "bias"), pair, strict=True)
+    }
 
 
 # ---- activations ------------------------------------------------------------------------------------------
@@ -173,24 +165,6 @@ def _adam(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.array([row[i] for row in rows]) for i, name in enumerate(("theta", "m", "v"))}
 
 
-def _adam_ranges(inputs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
-    """Return the ends (K, n) of what single precision may give, from step to step."""
-    program, theta = lower_adam(), np.asarray(inputs["theta"], np.float64)
-    zero = np.zeros_like(theta)
-    state: dict[str, Any] = {"theta": theta, "m": zero, "v": zero}
-    rows = []
-    for t, gradient in enumerate(inputs["gradients"], start=1):
-        grown = [_rounded(value) for value in adam.growth(t)]
-        rate = np.float64(inputs["learning_rate"])
-        given = (state["theta"], gradient, state["m"], state["v"], rate, *grown)
-        state = ranges.evaluate(program, dict(zip(ADAM_INPUTS, given, strict=True)))
-        rows.append({name: (np.array(r.low), np.array(r.high)) for name, r in state.items()})
-    return {
-        name: tuple(np.array([row[name][end] for row in rows]) for end in (0, 1))  # type: ignore[misc]
-        for name in ("theta", "m", "v")
-    }
-
-
 def _rounded(value: float) -> Range:
     """Return the range of a float64 number that may be rounded to float32, either way."""
     near = np.float32(value)
@@ -199,12 +173,21 @@ def _rounded(value: float) -> Range:
 
 
 def _of_adam(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return the runs with bounds."""
-    ends = _adam_ranges(inputs)
-    return {
-        name: Output(value, np.maximum(ends[name][1] - value, value - ends[name][0]), STEPS)
-        for name, value in wanted.items()
-    }
+    """Return the runs (K, n) with bounds: what single precision may give, from step to step."""
+    program, rate = lower_adam(), np.float64(inputs["learning_rate"])
+    zero = np.zeros_like(np.asarray(inputs["theta"], np.float64))
+    state: dict[str, Any] = {"theta": inputs["theta"], "m": zero, "v": zero}
+    rows: list[Mapping[str, Range]] = []
+    for t, gradient in enumerate(inputs["gradients"], start=1):
+        grown = [_rounded(value) for value in adam.growth(t)]
+        given = (state["theta"], gradient, state["m"], state["v"], rate, *grown)
+        state = dict(ranges.evaluate(program, dict(zip(ADAM_INPUTS, given, strict=True))))
+        rows.append(state)
+    expected = {}
+    for name, value in wanted.items():
+        low, high = (np.array([getattr(row[name], end) for row in rows]) for end in ("low", "high"))
+        expected[name] = Output(value, np.maximum(high - value, value - low), STEPS)
+    return expected
 
 
 KINDS = (

@@ -10,7 +10,7 @@ import numpy as np
 from ....refimpl import encoding, rng
 from ....refimpl.light import sobol
 from ....refimpl.network import adam
-from ..case import Kind, Output
+from ..case import Kind, within
 from .tables import ROWS, direct, kind
 
 FUNCTIONS = (
@@ -47,25 +47,18 @@ def _exposed(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"exposed": np.float64(encoding.expose(np.asarray(inputs["linear"], np.float64), stops))}
 
 
-def _of_exposed(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return exposed radiance with its bound."""
-    value = wanted["exposed"]
-    return {"exposed": Output(value, 2.0**-22 * value, "a power, rounded to float32, and a product")}
-
-
 def _shown(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return exposed and display-encoded radiance."""
     linear = np.asarray(inputs["linear"], np.float64)
     return {"encoded": np.float64(encoding.to_display(linear, float(inputs["exposure_stops"])))}
 
 
-def _of_shown(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return encoded radiance with its bound.
+def _bound_of_shown(inputs: Mapping[str, Any], value: Any) -> Any:
+    """Return the bound of encoded radiance.
 
     Near a number the encoding grows by at most its own share: slope times x over value is at most 1."""
-    value, light = wanted["encoded"], np.float64(np.float32(_exposed(inputs)["exposed"]))
-    bound = FUNCTIONS[1].bounded({"linear": light})["encoded"].bound + 2.0**-22 * value
-    return {"encoded": Output(value, bound, "those of encoding.exposed and of encoding.display")}
+    light = np.float64(np.float32(_exposed(inputs)["exposed"]))
+    return FUNCTIONS[1].bounded({"linear": light})["encoded"].bound + 2.0**-22 * value
 
 
 KINDS = (
@@ -75,7 +68,15 @@ KINDS = (
     _words("random.scrambled", lambda fraction, key: ([sobol.scramble(fraction, key)],)),
     _words("random.point", lambda index: ([sobol.sobol(index, axis) for axis in range(4)],)),
     _words("random.sobol", lambda s, p, n, b: (sobol.uniforms(s, p, n, b, np.float64),)),
-    kind("encoding.exposed", _exposed, _of_exposed),
-    kind("encoding.shown", _shown, _of_shown),
+    kind(
+        "encoding.exposed",
+        _exposed,
+        within(lambda inputs, value: 2.0**-22 * value, "a power, rounded to float32, and a product"),
+    ),
+    kind(
+        "encoding.shown",
+        _shown,
+        within(_bound_of_shown, "those of encoding.exposed and of encoding.display"),
+    ),
 )
 """Kinds of counters and words of 32 bits, and of exposure."""

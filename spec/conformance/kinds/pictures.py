@@ -25,7 +25,7 @@ from ....refimpl.light import scene as scene_module
 from ....refimpl.light.render import Job, render
 from ....refimpl.network import dataset, denoise
 from .. import blocks
-from ..case import Output
+from ..case import Output, within
 from . import paths
 from .files import model_from
 from .images import ULP, frame_of
@@ -39,6 +39,9 @@ REFERENCE_SPP, REFERENCE_SEED = 256, 1000
 
 OF_SAMPLES = "ranges of single precision of all samples, from step to step (compiler/proof/ranges.py)"
 """Where the bounds of tiny pictures come from."""
+
+AT_PIXELS = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
+"""Where the bounds of denoised pictures come from."""
 
 ROUNDED = 2.0**-22
 """What a mean may be off by for its sum and its rounding to float32, relative: few samples are added."""
@@ -56,18 +59,16 @@ def _denoise(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {"picture": denoise.denoise(model_from(base64.b64decode(inputs["model"])), frame, np.float64)}
 
 
-def _of_denoised(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
-    """Return the picture with its bound (H, W, 3)."""
-    model, frame, picture = model_from(base64.b64decode(inputs["model"])), _layers(inputs), wanted["picture"]
+def _of_denoised(inputs: Mapping[str, Any], picture: Any) -> Any:
+    """Return the bound (H, W, 3) of a picture."""
+    model, frame = model_from(base64.b64decode(inputs["model"])), _layers(inputs)
     program = analysed(lower(model))
     image = dataset.feature_image(frame, model.features, model.normalization).astype(np.float64)
     windows = dataset.all_windows(dataset.pad(image, model.window), model.window)
     nodes = bounds.enclose(program, {"window": (windows - ULP, windows + ULP)}, EMITTED_SINE)
     ((_, index),) = program.outputs
     found = nodes[index]
-    bound = np.maximum(found.high - picture, picture - found.low) + found.read
-    text = "bounds of profile ieee at these pixels, features being one ulp off (compiler/proof/bounds.py)"
-    return {"picture": Output(picture, bound, text)}
+    return np.maximum(found.high - picture, picture - found.low) + found.read
 
 
 def _render(inputs: Mapping[str, Any], dtype: str = "float32") -> dict[str, Any]:
@@ -124,7 +125,7 @@ def _of_exact(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -
 
 
 KINDS = (
-    kind("picture.denoised", _denoise, _of_denoised),
+    kind("picture.denoised", _denoise, within(_of_denoised, AT_PIXELS)),
     kind("picture.exact", _exact, _of_exact),
     kind("picture.rendered", _render, _of_rendered),
 )

@@ -17,8 +17,6 @@
    (tests/support/tiers.py).
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """What the tests of the commands share: a way to run one, and small frames and a model to run them on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple

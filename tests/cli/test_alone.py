@@ -1,7 +1,5 @@
 """Tests of locks: one writer at a time, which no kill, link or foreign file turns into a loss."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

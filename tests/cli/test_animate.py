@@ -1,7 +1,5 @@
 """Tests of `wamnet animate`: what the pictures show, films that can be read, resuming, refusals."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """Tests of `wamnet bench`: its files, its refusals, an interrupt, and the report's section."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """`wamnet certify` of the shelf: its index says what the command finds, of each kernel."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

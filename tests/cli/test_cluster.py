@@ -1,7 +1,5 @@
 """Tests of sharing tasks: here and on real Dask clusters, with a worker killed, and with nobody there."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import os

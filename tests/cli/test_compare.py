@@ -1,7 +1,5 @@
 """Tests of `wamnet compare`: the reference's numbers, in a table and as JSON; paths, and when they fail."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

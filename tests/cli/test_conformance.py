@@ -1,7 +1,5 @@
 """`wamnet conformance`: what it prints and writes, its exit status, and every refusal."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """`wamnet course`: what it writes and prints, its exit status, refusals; pytest and make in its folder."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tests of `wamnet dataset`: the same bytes from any number of processes, resumed, and checked."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """`wamnet dataset --from-blender`: DSF-13, by a program that answers as Blender does, and by Blender."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

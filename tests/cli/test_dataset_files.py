@@ -1,7 +1,5 @@
 """Tests of a data set's folder: every place where a run can end, damage, other requests, other folders."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@ Whatever was done to the folder, the next run ends with the bytes of an undistur
 with one error and changes nothing; and nothing outside of the folder is ever touched.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from pathlib import Path

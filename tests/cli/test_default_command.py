@@ -1,7 +1,5 @@
 """A command with commands of its own: what names none of them is its own line, with all its messages."""
 
-from __future__ import annotations
-
 import pytest
 import typer
 

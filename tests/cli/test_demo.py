@@ -1,7 +1,5 @@
 """Tests of `wamnet demo --quick`: all files, honest numbers, a self-contained report, resuming."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re

@@ -1,7 +1,5 @@
 """Tests of `wamnet compile`, `wamnet denoise` and `wamnet executors`."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Tests of what the commands say of frames that a model has not learned, and of foreign ones they refuse."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

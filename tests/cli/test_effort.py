@@ -1,7 +1,5 @@
 """Tests of what is said before large work: when, how much, in which words; small work says nothing."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

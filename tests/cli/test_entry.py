@@ -1,7 +1,5 @@
 """Tests of the command's first moments: Ctrl-C while modules are imported is one line."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

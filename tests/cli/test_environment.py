@@ -1,7 +1,5 @@
 """The command on machines that take things away: a home, a name, writable folders, programs in folders."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

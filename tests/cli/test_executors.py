@@ -1,7 +1,5 @@
 """Tests of `--executor auto`, the default of the commands that run on an executor."""
 
-from __future__ import annotations
-
 import inspect
 import shutil
 

@@ -1,7 +1,5 @@
 """`wamnet export`: files of each target, options of scenes, verdicts, refusals."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of frames in EXR files: round trip to the bit, other programs' names, and every refusal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -299,7 +297,7 @@ def test_ctrl_c_while_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         def Part(self, *_: object) -> None:
             pass
 
-        def File(self, *_: object) -> Interrupted:
+        def File(self, *_: object) -> "Interrupted":
             return self
 
         def write(self, name: str) -> None:

@@ -1,7 +1,5 @@
 """Tests of OpenEXR files as other programs write them: parts, views, attributes, text, damage."""
 
-from __future__ import annotations
-
 import re
 import struct
 from collections import Counter

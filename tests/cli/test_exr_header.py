@@ -1,7 +1,5 @@
 """Tests of the headers of OpenEXR files: what is in them, and what cannot be read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of PNG files and of opening a picture of either kind."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from pathlib import Path

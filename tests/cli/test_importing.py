@@ -1,7 +1,5 @@
 """`wamnet import`: a model from another program's network, and what is said of it."""
 
-from __future__ import annotations
-
 import pytest
 from packages import needed
 from strangers import FOLDER

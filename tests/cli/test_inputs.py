@@ -1,7 +1,5 @@
 """Tests of what commands say of wrong inputs: folders, checkpoints, missing layers, invalid numbers."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`wamnet listing`: a kernel with the lines that it came from, to the terminal or to a file."""
 
-from __future__ import annotations
-
 import pytest
 
 

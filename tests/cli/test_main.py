@@ -1,7 +1,5 @@
 """Tests of the command line as a whole: help, version, wrong options, errors, interrupts, processes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

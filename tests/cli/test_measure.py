@@ -1,7 +1,5 @@
 """The commands below `wamnet bench`: their tables, refusals and helps. What they measure here is nothing."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The models that come with the package: whole, small, with recipe and scores, good on an unseen frame."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 

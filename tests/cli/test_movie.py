@@ -1,7 +1,5 @@
 """Tests of films: a failure in the middle leaves no file, nor half of one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

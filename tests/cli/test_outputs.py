@@ -1,7 +1,5 @@
 """Tests of safe writing: all or nothing, and every refusal before the work starts."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

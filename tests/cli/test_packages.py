@@ -1,7 +1,5 @@
 """Test of the sentence for a package that is not installed."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of colour spaces: the published matrix, white, and what is not converted."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Tests of `wamnet render` and `wamnet scene`: the same frame as the reference's, and every refusal."""
 
-from __future__ import annotations
-
 import colorsys
 import json
 import os

@@ -1,7 +1,5 @@
 """Data classes as parameters of a command: each field is an option, at its place among the others."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Integer networks for users: files and digests that are the same to the byte on every executor."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

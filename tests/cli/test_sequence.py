@@ -1,7 +1,5 @@
 """Sequences of frames: names, results, overlap, failures, and resuming after an interruption."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Tests of what is printed: texts appear as they are, and an interrupt says how to resume."""
 
-from __future__ import annotations
-
 import io
 import unicodedata
 from contextlib import redirect_stderr, redirect_stdout

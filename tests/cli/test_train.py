@@ -1,7 +1,5 @@
 """Tests of `wamnet train`: the reference's model, checkpoints, resuming to the same bits, refusals."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Tests of `wamnet triage`: verdicts, exit status, the reproducer and its command, refusals."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

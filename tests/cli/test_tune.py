@@ -1,7 +1,5 @@
 """Tests of `wamnet tune`, and of what other commands do with its tables."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Tests of --variant and of choices from a curve, in compile, denoise and train."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

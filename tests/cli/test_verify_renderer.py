@@ -1,8 +1,6 @@
 """`wamnet verify-renderer`: what it prints and writes, its exit status, and every refusal (VRF-10, VRF-11,
 VRF-12)."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """`wamnet view`: a page that is written or served, and what is refused before anything is computed."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import re

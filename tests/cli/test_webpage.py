@@ -3,8 +3,6 @@
 A small network and few bounces: SwiftShader traces and denoises 40 x 40 pixels in a moment.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The web page with a network of integers, in a headless Chromium: the same bits, and their SHA-256."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The controls of the web page in a headless Chromium: ranges, keys, pointers, telephones."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

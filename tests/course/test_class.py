@@ -1,7 +1,5 @@
 """A class is graded: what students' code does to its process ends only its own lab, and is named."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

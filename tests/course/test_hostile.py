@@ -1,7 +1,5 @@
 """Hostile answers: none is graded above its functions, leaves its process, or costs another student."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The graders of the course: right answers pass, in other styles too; skeletons and wrong answers do not."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

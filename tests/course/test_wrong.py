@@ -1,7 +1,5 @@
 """Wrong answers to the labs are caught and explained: a part of them at once, the others with `--nightly`."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The web site, built once for all tests of a session; it takes a minute, so that these tests are nightly."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Pages of labs: each has its sections in their order, a figure, the task of its skeleton, and sources."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

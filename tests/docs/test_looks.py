@@ -1,7 +1,5 @@
 """How the site looks and works: live page, captions, no cut text, access in two themes, print."""
 
-from __future__ import annotations
-
 import figures
 import folds
 import pytest

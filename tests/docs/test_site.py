@@ -1,7 +1,5 @@
 """The web site: it is whole, needs no other host, and says what the spec says; wrong pages are refused."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path

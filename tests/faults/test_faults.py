@@ -1,7 +1,5 @@
 """Faults of each kind at random times; `make faults` runs more of them, at more commands."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import faults

@@ -7,8 +7,6 @@ least the reported margin from the edge, within a bound of their rounding [`comp
 keeps those that differ.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections import Counter

@@ -6,8 +6,6 @@
 3. What has not ended after a while has been accepted, and works: it gets Ctrl-C, and must end [`_ended`].
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os

@@ -9,8 +9,6 @@
    exit status is 1 if there are findings. A finding's file belongs into tests/fuzz/corpus once it is fixed.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import logging

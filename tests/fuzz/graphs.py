@@ -6,8 +6,6 @@
    then, and attributes are wrong or change what the operator does [`ODD`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from random import Random
 from typing import Any

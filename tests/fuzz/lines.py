@@ -6,8 +6,6 @@
    control characters. What the child has started must end with it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -4,8 +4,6 @@ A command on such a machine ends with its output, or in status 2 with one line. 
 reason, and leaves no process and no folder behind.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

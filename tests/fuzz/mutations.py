@@ -10,8 +10,6 @@
 All of it is a function of a `random.Random`: the same seed gives the same input.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Mapping

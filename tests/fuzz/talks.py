@@ -1,7 +1,5 @@
 """What comes through a pipe or a socket: requests to `wamnet view`, and answers of programs under test."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -5,8 +5,6 @@ program would. It returns a value or raises a `WamnetError`; numbers that come o
 is run in this process with the changed file instead of a good one [`commands`].
 """
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

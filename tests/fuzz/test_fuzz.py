@@ -4,8 +4,6 @@
 into corpus/TARGET/ [`CORPUS`].
 """
 
-from __future__ import annotations
-
 import json
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Adam where float32 is at its ends, against exact or float64 arithmetic, interpreted and on the device."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

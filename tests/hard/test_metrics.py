@@ -1,7 +1,5 @@
 """Metrics where cancellation, tiny pictures and equal pictures lie in wait."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

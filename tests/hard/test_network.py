@@ -1,7 +1,5 @@
 """Networks and pictures that break careless kernels, on every executor, each within its computed bound."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Pictures of such scenes prove little, being noise; `compare_paths` starts each s
 state and has a range for every number of the result.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The generator at the ends of its counters, on every executor, to the bit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

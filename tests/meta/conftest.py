@@ -4,8 +4,6 @@ A rule is one test. It lists its violations as `path:line: what` and hands them 
 that states the rule and the fix.
 """
 
-from __future__ import annotations
-
 import ast
 import gc
 from collections.abc import Iterable, Iterator, Mapping

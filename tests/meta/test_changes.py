@@ -1,7 +1,5 @@
 """House rule about the changelog: one line an entry, in files of `changes` until a release."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Policies of tests/conftest.py: what is missing fails or is reported; what takes long is left out loudly."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

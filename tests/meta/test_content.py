@@ -1,7 +1,5 @@
 """House rules about text: nothing in the repository depends on one machine or points outside the project."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -12,8 +12,6 @@
    set-up may be marked so, for CI runs that itself [`SETUP`].
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

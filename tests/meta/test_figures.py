@@ -6,8 +6,6 @@
    nothing goes [`test_quotes_are_of_use`].
 """
 
-from __future__ import annotations
-
 import measured
 import pytest
 from lab import records, texts

@@ -1,7 +1,5 @@
 """House rules about the form of the code: contracts, strings under constants, types, sizes, errors."""
 
-from __future__ import annotations
-
 import ast
 import re
 

@@ -1,7 +1,5 @@
 """House rule about the catalogue of hard cases: each clause names its tests, each test has its clause."""
 
-from __future__ import annotations
-
 import ast
 import re
 

@@ -1,7 +1,5 @@
 """House rules about imports: one direction, few dependencies, one name for each module."""
 
-from __future__ import annotations
-
 import ast
 import sys
 from collections import Counter

@@ -1,7 +1,5 @@
 """House rules about pages: the first ones are short, and each of the site says what it is good for."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

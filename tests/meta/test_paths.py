@@ -1,7 +1,5 @@
 """House rule about paths: what a document or a docstring names is there."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

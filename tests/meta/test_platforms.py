@@ -1,7 +1,5 @@
 """Extras and dependency groups can be installed on each processor and Python that the project names."""
 
-from __future__ import annotations
-
 import ast
 import itertools
 import re

@@ -1,7 +1,5 @@
 """`.ci/setup` refuses what cannot work in one sentence, and touches nothing; `make` lists its targets."""
 
-from __future__ import annotations
-
 import fnmatch
 import os
 import re

@@ -6,8 +6,6 @@
 3. Vectors and their clauses: tests/meta/test_vectors.py. Examples: tests/meta/test_spec_examples.py.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

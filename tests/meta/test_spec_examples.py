@@ -9,8 +9,6 @@
    [`test_decisions_about_the_paper_are_in_the_appendix`].
 """
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

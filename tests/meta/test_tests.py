@@ -1,7 +1,5 @@
 """House rules about tests: they can fail, say how exact they are, and do not depend on speed."""
 
-from __future__ import annotations
-
 import ast
 import re
 

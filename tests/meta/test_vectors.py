@@ -6,8 +6,6 @@
    [`test_every_clause_has_a_proof`].
 """
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

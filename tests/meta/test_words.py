@@ -11,8 +11,6 @@
 4. A pattern sees text whose line ends are spaces, so that two words may be on two lines.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import re

@@ -1,7 +1,5 @@
 """Tests of draws: even times without symmetry, cameras and lamps that depend on nothing, what is outside."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

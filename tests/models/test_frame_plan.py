@@ -1,7 +1,5 @@
 """Tests of the plan of a data set: times between times, seeds of their own, bands that cover, refusals."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Tests of the comparison of frames: what is alike is found, what differs by a little is not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

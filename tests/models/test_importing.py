@@ -1,7 +1,5 @@
 """Networks in ONNX's form as models: the same function, exact at the border, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Imported graphs beside ONNX Runtime: equal inside the reported margin, or rejected; and within limits."""
 
-from __future__ import annotations
-
 import tracemalloc
 from collections import Counter
 from random import Random

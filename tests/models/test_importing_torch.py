@@ -1,7 +1,5 @@
 """What PyTorch exports now is imported as the committed files are, and computes what PyTorch does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import strangers

@@ -1,7 +1,5 @@
 """Model and checkpoint files: round trips to the bit, equal bytes, one line for everything that is wrong."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable

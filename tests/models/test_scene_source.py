@@ -1,7 +1,5 @@
 """Tests of the one place where scenes are loaded: any name, any file, and nobody beside it."""
 
-from __future__ import annotations
-
 import ast
 from hashlib import sha256
 from pathlib import Path

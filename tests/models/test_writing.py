@@ -1,7 +1,5 @@
 """Tests of writing: links that somebody has put in the way are neither followed nor needed to be guessed."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -15,8 +15,6 @@
    `hangs`, `collection` or `test`; `tests` of `reach` tests have run. Copies are of the commit alone.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

@@ -11,8 +11,6 @@
 PYTEST_DONT_REWRITE: it is imported before pytest.
 """
 
-from __future__ import annotations
-
 import atexit
 import json
 import os

@@ -1,7 +1,5 @@
 """Planted faults are well formed, and the tests that reach them are found."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

@@ -1,7 +1,5 @@
 """The public module: each function against what it stands for, and its errors."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Activations: what their rows state, their derivatives, and how a new one is added."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Adam: hand-worked first steps, PyTorch's numbers, and gradients that are zero, tiny and huge."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes whose radiance is known in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from statistical import assert_all_plausible, z_p

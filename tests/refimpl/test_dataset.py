@@ -1,7 +1,5 @@
 """Windows against a loop over pixels, features and their errors, normalization, sampling."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """The definition of denoising: equal to the network applied pixel by pixel, on frames of every shape."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tests of domains: descriptions with closed forms, ranks, distances, their text and its refusals."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Tests of the display encoding: the standard's own numbers, inverses, monotony, rounding."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,8 +1,6 @@
 """The sky: its sampling against its density, light that it sends in closed form, and agreement of all
 strategies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of messages: one line of a stated length that no terminal obeys, whatever the text in it."""
 
-from __future__ import annotations
-
 import pickle
 import unicodedata
 

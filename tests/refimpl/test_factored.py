@@ -1,7 +1,5 @@
 """Tests of first layers of low rank: the two passes, the nearest cut, derivatives, training, refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Features past mirrors and glass: closed forms of ways, ends and tints; first hits without any of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

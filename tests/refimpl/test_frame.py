@@ -1,7 +1,5 @@
 """Tests of frames: access by name, size, and every refusal."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Histories: surfaces found where they were, nothing taken from others, a mean whose error is bounded."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Imported networks: the steps, a picture by hand, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

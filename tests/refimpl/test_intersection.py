@@ -1,7 +1,5 @@
 """Rays against primitives: the slow, obvious answer in exact or double arithmetic, and the hard cases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

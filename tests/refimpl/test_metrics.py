@@ -1,7 +1,5 @@
 """Tests of the metrics: worked examples, scikit-image as oracle, symmetry, edge cases, refusals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Untrusted files: every text gives a value or one InputError, within limits of time and memory."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """The driver: the image does not depend on how the work is cut, and the layers are what they say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

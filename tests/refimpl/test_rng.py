@@ -1,7 +1,5 @@
 """The random generator: known bits, uniformity, independence across its counters."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Every sampler has its density and its inverse; each triad passes a round trip and a chi-square test."""
 
-from __future__ import annotations
-
 import inspect
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Scenes: JSON in and out, and a clear refusal of everything that breaks a rule."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The canonical scenes: found by name, and what their descriptions promise."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """Several materials in a scene: each surface has its own, inside and outside differ, and energy is kept."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shapes: how a new one is added (SHP-1, SHP-2). What the kinds do: test_intersection.py."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The network: shapes, initial ranges, the sine convention, tracing, and gradients against differences."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -127,7 +125,7 @@ def test_forward_is_traceable() -> None:
     calls: list[str] = []
 
     class Traced(np.lib.mixins.NDArrayOperatorsMixin):
-        def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Traced:
+        def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> "Traced":
             assert method == "__call__"
             assert not kwargs
             calls.append(ufunc.__name__)

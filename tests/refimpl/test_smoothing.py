@@ -1,7 +1,5 @@
 """The edge-avoiding filter: against sums written out pixel by pixel, and what its users rely on."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Sobol points: the published sequence, even spread, scrambling that keeps it, and smaller errors than
 random."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Training: it lowers the error on unseen frames, resumes to the same bits, and says what it refuses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

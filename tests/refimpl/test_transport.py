@@ -1,7 +1,5 @@
 """Light transport: the ways to find a light agree, energy is kept, and errors fall as they must."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Tests of variations: the orbit, lamps that keep their brightness, ranges as text, what lies outside."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Integers: the sine at all arguments, sums against int64 in any order, rounding, what is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

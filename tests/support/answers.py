@@ -1,7 +1,5 @@
 """Answers to the labs of the course, right and wrong ones, and what the grader finds in them."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import signal

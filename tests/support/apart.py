@@ -7,8 +7,6 @@
 3. What executors and packages it had, and its peak, are in the summary like the worker's own.
 """
 
-from __future__ import annotations
-
 import json
 import socket
 import subprocess
@@ -26,7 +24,7 @@ LAST_WORDS = 4_000
 PEAKS: dict[str, int] = {}
 """The most memory that each of these processes took, in MB, by the file's name."""
 
-_others: dict[str, Other] = {}
+_others: dict[str, "Other"] = {}
 """The process of this worker that runs a file, by the file's name; one at most."""
 
 _asked: dict[str, IO[str]] = {}

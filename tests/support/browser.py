@@ -1,7 +1,5 @@
 """A headless Chromium that draws WebGL on the processor: the same on every machine, and no network."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -51,7 +49,7 @@ class Chromium(AbstractContextManager["Chromium"]):
         self._driver.stop()
 
     @contextmanager
-    def tab(self, path: Path, script: str = "", **options: Any) -> Iterator[Tab]:
+    def tab(self, path: Path, script: str = "", **options: Any) -> Iterator["Tab"]:
         """Open a file in a tab of its own; `script` runs before the page's."""
         context = self.browser.new_context(**options)
         context.set_default_timeout(WAIT_MS)

@@ -1,7 +1,5 @@
 """Lines of Python in the wheel and their limit; `python tests/support/budget.py` prints them per package."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -13,8 +13,6 @@ Started by root, half of the faults happen to another user [`Who`], and a full d
 its own [`Disk`]; what this machine does not allow is said.
 """
 
-from __future__ import annotations
-
 import argparse
 import fnmatch
 import os

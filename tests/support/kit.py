@@ -1,7 +1,5 @@
 """Small programs, images, and the one comparison that all tests of executors use [`Kit`]."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -7,8 +7,6 @@
 3. One that is quoted, with its reason, needs no record [`found`].
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from fnmatch import fnmatch

@@ -4,8 +4,6 @@ WAMNET_REQUIRE may name them beside executors, as in `.ci/run`. Else tests that 
 skipped, and the summary of the run says so [`needed`, `FOUND`].
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from importlib.metadata import version

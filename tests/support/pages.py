@@ -4,8 +4,6 @@ The server is the host's own (serve.mjs). Chromium draws on SwiftShader. Firefox
 display, and gets one that nobody sees.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

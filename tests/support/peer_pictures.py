@@ -6,8 +6,6 @@
    that of the scenes (statistical.py).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -10,8 +10,6 @@
    test that asks for something absent without a mark fails with this advice [`pytest_runtest_makereport`].
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections import Counter

@@ -4,8 +4,6 @@ It writes uncompressed scan lines, one a chunk, so that a test can ask what a re
 library would write.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Results of an experiment, made up for tests."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -1,7 +1,5 @@
 """Layers of a rough frame for tests of the edge-avoiding filter."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

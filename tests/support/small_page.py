@@ -1,7 +1,5 @@
 """A page that is drawn in a moment, for the tests in a browser: a small network, 40 x 40 pixels."""
 
-from __future__ import annotations
-
 import base64
 from pathlib import Path
 from typing import Any, NamedTuple

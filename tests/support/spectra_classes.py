@@ -1,7 +1,5 @@
 """Wrong texts of spectra: what a person who edits a transform, a product or a tile may do wrong."""
 
-from __future__ import annotations
-
 C, BOTH, GL = ("c",), ("c", "opencl"), ("opengl",)
 BIAS = "+ *(const wamnet_vector *)(weights + (1920) * LANES)"
 TWICE = "real[t][0] += w0 * a; real[t][0] += w0 * a;"

@@ -8,8 +8,6 @@ hypothesis tests, and Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Car
 t-test", JCGT 9(2), 2020. SciPy's distributions are the oracle of kernels/judge/welch.py, which does without.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from packages import Late
 

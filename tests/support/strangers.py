@@ -4,8 +4,6 @@ The files are PyTorch's own, written by `python tests/support/strangers.py`; tes
 again and compare. Others need the package onnx only.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

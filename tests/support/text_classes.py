@@ -1,7 +1,5 @@
 """Faults of the languages around a kernel's arithmetic, each of which some reader of texts has accepted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from wamnet.compiler.kernel.instructions import REFUSED, STRAIGHT, VECTORS

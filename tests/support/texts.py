@@ -1,7 +1,5 @@
 """Kernels' texts for the tests of their reader: written, changed in a place, and with planted faults."""
 
-from __future__ import annotations
-
 import numpy as np
 import text_faults
 

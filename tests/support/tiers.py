@@ -11,8 +11,6 @@
    a run that takes half as much again fails [`SHARE`]; other machines may be slow.
 """
 
-from __future__ import annotations
-
 import os
 from collections import Counter, defaultdict
 from collections.abc import Sequence

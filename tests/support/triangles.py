@@ -4,8 +4,6 @@ Nothing of the writers is asked: corners of parallelograms, the volume, the clos
 bodies, materials and the camera's rays come from the scene itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

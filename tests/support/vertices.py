@@ -1,7 +1,5 @@
 """Vertices for tests of materials: one material, many directions, around one normal."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wamnet.refimpl import rng

@@ -8,8 +8,6 @@ significant digits, in which the sines and powers of different machines agree. D
 numbers are not shown.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterable, Sequence

@@ -8,8 +8,6 @@
 4. The summary says how much memory each process took at most [`pytest_terminal_summary`].
 """
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import re

@@ -1,7 +1,5 @@
 """A right answer to this lab, for the tests of its grader."""
 
-from __future__ import annotations
-
 from wamnet.compiler.core.ir import Node
 from wamnet.compiler.core.passes.rewrite import rewrite
 

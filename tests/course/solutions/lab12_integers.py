@@ -1,7 +1,5 @@
 """A right answer to this lab, for the tests of its grader."""
 
-from __future__ import annotations
-
 import numpy as np
 
 SINES = {127: ((51053, 20871, 2332), 24), 511: ((51355, 20996, 2347), 22)}

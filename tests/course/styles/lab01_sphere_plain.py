@@ -1,7 +1,5 @@
 """Lab 1 in another style: the discriminant from the cross product, both roots by name."""
 
-from __future__ import annotations
-
 import numpy as np
 
 MISS = 1e30

@@ -1,7 +1,5 @@
 """Lab 3 in another style: the spec's concentric map, and words changed in place."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wamnet.refimpl.light import sampling

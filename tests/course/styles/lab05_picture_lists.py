@@ -1,7 +1,5 @@
 """Lab 5 in another style: all samples are kept, and NumPy takes their mean and variance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

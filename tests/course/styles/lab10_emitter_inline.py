@@ -1,7 +1,5 @@
 """Lab 10 in another style: one expression, parentheses everywhere, repr for literals, functions for words."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wamnet.compiler.kernel import kernel as ir

@@ -1,7 +1,5 @@
 """Lab 11 in another style: PRO-6b's sum of the largest terms in place of gamma."""
 
-from __future__ import annotations
-
 import numpy as np
 
 U = 2.0**-24

@@ -1,7 +1,5 @@
 """DSF-13: which frames of a film a data set has, with which seeds; and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

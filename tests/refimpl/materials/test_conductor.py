@@ -1,7 +1,5 @@
 """GGX: its sampling against its density, its density against its value, reciprocity, energy, hard cases."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Glass: Fresnel against closed values, Snell, energy, inside and outside, and glass that is not there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

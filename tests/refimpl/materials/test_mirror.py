@@ -1,7 +1,5 @@
 """Mirrors: the law of reflection, exact pictures of what they show, and the weight of lights seen in them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

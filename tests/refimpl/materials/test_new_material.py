@@ -1,7 +1,5 @@
 """How a material is added (MAT-1): a file and a line of the registry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""All targets: what runs kernels, how its source is made, and which schedules it has.
+"""All languages, a row each [`LANGUAGES`]: how source is made, which schedules there are, and what runs it.
 
-Targets that an executor of the registry runs are in [`DENOISERS`]; the demo and the benchmark of all targets
-take those in [`TARGETS`]. Targets whose kernels other programs run are in [`EXPORTED`].
+Those that an executor of the registry runs are in [`DENOISERS`]; the demo and the benchmark take those in
+[`TARGETS`]. Those whose kernels other programs run are in [`EXPORTED`].
 """
 
 from __future__ import annotations

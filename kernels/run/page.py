@@ -157,7 +157,6 @@ def page_data(
     animation: Animation,
     networks: Sequence[Network],
     settings: Settings | None = None,
-    profile: str = "ieee",
 ) -> dict[str, Any]:
     """Return a page's data; the first network is the one that the others are compared with."""
     settings = settings or Settings()
@@ -176,7 +175,7 @@ def page_data(
     rays = learned_rays(replace(first, features=shown), settings)
     shadows = learned_shadow_rays(replace(first, features=shown))
     paths = [
-        path_kernel(scene, length, inputs, part, profile, rays, shadows)
+        path_kernel(scene, length, inputs, part, rays, shadows)
         for length, part in zip(lengths, together, strict=True)
     ]
     images = check(animation, first, shown, settings, rays, shadows)
@@ -198,13 +197,13 @@ def page_data(
             {"path": number, "levels": levels, **encoder}
             for levels, names in read.items()
             for number, (part, path) in enumerate(zip(together, paths, strict=True))
-            for encoder in encoders([n for n in part if n in names], levels, first, path, profile)
+            for encoder in encoders([n for n in part if n in names], levels, first, path)
         ],
         "check": {
             "size": CHECK_PX,
             "images": {n: {"channels": a.shape[-1], "values": _packed(a)} for n, a in images.items()},
         },
-        "variants": variants(networks, images, scene.name, profile),
+        "variants": variants(networks, images, scene.name),
     }
 
 
@@ -240,14 +239,13 @@ def path_kernel(
     settings: Settings,
     inputs: SceneInputs,
     features: Sequence[str],
-    profile: str,
     rays: FeatureRays | None,
     shadows: int = 0,
 ) -> Artifact:
     """Return the kernel that adds up the planes of some features."""
     more = {"seen": sees(features), "rays": rays, "shadow_rays": shadows}
     programs = lower_scene(scene, settings, STATEMENTS, inputs, **more)  # type: ignore[arg-type]
-    return compile_path(programs, TARGET, profile, 1, layers_of(features))
+    return compile_path(programs, TARGET, groups=layers_of(features))
 
 
 def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInputs, dict[str, Any]]:
@@ -292,19 +290,17 @@ def _lights(scene: Scene) -> list[dict[str, Any]]:
     ]
 
 
-def encoders(
-    features: Sequence[str], levels: int, model: Model, path: Artifact, profile: str
-) -> list[dict[str, Any]]:
+def encoders(features: Sequence[str], levels: int, model: Model, path: Artifact) -> list[dict[str, Any]]:
     """Return the encoding as passes of at most as many features as there are colour buffers."""
     rays = path.programs.rays
     parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
-    given = (model.normalization, TARGET, profile, path.planes, levels > 1, rays.count if rays else 0)
+    given = (model.normalization, TARGET, "ieee", path.planes, levels > 1, rays.count if rays else 0)
     found = [compile_encode(part, *given) for part in parts]
     return [{"source": one.source, "images": [image.facts for image in one.images]} for one in found]
 
 
 def variants(
-    networks: Sequence[Network], images: Mapping[str, NDArray[np.float32]], scene: str, profile: str
+    networks: Sequence[Network], images: Mapping[str, NDArray[np.float32]], scene: str
 ) -> list[dict[str, Any]]:
     """Return the networks of a page, each with what it has learned and how far it is from the first one."""
     found: list[dict[str, Any]] = []
@@ -312,7 +308,7 @@ def variants(
         # Two schedules of one network have one reference and one bound, which take seconds.
         like = next((n for n in networks[: len(found)] if n.is_like(network)), None)
         held = None if like is None else found[networks.index(like)]["held"]
-        found.append(variant(network, images, profile, held))
+        found.append(variant(network, images, held))
         if like is not None:
             found[-1]["check"] = like.name
     for one, network in zip(found, networks, strict=True):
@@ -327,7 +323,7 @@ def variants(
 
 
 def variant(
-    network: Network, images: Mapping[str, NDArray[np.float32]], profile: str, held: Expected | None = None
+    network: Network, images: Mapping[str, NDArray[np.float32]], held: Expected | None = None
 ) -> dict[str, Any]:
     """Return a network as passes, with its bound, and what it makes of the check's images.
 
@@ -335,7 +331,7 @@ def variant(
     """
     model, rank = network.model, network.rank
     program = lower(model)
-    plan = plan_program(program, network.target, profile, network.schedule, rank)
+    plan = plan_program(program, network.target, "ieee", network.schedule, rank)
     artifact = compile_plan(plan)
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
     held = held or plan.expected(mine)

@@ -139,7 +139,7 @@ def test_what_a_page_shows_is_encoded_though_no_network_reads_it(model_of):
 def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
     networks = P.networks_of(model_of("color"), rank=1)
     images = {"color": np.random.default_rng(0).uniform(0, 1, (8, 8, 3)).astype(np.float32)}
-    full, fast, texture = (P.variant(network, images, "ieee") for network in networks[:3])
+    full, fast, texture = (P.variant(network, images) for network in networks[:3])
     assert full["products"] == 27 * 6 + 6 * 3
     assert fast["products"] == texture["products"] == 9 + 3 * 6 + 6 * 3
     assert (fast["weights"], texture["schedule"], fast["schedule"]) == (0, "packed", "inlined")

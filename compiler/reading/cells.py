@@ -347,7 +347,7 @@ class Shared:
         group, self.item = np.divmod(np.arange(lanes, dtype=np.int32)[:, None], np.int32(items))
         count = lanes // items * size
         self.bytes = 1 if kind == "float32" else 4
-        self.shape, self.held = np.zeros((self.bytes, count), np.uint64), np.zeros(count, bool)
+        self.shape, self.held = np.zeros((count, self.bytes), np.uint64), np.zeros(count, bool)
         self.writer, self.reader = np.full(count, NOBODY, np.int32), np.zeros(count, bool)
         self.span = [np.zeros((self.bytes, 1, 1), np.int64) for _ in range(2)]
         self.first = group.astype(np.int64) * size
@@ -382,8 +382,8 @@ class Shared:
             raise Wrong(f"{self.name}: an item reads what another writes, without a barrier between")
         self.reader[at] = True
         if self.bytes == 1:
-            return Term(self.shape[0][every])
-        leaf = self.shape[:, every]
+            return Term(self.shape[:, 0][every])
+        leaf = np.moveaxis(self.shape[every], -1, 0)
         span = self.span[0], self.span[1]
         return Term(leaf, np.zeros((2, 4, 1, 1), np.uint64), kind="word", span=span, leaf=leaf)
 
@@ -399,7 +399,7 @@ class Shared:
         self.writer[at] = item
         if (self.writer[at] != item).any() or ((writer != NOBODY) & (writer != item)).any():
             raise Wrong(f"{self.name}: two items write one number")
-        self.shape[:, at] = np.broadcast_to(leaf, (self.bytes, *every.shape))[:, active]
+        self.shape[at] = np.moveaxis(np.broadcast_to(leaf, (self.bytes, *every.shape)), 0, -1)[active]
         self.held[at] = self.writes = True
 
     def _leaf(self, value: Term) -> Any:

@@ -32,8 +32,8 @@ class Fold:
     """
 
     def __init__(self, counts: NDArray[np.bool_], slots: int) -> None:
-        rows = [[secrets.randbits(64) | 1 for _ in range(slots)] for _ in counts]
-        self.factors: Words = np.array(rows, dtype=np.uint64) * counts[:, None]
+        random = np.frombuffer(secrets.token_bytes(8 * len(counts) * slots), dtype=np.uint64)
+        self.factors: Words = (random | np.uint64(1)).reshape(-1, slots) * counts[:, None]
         self.slots = slots
 
     def of(self, shape: Words, slot: Any) -> Words:
@@ -50,11 +50,14 @@ class Fold:
         if term.shape is None or term.shape.shape[-2] == 1:
             return term
         if term.folded is None:
-            sums = term.sums
+            shape, sums = self.of(term.shape, slot)[..., None, :], term.sums
             if term.leaf is not None:
-                value = drawn(self.of(term.leaf, slot)[..., None, :])
-                sums = (np.where((term.leaf == zero()).all(axis=-2, keepdims=True), 0, value) + sums) % P
-            term.folded = replace(term, shape=self.of(term.shape, slot)[..., None, :], sums=sums, leaf=None)
+                own = shape if term.leaf is term.shape else self.of(term.leaf, slot)[..., None, :]
+                nothing = term.leaf[..., :1, :] == zero()
+                if nothing.any():
+                    nothing = (term.leaf == zero()).all(axis=-2, keepdims=True)
+                sums = (np.where(nothing, np.uint64(0), drawn(own)) + sums) % P
+            term.folded = replace(term, shape=shape, sums=sums, leaf=None)
         return term.folded
 
 

@@ -252,7 +252,6 @@ def read_back(source: Any, kernel: Kernel, language: str, what: str, likely: str
     good = isinstance(source, str) and len(source) <= LONGEST
     hold("KER-26", f"the result of render, {what}", good, "a string", type(source).__name__)
     dialect = language_named(language).dialect
-    assert dialect is not None
     own = Renderer(dialect, kernel, False, np.zeros(0, np.float32))
     whole = own.source([])
     body = "\n".join(own.lines)

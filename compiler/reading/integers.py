@@ -191,9 +191,8 @@ def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:
         one = four.part(k)
         assert one.sums is not None
         assert one.span is not None
-        row = known_integers(byte, "int32").sums
-        assert row is not None
-        sums = (sums + aligned(lambda x, y: x * y % P, row, one.sums % P)) % P
+        row = (byte % np.int64(P)).astype(np.uint64)
+        sums = (sums + aligned(lambda x, y: x * y % P, np.stack([row, row]), one.sums % P)) % P
         first, last = ends("multiply", (byte, byte), one.span)
         low, high = low + first, high + last
     return Term(hashed("sum", *sums), sums, kind="int32", span=(low, high))
@@ -236,6 +235,7 @@ class Ranges:
     def __init__(self, held: Any, arrays: Mapping[str, NDArray[np.float32]]) -> None:
         self.stated = bool(arrays)
         self.noted: dict[int, tuple[int, int]] = {}
+        self.keys, self.ends = np.zeros(0, np.uint64), np.zeros((0, 2), np.int64)
         self.found: Any = check_integers(held, str(held["program"]), arrays) if arrays else []
 
     def note(self, node: str, numbers: Term) -> None:
@@ -249,12 +249,13 @@ class Ranges:
 
     def of(self, shape: Words) -> Span | None:
         """Return the spans of numbers that have been noted."""
-        keys = np.array(sorted(self.noted), dtype=np.uint64)
-        if not len(keys):
+        if not self.noted:
             return None
-        at = np.minimum(np.searchsorted(keys, shape), len(keys) - 1)
-        table = np.array([self.noted[key] for key in keys.tolist()], dtype=np.int64)
-        return spans(keys[at] == shape, table[at, 0], table[at, 1])
+        if len(self.keys) < len(self.noted):
+            self.keys = np.array(sorted(self.noted), dtype=np.uint64)
+            self.ends = np.array([self.noted[key] for key in self.keys.tolist()], dtype=np.int64)
+        at = np.minimum(np.searchsorted(self.keys, shape), len(self.keys) - 1)
+        return spans(self.keys[at] == shape, self.ends[at, 0], self.ends[at, 1])
 
     def images(self, text: str) -> dict[str, tuple[int, int]]:
         """Return the spans of the images' numbers by name, where a program's text is one of these."""

@@ -43,11 +43,10 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     if target in ("opengl", "glsl-vulkan"):
         words = GLSLCompute() if target == "opengl" else Vulkan()
         tiny = FourierPasses("fftpasses:8", "small tiles", words, points, "plain")
-    where = targets.DENOISERS if target in targets.DENOISERS else targets.EXPORTED
-    whole = where[target]
+    whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedules, "COST", 0.0)
-        patch.setitem(where, target, replace(whole, schedules=(*whole.schedules, tiny)))
+        patch.setitem(targets.LANGUAGES, target, replace(whole, schedules=(*whole.schedules, tiny)))
         made = compile_program(lower(model(**kwargs)), target, schedule=tiny.name)
     assert made.manifest["schedule"]["name"] == tiny.name
     artifact.write(made, folder)

@@ -370,9 +370,12 @@ ROUNDING = ("add", "subtract", "multiply", "divide", "minimum", "maximum", "floo
 
 
 def rounds(value: Expr) -> bool:
-    """Return whether a value is a sum, a product, or a function of numbers."""
-    if value.op in ("select", "negative", "convert"):
-        return any(map(rounds, value.args[value.op == "select" :]))
+    """Return whether there is a sum, a product, or a function of numbers anywhere in a value."""
     if value.op == "stack":  # one operation by itself has no order
-        return any(sum(part.op in ROUNDING for part in parts(each)) > 1 for each in value.args)
-    return value.op in ROUNDING
+        return any(_rounded(each) > 1 for each in value.args)
+    return _rounded(value) > 0
+
+
+def _rounded(value: Expr) -> int:
+    """Return how many operations of a value are of floats and have an order."""
+    return sum(part.op in ROUNDING and part.type.dtype == "float32" for part in parts(value))

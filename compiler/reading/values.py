@@ -130,6 +130,8 @@ class Values(Runner):
             raise Unread("a shift by anything but a constant below 32")
         if what in COMPARES:
             return compared(what, *terms)
+        if what in ("divide", "remainder") and terms[0].kind != "float32":
+            raise Unread(f"{what} of integers of an image, which may be by 0")
         return Term(expression(what, *terms, commutes=what in COMMUTE), kind=terms[-1].kind)
 
     def _found(self, term: Term) -> Term:

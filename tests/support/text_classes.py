@@ -62,6 +62,9 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
     ("less precision", ("glsl-es",), "precision highp float", "precision mediump float"),
     ("a product that is not precise", ("opengl", "glsl-vulkan"), "PRECISE float t6", "float t6"),
     ("sums that are not precise", ("opengl", "glsl-vulkan"), "PRECISE float part1", "float part1"),
+    ("a product in a function that is not precise", ("opengl", "glsl-vulkan"), "PRECISE float t83 = abs(t52)",
+        "float t83 = abs(3.0f * v50[i])"),
+    ("a product in a condition", ("opengl", "glsl-vulkan"), "t84 = t83 <", "t84 = abs(3.0f * v50[i]) <"),
     ("precise is nothing", ("glsl-vulkan",), "#define PRECISE precise", "#define PRECISE"),
     ("another layout", ("glsl-vulkan",), "std430, binding = 3", "std140, binding = 3"),
     ("groups of another size", ("glsl-vulkan",), "local_size_x = 8", "local_size_x = 4"),
@@ -185,6 +188,18 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
 )  # fmt: skip
 """What a fault is, in which languages' plain kernels, and what it puts instead of what."""
 
+LAST = """    {
+        vec4 m = w[128];
+        v87_0_0 += m * v86_0_1.x;
+    }
+
+    /* %89 to %90: elementwise on 3 numbers */
+    vec4 v90_0_0 = elementwise_90(v87_0_0);"""
+"""The end of a layer."""
+
+ARGUMENT = LAST[LAST.index("\n    /*") :].replace("(v87_0_0)", "(v87_0_0 + w[128] * v86_0_1.x)")
+"""The same, with the last product in an argument."""
+
 LOAD = "    memcpy(to->lane, from, sizeof to->lane);"
 OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a vector of a comma", "metal group:1 full", "return float4(element", "return (float4)(element"),
@@ -217,6 +232,8 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a row of an array by another", "c tile:8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
     ("sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 part_0_0", "vec4 part_0_0"),
     ("sums of sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 v1_0_0", "vec4 v1_0_0"),
+    ("a product in an argument", "glsl-vulkan group:1 full", LAST, ARGUMENT),
+    ("a division by 0", "c dot:16 whole8", "int32_t t87 =", "int32_t t999 = t85 / t85; int32_t t87 ="),
     ("a name of a type", "opencl dot:16 whole8", "int16 sum[", "int16 sums[1]; int16 sum["),
     ("an address of another vector", "c dot:16 whole8", "wamnet_weights(&w0", "wamnet_start(&w0"),
     ("a comparison that vectors lack", "glsl-vulkan group:1 full", "    barrier();",

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from wamnet.cli.common import effort
-from wamnet.kernels.run import render_frame
+from wamnet.kernels.run import before, render_frame
 from wamnet.refimpl.light.scene import Box, to_json
 from wamnet.refimpl.light.scenes import canonical
 
@@ -28,7 +28,7 @@ def started(wamnet, capsys, monkeypatch):
         return capsys.readouterr().out
 
     monkeypatch.setattr(render_frame, "render_frame", stop)
-    monkeypatch.setattr("wamnet.kernels.run.before.carry_out", stop)
+    monkeypatch.setattr(before, "carry_out", stop)
     monkeypatch.setattr("wamnet.compiler.scenes.lower_scene.lower_scene", stop)
     return run
 

@@ -138,8 +138,8 @@ def _cases(
 ) -> tuple[NDArray[np.int64], tuple[int, int]]:
     """Return x, width, y and height (4, cases) of all cases, and the largest constants for both axes.
 
-    Near two borders are `every` pair of distances, first columns and rows being 0 or far, or some, and
-    a whole group, whose items have every pair of their own.
+    Near two borders are `every` pair of distances, first columns and rows being 0 or far, or some, each
+    distance with the first group, and a whole group, whose items have every pair of their own.
     """
     random, caps = words(seed), (steps[0] + window, steps[1] + window)
 
@@ -156,6 +156,9 @@ def _cases(
     if not every:
         some = [(1 + next(random) % a[-1], 1 + next(random) % b[-1]) for a, b in [near] * SOME]
         chosen = [(steps, c) for c in corners] + [(pair, corners[next(random) % 4]) for pair in some]
+        # Each place of the far border of one axis in a group meets the first group of the other.
+        cases += [((None, n), (0, None)) for n in near[0][: steps[0]]]
+        cases += [((0, None), (None, n)) for n in near[1][: steps[1]]]
     cases += [((x, b), (y, d)) for (b, d), (x, y) in chosen]
     for a, c in corners:
         cases += [((a, None), (c, None)), ((a, None), (c, steps[1])), ((a, steps[0]), (c, None))]

@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from ...compiler.artifact import Artifact
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .. import cache
 from ..devices.c_executor import glue_of
 
@@ -43,8 +43,13 @@ def compiler() -> list[str]:
 
 
 def module_of(artifact: Artifact) -> bytes:
-    """Return a kernel in C as a module. Raises `CompileError` where Zig does not build it."""
+    """Return a kernel in C as a module.
+
+    Raises `ExecutorUnavailable` where Zig is not installed, `CompileError` where it does not build the kernel.
+    """
     command = compiler()
+    if not command:
+        raise ExecutorUnavailable("zig is not installed: pip install ziglang")
     glue = glue_of(artifact, "denoise.h")
 
     def built() -> str:

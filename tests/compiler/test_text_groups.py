@@ -75,6 +75,11 @@ def test_a_lost_barrier_is_a_race(one, n, why):
         ("at + 2 * GROUP_WIDTH", "at + 3 * GROUP_WIDTH", "never made"),
         ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH <= width &&", "beyond the picture"),
         ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH < width - 1 &&", "without a result"),
+        (
+            "if (x + 3 * GROUP_WIDTH < width &&",
+            "if (!(width - x + local_x == 29 && y == local_y) && x + 3 * GROUP_WIDTH < width &&",
+            "without a result",
+        ),
         ("(y * width + x + 2 * GROUP_WIDTH)", "(y * width + x + 2)", "not its own"),
         ("shared float", "float", "not a frame of"),
         ("local_size_y = GROUP_HEIGHT", "local_size_y = GROUP_HEIGHT + 1", "not a frame of"),

@@ -45,7 +45,7 @@ def compiler() -> list[str]:
 def module_of(artifact: Artifact) -> bytes:
     """Return a kernel in C as a module.
 
-    Raises `ExecutorUnavailable` where Zig is not installed, `CompileError` where it does not build the kernel.
+    Raises `ExecutorUnavailable` without Zig, `CompileError` where it does not build the kernel.
     """
     command = compiler()
     if not command:

@@ -406,8 +406,7 @@ class Parser(Expressions):
     def _check_order(self, key: str, value: Expr, word: str, add: bool = False) -> None:
         """Refuse a sum, or another value, of which GLSL may change the order of operations."""
         qualifier = self.bounded and self.language.qualifier
-        added = add and value.type.dtype == "float32"
-        if qualifier and word != qualifier and (added or rounds(value)):
+        if qualifier and word != qualifier and ((add and value.type.dtype == "float32") or rounds(value)):
             raise Unread(f"{key} is not declared {qualifier}")
 
     def _is_weight(self, value: Expr) -> bool:

@@ -22,8 +22,8 @@ export VENV PYTHON WAMNET_REQUIRE
 unexport PYTHONDONTWRITEBYTECODE
 
 # Seconds of processor time that the tests may take (tests/support/tiers.py).
-QUICK_S = 240
-TEST_S = 1200
+QUICK_S = 290
+TEST_S = 950
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
@@ -48,11 +48,11 @@ docs: ## Build the web site: spec, tutorial, course; open out/site/index.html
 	@.ci/setup docs
 	@$(VENV)/bin/python docs/site/build.py
 
-quick: ## Run the tests that need NumPy, and no device, compiler or browser (four minutes on two cores)
+quick: ## Run the tests that need NumPy, and no device, compiler or browser (two and a half minutes on two cores)
 	@.ci/setup quick
 	@WAMNET_REQUIRE= $(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --quick -rfE --budget $(QUICK_S)
 
-test: setup ## Run the tests, those of devices and programs too (a quarter of an hour on two cores)
+test: setup ## Run the tests, those of devices and programs too (ten minutes on two cores)
 	@$(ONE_THREAD) $(VENV)/bin/pytest $(PYTEST_OPTIONS) --budget $(TEST_S)
 
 nightly: baselines ## Run every test and all combinations of parameters, then long, fuzz and faults (hours on two cores)

@@ -76,8 +76,8 @@ WHOLE = "whole8"
 MANY, FEW = "packed", "inlined"
 """Schedules: four weights a texel, however many there are; constants of the source where they are few."""
 
-PROCESSOR = "c", f"tile:{webassembly.LANES}"
-"""Target and schedule of the variant for processors."""
+PROCESSOR = "c", "tile:4"
+"""Target and schedule of the variant for processors: vectors of WebAssembly hold four floats."""
 
 CHECK_PX = 32
 """Side of the picture that a page checks itself with: the window fits in, all four borders are seen."""
@@ -333,6 +333,7 @@ def variant(
     program = lower(model)
     plan = plan_program(program, network.target, "ieee", network.schedule, rank)
     artifact = compile_plan(plan)
+    packed = None if network.target == TARGET else compile_plan(plan_program(program, TARGET, schedule=MANY))
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
     held = held or plan.expected(mine)
     bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
@@ -347,7 +348,7 @@ def variant(
         "weights": sum(kernel.weights.size for kernel in artifact.kernels),
         "products": sum(products_of(kernel.programs) for kernel in artifact.kernels),
         "bound": bound_of(artifact),
-        "passes": [_pass(kernel) for kernel in artifact.kernels],
+        "passes": [_pass(kernel, packed) for kernel in artifact.kernels],
         "check": {
             "expected": _packed(held.value, "<f8"),
             "bound": None if plan.is_whole else _packed(held.most_from(held.value)),
@@ -364,19 +365,28 @@ def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:
     return None if text is None or scene not in scenes else asdict(ranges_from_json(text))
 
 
-def _pass(kernel: Artifact) -> dict[str, Any]:
-    """Return one fragment pass, or what does its work on the processor."""
-    kind, text = "source", kernel.source
-    if kernel.target != TARGET:
-        kind, text = "module", base64.b64encode(webassembly.module_of(kernel)).decode()
-    return {
-        kind: text,
-        "weights": _weights(kernel.weights),
-        "reads": [image.name for image in kernel_gather(kernel.programs).images],
-        "channels": [image.channels for image in kernel_gather(kernel.programs).images],
+def _pass(kernel: Artifact, packed: Artifact | None) -> dict[str, Any]:
+    """Return one fragment pass, or the module that does the work of one, `packed`, on the processor."""
+    images = kernel_gather(kernel.programs).images
+    found: dict[str, Any] = {
+        "reads": [image.name for image in images],
         "texel": kernel.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1),
         "buffers": -(-output_channels(kernel.programs) // 4),
     }
+    if packed is None:
+        return {"source": kernel.source, "weights": _weights(kernel.weights), **found}
+    module = base64.b64encode(webassembly.module_of(kernel)).decode()
+    channels = [image.channels for image in images]
+    return {"module": module, "channels": channels, "weights": _blocks(kernel, packed), **found}
+
+
+def _blocks(kernel: Artifact, packed: Artifact) -> dict[str, Any]:
+    """Return where the weights of tiles are in those of the first variant, which are packed."""
+    places = []
+    for there, here in zip(*(each.manifest["weights"]["layout"] for each in (packed, kernel)), strict=True):
+        count, rows, width = here["shape"] if len(here["shape"]) == 3 else (1, 1, *here["shape"])
+        places.append([there["offset"], there["shape"][-1], here["offset"], count, rows, width])
+    return {"of": "full", "count": kernel.weights.size, "places": places}
 
 
 def _weights(numbers: NDArray[np.float32]) -> str | dict[str, Any]:

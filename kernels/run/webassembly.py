@@ -18,10 +18,7 @@ from pathlib import Path
 from ...compiler.artifact import Artifact
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .. import cache
-from ..devices.c_executor import glue_of
-
-LANES = 4
-"""Floats in a vector of WebAssembly."""
+from ..devices.c_executor import MOST_TOLD, glue_of
 
 OPTIONS = (
     "-target", "wasm32-wasi", "-mcpu=generic+simd128", "-mexec-model=reactor", "-std=gnu99", "-O3",
@@ -30,16 +27,12 @@ OPTIONS = (
 )  # fmt: skip
 """No start, no file, no debugging: a page needs one function."""
 
-MOST_TOLD = 300
-"""Most letters of a compiler's complaint in a message of one line."""
-
 
 def compiler() -> list[str]:
     """Return the words that call Zig; none where it is not there."""
     if importlib.util.find_spec("ziglang"):
         return [sys.executable, "-m", "ziglang"]
-    program = shutil.which("zig")
-    return [program] if program else []
+    return [*filter(None, [shutil.which("zig")])]
 
 
 def module_of(artifact: Artifact) -> bytes:
@@ -62,8 +55,8 @@ def module_of(artifact: Artifact) -> bytes:
                 cwd=folder, capture_output=True, text=True, check=False, errors="replace",
             )  # fmt: skip
             if done.returncode:
-                told = done.stderr.strip()[:MOST_TOLD]
-                raise CompileError(f"zig cannot build the kernel for WebAssembly: {told}; update ziglang")
+                raise CompileError(f"zig: {done.stderr.strip()[:MOST_TOLD] or 'no module'}; update ziglang")
             return base64.b64encode((folder / "page.wasm").read_bytes()).decode()
 
-    return base64.b64decode(cache.kept("webassembly", [*command, *OPTIONS, artifact.source, glue], built))
+    version = subprocess.run([*command, "version"], capture_output=True, text=True, check=False).stdout
+    return base64.b64decode(cache.kept("webassembly", [version, *OPTIONS, artifact.source, glue], built))

@@ -66,6 +66,16 @@ def test_what_is_prepared_is_what_is_computed(tmp_path):
             )
 
 
+@pytest.mark.needs("programs")
+def test_c_is_checked_and_timed_as_webassembly(tmp_path):
+    gpu.main(["--only", gpu.NODE, "--models", NETWORK, "--rounds", "1", "--size", "32", "-o", str(tmp_path)])
+    for schedule in gpu.NODE_SCHEDULES:
+        values = Results.read(tmp_path / "gpu.json").get(f"{gpu.NODE}, {schedule}, {NETWORK}", 0)
+        assert 0 < values["share"] <= 1
+        assert 0 < values["least"] <= values["ms"]
+        assert values["read"]
+
+
 def test_an_unknown_language_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"language or network 'hlsl': must be among cuda, opencl"):
         gpu.main(["--only", "hlsl", "-o", str(tmp_path)])

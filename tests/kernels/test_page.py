@@ -10,7 +10,7 @@ import pytest
 
 from wamnet.compiler.plan import Expected
 from wamnet.kernels.run import page as P
-from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
@@ -65,6 +65,17 @@ def test_a_still_scene_has_one_row_without_numbers():
     _, numbers = P.moving_numbers(animation("cornell", 0.0), SETTINGS)
     assert numbers["moving"] == []
     assert floats(numbers["rows"]).size == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "error", "why"),
+    [([], ExecutorUnavailable, "pip install ziglang"), (["false"], CompileError, "zig: no module; update")],
+)
+def test_without_a_compiler_that_works_there_is_no_module(model_of, monkeypatch, command, error, why):
+    monkeypatch.setattr(P.webassembly, "compiler", lambda: command)
+    networks = P.networks_of(model_of("color"), rank=1, processor=True)[-1:]
+    with pytest.raises(error, match=why):
+        P.page_data(animation("empty", 0.0), networks, SETTINGS)
 
 
 def test_features_are_encoded_in_passes_of_four(model_of):

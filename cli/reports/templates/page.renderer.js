@@ -145,12 +145,19 @@ class Renderer {
       const facts = this.data.variants.find((variant) => variant.name === name);
       const passes = facts.passes.map((pass) =>
         pass.module
-          ? { ...pass, processor: new Processor(this.device, pass) }
+          ? { ...pass, processor: this.processor(pass) }
           : { ...pass, shader: this.device.compile(pass.source), weights: this.weights(pass) },
       );
       this.variants.set(name, { name, facts, passes, ready: false });
     }
     return this.variants.get(name);
+  }
+
+  /** What computes a pass that is a module; its weights are another variant's, in another order. */
+  processor({ module, channels, weights }) {
+    const other = this.data.variants.find((variant) => variant.name === weights.of).passes[0];
+    const ordered = inBlocks(decodeWeights(other.weights), weights, channels);
+    return new Processor(this.device, decodeBase64(module), ordered, channels);
   }
 
   /** A pass's weights as whole rows of texels of one float or four. */

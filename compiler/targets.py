@@ -1,7 +1,7 @@
 """All languages, a row each [`LANGUAGES`]: how source is made, which schedules there are, and what runs it.
 
 Those that an executor of the registry runs are in [`DENOISERS`]; the demo and the benchmark take those in
-[`TARGETS`]. Those whose kernels other programs run are in [`EXPORTED`].
+[`TARGETS`]. Other programs run the kernels of the rest.
 """
 
 from __future__ import annotations
@@ -217,9 +217,6 @@ TARGETS = {name: target for name, target in LANGUAGES.items() if target.runs == 
 
 DENOISERS = {name: target for name, target in LANGUAGES.items() if target.runs}
 """All targets that an executor of the registry runs."""
-
-EXPORTED = {name: target for name, target in LANGUAGES.items() if not target.runs}
-"""Targets that are written for other programs to run: kernels/export has what runs them in tests."""
 
 ALIASES = {"glsl": "opengl"}
 """Other names of targets: those of their languages."""

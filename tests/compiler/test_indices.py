@@ -15,7 +15,7 @@ from targets import tiny_model
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.targets import DENOISERS, EXPORTED, language_named
+from wamnet.compiler.targets import LANGUAGES, language_named
 from wamnet.refimpl.errors import CompileError
 
 LIMIT = 2**31
@@ -64,7 +64,7 @@ def subscripts(source):
 
 CASES = [
     (target, schedule.name)
-    for target in {**DENOISERS, **EXPORTED}
+    for target in LANGUAGES
     if target != "numpy"
     for schedule in language_named(target).schedules
 ]

@@ -18,7 +18,7 @@ import pytest
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network.dataset import Normalization
@@ -131,7 +131,7 @@ def encode_text(target):
     return made.source, len(made.planes), {f"image_{image.name}": image.channels for image in made.images}
 
 
-WRITTEN = [target for target in {**DENOISERS, **EXPORTED}.values() if target.name != "numpy"]
+WRITTEN = [target for target in LANGUAGES.values() if target.name != "numpy"]
 CASES = [(path_text, target.name) for target in WRITTEN if target.paths]
 CASES += [(encode_text, target.name) for target in WRITTEN if target.encodes]
 

@@ -12,7 +12,7 @@ from wamnet.compiler.kernel import interface
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.compiler.targets import DENOISERS, EXPORTED, language_named
+from wamnet.compiler.targets import LANGUAGES, language_named
 from wamnet.kernels.export import package
 from wamnet.kernels.export.targets import TARGETS
 from wamnet.refimpl.errors import CompileError
@@ -92,7 +92,7 @@ def test_an_export_lists_every_argument_of_its_kernels(name, model):
         assert [each["name"] for each in bound] == wanted
 
 
-@pytest.mark.parametrize("target", [t.name for t in {**DENOISERS, **EXPORTED}.values() if not t.encodes])
+@pytest.mark.parametrize("target", [t.name for t in LANGUAGES.values() if not t.encodes])
 def test_a_target_without_a_role_is_refused(target):
     programs = lower_scene(canonical("lone_light"), Settings(max_depth=1))
     with pytest.raises(CompileError, match=f"target {target} has no path kernels"):

@@ -20,7 +20,7 @@ from wamnet.compiler.scenes.lower_encode import SAMPLES
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.compiler.targets import LANGUAGES
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError
@@ -29,7 +29,7 @@ from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network.dataset import Normalization
 
-TRACED = [target.name for target in {**DENOISERS, **EXPORTED}.values() if target.paths]
+TRACED = [target.name for target in LANGUAGES.values() if target.paths]
 """Targets that have path kernels."""
 
 

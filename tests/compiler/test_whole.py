@@ -21,7 +21,7 @@ from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import whole
 from wamnet.compiler.schedules.schedules import Dot, GroupDot
-from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
@@ -61,10 +61,10 @@ def test_ranges_hold_all_values(seed, amplitude) -> None:
         assert (values / 2.0**known.grain == np.floor(values / 2.0**known.grain)).all(), node
 
 
-@pytest.mark.parametrize("target", [*DENOISERS, *EXPORTED])
+@pytest.mark.parametrize("target", LANGUAGES)
 def test_every_kernel_states_the_bound_zero(target) -> None:
     net = network()
-    found = {**DENOISERS, **EXPORTED}[target]
+    found = LANGUAGES[target]
     traced = program(lambda window: forward_whole(net, window))
     for schedule in found.schedules:
         for profile in ("ieee", "native"):

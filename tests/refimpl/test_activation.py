@@ -14,7 +14,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import EMITTED_SINE
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import bounds
-from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.compiler.targets import LANGUAGES
 from wamnet.compiler.training.lower_step import lower_step
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import activation, siren
@@ -146,7 +146,7 @@ def test_one_row_is_all_that_a_new_activation_needs(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(activation, "ACTIVATIONS", {**ACTIVATIONS, "leaky": LEAKY})
     network = siren.init((27, 6, 5, 3), 1.0, 1.0, 5, activation="leaky")
     program = lower(Model(network, ("color",), Window(3), Normalization()))
-    for name, target in {**DENOISERS, **EXPORTED}.items():
+    for name, target in LANGUAGES.items():
         for schedule in target.schedules:
             kernel = compile_program(program, name, schedule=schedule.name)
             errors = kernel.manifest["bound"]["output"]

@@ -50,7 +50,7 @@ from wamnet.compiler.plan import plan_program
 from wamnet.compiler.reading.check import passes_of
 from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.tile import all_stored, tile
-from wamnet.compiler.targets import DENOISERS, EXPORTED
+from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import RELU
@@ -103,7 +103,7 @@ def test_round_trip(kit, window, hidden, border, relu, shape, bounded):
 
 SCHEDULES = [
     (target.name, schedule.name)
-    for target in (*DENOISERS.values(), *EXPORTED.values())
+    for target in TARGETS.values()
     if target.name in GRAMMARS
     for schedule in target.schedules
     if target.name in ("opengl", "glsl-vulkan", "glsl-compute") or schedule.name != "fftpasses:32"

@@ -6,10 +6,10 @@
    cameras, with the features of each row [`ROWS`]: camera rays, shadow rays of each, paths per pixel.
 2. A network is trained for each row and seed by the preset `best`, whose input is the layer `unshadowed`
    where there are no shadow rays, and `direct` in its place where there are [`Bench.images`]. `direct` has
-   visible lamps too: a row without shadow rays, with `seen_emission`, has the gain of these alone.
+   visible lights too: a row without shadow rays, with `seen_emission`, has the gain of these alone.
 3. Open Image Denoise gets the same frames. With the same direct light, its colour is `direct` in place of
    what the path itself has found of that: of the path that ends after one scattering [`Bench.relit`]. Since
-   `direct` takes lamps for disks, which a network learns and it cannot, another row has it without bias.
+   `direct` approximates lights by disks, which a network learns and it cannot, another row has no such bias.
 4. Scores are means over seeds and test frames that nothing was chosen on, in the penumbra and after a blur
    too [`scored`]. Milliseconds are those of a pipeline's frame, paths, features and network, 512 x 512
    pixels, rows in turn [`milliseconds`]. A picture shows a test frame by the rows in `SHOWN`.
@@ -74,7 +74,7 @@ SEED_STEP = 1000
 class Row:
     """Camera rays of the features, shadow rays of each, and paths, per pixel.
 
-    `emission`: the network sees visible lamps without shadow rays. `oidn`: Open Image Denoise; `usual`: its
+    `emission`: the network sees visible lights without shadow rays. `oidn`: Open Image Denoise; `usual`: its
     direct light is that of as many paths of one scattering, which have no bias.
     """
 
@@ -94,7 +94,7 @@ class Row:
 
 ROWS = {
     "4 camera rays, no shadow ray": Row(4),
-    "4 camera rays, no shadow ray, visible lamps": Row(4, emission=True),
+    "4 camera rays, no shadow ray, visible lights": Row(4, emission=True),
     "4 camera rays, 4 shadow rays": Row(4, 1),
     "8 camera rays, 8 shadow rays": Row(8, 1),
     "16 camera rays, no shadow ray": Row(16),

@@ -368,7 +368,7 @@ class _Builder:
         program = self.programs.parts.get("shadow")
         if program:  # the radiance so far is what the first surface emits
             found += tuple(self._added(f"direct_{c}", self.of(f"radiance_{c}")) for c in "rgb")
-        # Without lamps no ray is sent.
+        # Without lights no shadow ray is traced.
         if program and any(program.nodes[index].op != "constant" for _, index in program.outputs):
             number = Let("shadow_number", self.all(apply("convert", name("shadow"), value="uint32")))
             body = (number, *self.block("shadow", "a lamp's light, if nothing is in between", summed=True))

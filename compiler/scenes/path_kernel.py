@@ -54,7 +54,7 @@ PAST_SUMS = ("seen_*: the same of what is seen past mirrors and glass; albedo ti
 """What the planes of `see` mean."""
 
 
-OF_SHADOWS = "direct_*: emission, and the lamps' light with shadows, by {0} shadow rays of each camera ray"
+OF_SHADOWS = "direct_*: emission and direct light, by {0} shadow rays of each camera ray"
 """What the planes of `shadow` mean."""
 
 OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the number of samples: of one launch"

@@ -10,7 +10,7 @@
    [`with_own_features`], whose rays are spread evenly over a pixel and begin with the colour's first one.
 5. Features of what is seen past mirrors and glass are layers of their own, on request (following.py). They
    follow the same paths; those of more camera rays end where the features do.
-6. On request each camera ray sends shadow rays to the lamps, for the layer `direct`: their light, and what
+6. On request each camera ray sends shadow rays to the lights, for the layer `direct`: their light, and what
    the first hit emits itself.
 """
 

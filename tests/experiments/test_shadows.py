@@ -11,7 +11,7 @@ from wamnet.refimpl.frame import Frame
 def test_direct_light_takes_the_place_of_the_unshadowed_one():
     found = {name: row.layers[4:] for name, row in shadows.ROWS.items()}
     assert found["4 camera rays, no shadow ray"] == ("unshadowed",)
-    assert found["4 camera rays, no shadow ray, visible lamps"] == ("unshadowed", "seen_emission")
+    assert found["4 camera rays, no shadow ray, visible lights"] == ("unshadowed", "seen_emission")
     assert found["16 camera rays, 16 shadow rays"] == ("direct",)
     assert set(shadows.SHOWN) <= set(shadows.ROWS)
 

@@ -61,11 +61,6 @@ def schlick(reflectance: Sequence[float], cosine: float) -> tuple[float, ...]:
     return tuple(r + (1.0 - r) * (1.0 - cosine) ** 5 for r in reflectance)
 
 
-def sine_inside(cosine: float, ior: float) -> float:
-    """Return the sine of the refracted angle by Snell's law, for the cosine outside."""
-    return float(np.sqrt(1.0 - cosine * cosine) / ior)
-
-
 def fresnel(cosine: Any, ior: float) -> Any:
     """Return the share (...) of unpolarised light that glass of an index mirrors, for cosines (...) outside.
 

@@ -244,7 +244,7 @@ def plan_shots(
     facts: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation; `named` are the scene's name, parameters and view."""
-    from ...compiler.scenes.lower_encode import feature_rays, sees
+    from ...compiler.scenes.encode_kernel import feature_rays, sees
     from ...models.data.frame_plan import animation_times
     from ...models.data.scene_source import scene_source
     from ...refimpl.light.render import Job

@@ -107,7 +107,7 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
 
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
-    from ...compiler.scenes.lower_encode import sees
+    from ...compiler.scenes.encode_kernel import sees
     from ...models.data.frame_plan import Request
     from ...refimpl.light.render import FEATURE_SAMPLER
     from ...refimpl.network.denoise import learned_feature_spp, learned_shadow_rays

@@ -245,7 +245,7 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
-    from ...compiler.scenes.lower_encode import sees
+    from ...compiler.scenes.encode_kernel import sees
     from ...models.data import frame_plan
     from ...models.data.scene_source import scene_source
     from ...refimpl.network.train import PRESETS

@@ -38,7 +38,7 @@ SHARING = 1500.0
 
 @dataclass(frozen=True)
 class Forms:
-    """The forms of a scene's primitives from which a target gains (compiler/scenes/forms.py).
+    """The forms of a scene's primitives from which a target gains (compiler/scenes/hierarchy.py).
 
     `few`: most operations of all primitives together that become statements each, `sharing`: of those that
     statements share; None: any number. `trees`: whether walks along trees cost about what their operations

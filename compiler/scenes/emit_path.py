@@ -62,38 +62,21 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from .lower_scene import LAYERS, LIT, SEEN, SURFACE, WAY, PathPrograms, kinds, names
+from .lower_scene import ALIVE, LAYERS, LIT, SEEN, SURFACE, WAY, PathPrograms
 from .lower_scene import PATH as STATE
-
-FIRST = {layer: names({layer: value}) for layer, value in LAYERS.items()}
-"""Planes of the first surface: outputs of `look`, by group."""
-
-PAST = {layer: names({layer: value}) for layer, value in SEEN.items()}
-"""Planes of what is seen past mirrors and glass: outputs of `see`, by group."""
-
-DIRECT = {layer: names({layer: value}) for layer, value in LIT.items()}
-"""Planes of the first surface's light: outputs of `shadow`, by group."""
+from .values import RGB, Values, floats, kinds, names
 
 END = {
     "alive": ["alive"],
-    **{f"last_{each}": names({each: value}) for each, value in {**SURFACE, **STATE}.items()},
+    **{f"last_{each}": names({f"last_{each}": value}) for each, value in {**SURFACE, **STATE}.items()},
 }
 """Planes of the path's state after its last arrival, by group: for comparing paths."""
 
-COLOR = ["color_r", "color_g", "color_b"]
-"""Planes of the radiance."""
+SUMMED: Values = {**floats("color", "deviation", ends=RGB), **LAYERS, **SEEN, **LIT}
+"""What samples add up to: colour, the squared differences from its mean, and the layers of `look`, `see` and
+`shadow`."""
 
-DEVIATION = ["deviation_r", "deviation_g", "deviation_b"]
-"""Planes of the sum of squared differences from the mean radiance."""
-
-GROUPS: Mapping[str, Sequence[str]] = {
-    "color": COLOR,
-    "deviation": DEVIATION,
-    **FIRST,
-    **PAST,
-    **DIRECT,
-    **{group: [f"last_{n}" if n != "alive" else n for n in members] for group, members in END.items()},
-}
+GROUPS: Mapping[str, Sequence[str]] = {**{g: names({g: value}) for g, value in SUMMED.items()}, **END}
 """What a kernel can add up: groups of planes, by name."""
 
 TRIP = "i"
@@ -137,7 +120,7 @@ def path_kernel(
 def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
     """Return the programs that groups of planes need: some only for their own, which must be there then."""
     parts = dict(programs.parts)
-    for part, own, how in (("see", PAST, "seen=True"), ("shadow", DIRECT, "shadow_rays=N")):
+    for part, own, how in (("see", SEEN, "seen=True"), ("shadow", LIT, "shadow_rays=N")):
         wanted = [group for group in groups if group in own]
         if wanted and part not in parts:
             raise CompileError(f"planes {wanted[0]!r} need the program {part!r}: lower the scene with {how}")
@@ -363,7 +346,7 @@ class _Builder:
     def _features(self, comment: str) -> tuple[Statement, ...]:
         """Return what adds up the features of a camera ray's surface, the loop over shadow rays last."""
         found: tuple[Statement, ...] = ()
-        if set(self.groups) & set(FIRST):
+        if set(self.groups) & set(LAYERS):
             found = self.block("look", comment, summed=True)
         program = self.programs.parts.get("shadow")
         if program:  # the radiance so far is what the first surface emits
@@ -428,7 +411,7 @@ class _Builder:
 
     def _as_float(self, variable: str) -> Expr:
         """Return a state variable as a float."""
-        kind = {**kinds({**STATE, **SURFACE}), "alive": "bool"}[variable]
+        kind = kinds({**STATE, **SURFACE, **ALIVE})[variable]
         value = self.of(variable, Type(kind))
         if kind == "bool":
             return apply("select", value, self.all(1.0), self.all(0.0))

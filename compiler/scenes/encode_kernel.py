@@ -1,6 +1,7 @@
-"""Compile the encoding of features for a target: passes, kernel, artifact.
+"""Compile the encoding of features for a target: from sums over samples to the images that a denoiser reads.
 
-1. Trace the encoding of the features [`lower_encode.lower_encode`], and run the passes of the profile.
+1. Trace the reference's own encodings of features [`lower_encode`], and run the passes of the profile. Inputs
+   are planes by name, and `samples`; outputs the channels of the images, `color_0` and so on.
 2. The kernel is one statement an operation between the reads of the planes and the stores of the channels
    [`encode_kernel`].
 3. Put both together with a manifest [`compile_encode`].
@@ -17,10 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.errors import CompileError
-from ...refimpl.network.dataset import Normalization
+from ...refimpl.errors import CompileError, InputError
+from ...refimpl.frame import HISTORY, SEEN, SUN
+from ...refimpl.light.render import FEATURE_SAMPLER, spread, spread_rays
+from ...refimpl.light.transport import Settings
+from ...refimpl.network.dataset import (
+    FEATURES,
+    Normalization,
+    check_features,
+    check_normalization,
+    encode_sums,
+)
+from ...refimpl.network.denoise import Model, learned_feature_spp
 from ..artifact import Artifact
 from ..core import profiles
+from ..core.ir import Program
 from ..core.lower import images_of
 from ..core.passes import pipeline
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS, READ, WRITE, Array, Interface, image_of
@@ -30,12 +42,81 @@ from ..plan import sine_contract
 from ..proof import bounds
 from ..schedules.common import X, Y, lets
 from ..targets import Language, language_named
-from .emit_path import Encoding
-from .lower_encode import PASSES, SAMPLES, channel_name, lower_encode, planes_of
+from .emit_path import GROUPS, SUMMED, Encoding
+from .lower_scene import FeatureRays
 from .plane_kernel import compiled, reads
+from .values import Given, floats, lowered, numbered
 
 SCHEMA = "wamnet-encode-kernel-1"
 """Name and version of the manifest's form; described in spec/pipeline.md."""
+
+PASSES = ("scalarize", "fold", "eliminate_dead")
+"""What the program goes through: numbers in place of vectors, constants in float64, rounded when emitted."""
+
+SAMPLES = "samples"
+"""The input beside the planes: how many samples they are sums of."""
+
+
+def layers_of(features: Sequence[str]) -> tuple[str, ...]:
+    """Return the layers that features are made of: the groups of planes that a path kernel has to add up."""
+    check_features(features)
+    layers = tuple(dict.fromkeys(FEATURES[name].layer for name in features))
+    if smoothed := [name for name in features if FEATURES[name].guides]:
+        rule = "a path kernel knows nothing of a pixel's neighbours"
+        raise InputError("features", ", ".join(smoothed), rule, "denoise frames: wamnet render, then denoise")
+    if before := [layer for layer in layers if layer in HISTORY]:
+        rule = "a path kernel computes layers of one frame, not of earlier frames"
+        way_out = "denoise frames that have them: wamnet animate makes them"
+        raise InputError("features", ", ".join(before), rule, way_out)
+    if SUN in layers:
+        rule = "a path kernel knows what a pixel's paths meet, not where the sun is"
+        raise InputError("features", SUN, rule, "denoise frames: wamnet render, then denoise")
+    return layers
+
+
+def sees(features: Sequence[str]) -> bool:
+    """Tell whether some of the features are of what is seen past mirrors and glass."""
+    check_features(features)
+    return any(layer in SEEN for name in features for layer in FEATURES[name].layers)
+
+
+def feature_rays(model: Model) -> int:
+    """Return how many camera rays that are spread evenly are worth those that a model has learned from."""
+    rays = learned_feature_spp(model)
+    return rays if model.info.get(f"trained_on_{FEATURE_SAMPLER}") else spread_rays(rays)
+
+
+def learned_rays(model: Model, settings: Settings) -> FeatureRays | None:
+    """Return the rays of features that a path kernel makes for a model, or None: those of its samples.
+
+    What is seen past mirrors and glass is seen by paths, which have no further rays.
+    """
+    count = feature_rays(model)
+    if count < 2 or sees(model.features):
+        return None
+    return FeatureRays(count, spread(settings.sampler, False))
+
+
+def planes_of(features: Sequence[str]) -> tuple[str, ...]:
+    """Return the planes that features are made of, in the order in which a path kernel writes them."""
+    return tuple(plane for layer in layers_of(features) for plane in GROUPS[layer])
+
+
+def lower_encode(
+    features: Sequence[str], normalization: Normalization, whole: bool = False, rays: int = 0
+) -> Program:
+    """Return the program that turns a pixel's sums into its encoded features; `whole`: in integers.
+
+    With `rays` all sums but the colour's are over so many camera rays.
+    """
+    check_normalization(normalization)
+
+    def encode(given: Given) -> Given:
+        return encode_sums(given, given[SAMPLES], features, normalization, whole, rays)
+
+    inputs = {**{layer: SUMMED[layer] for layer in layers_of(features)}, **floats(SAMPLES)}
+    channels = {name: numbered(FEATURES[name].channels) for name in features}
+    return lowered("encoding", encode, inputs, channels, PASSES)
 
 
 def compile_encode(
@@ -100,7 +181,7 @@ def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
         *reads(used, lambda i: load(SUMS_ARRAY, planes.index(used[i]), Y, X)),
         *lines,
         *(
-            Store(f"{IMAGE}{image.name}", (Y, X, const(c)), outputs[channel_name(image.name, c)])
+            Store(f"{IMAGE}{image.name}", (Y, X, const(c)), outputs[f"{image.name}_{c}"])
             for image in encoding.images
             for c in range(image.channels)
         ),
@@ -125,14 +206,15 @@ def encoding_of(
 
 def error_at(artifact: Artifact, sums: Mapping[str, Any], samples: int) -> dict[str, NDArray[np.float64]]:
     """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
-    names = planes_of([image.name for image in artifact.images])
-    inputs = {name: np.asarray(sums[name], np.float64) for name in names}
-    inputs[SAMPLES] = np.full(inputs[names[0]].shape, float(samples))
+    inputs = {
+        each: np.asarray(sums[each], np.float64) for each in planes_of([i.name for i in artifact.images])
+    }
+    inputs[SAMPLES] = np.full(next(iter(inputs.values())).shape, float(samples))
     contract = sine_contract(artifact.profile, artifact.target)
-    boxes = {name: (value, value) for name, value in inputs.items()}
+    boxes = {each: (value, value) for each, value in inputs.items()}
     found = bounds.enclose(artifact.programs, boxes, contract)
-    errors = {name: found[index].read for name, index in artifact.programs.outputs}
+    errors = {each: found[index].read for each, index in artifact.programs.outputs}
     return {
-        image.name: np.stack([errors[channel_name(image.name, c)] for c in range(image.channels)], axis=-1)
+        image.name: np.stack([errors[f"{image.name}_{c}"] for c in range(image.channels)], axis=-1)
         for image in artifact.images
     }

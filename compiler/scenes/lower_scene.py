@@ -8,14 +8,14 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 4. `scatter`: path, surface, depth and counters -> the path after it, and whether it continues.
 5. On request `shadow`: surface, counters and the number of a shadow ray -> its part of the layer `direct`.
 6. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
-   after it (refimpl/light/following.py). Where nothing is followed it is the first surface's layers [`_see`].
+   after it (refimpl/light/following.py). Where nothing is followed it is those of the first [`_first_seen`].
 
 Where features are means over more camera rays [`FeatureRays`] there is a fifth one, `ray`: `start` with
 another source of random numbers.
 
-Values between them have names [`PATH`, `SURFACE`, `COUNTERS`]: a vector is three numbers, `origin_x` and so
-on. The scene is constants by then: what it lacks (a kind of primitive, a second light, a rotation) is in no
-program. Numbers of it that shall move are inputs of all four [scene_inputs.py].
+Values between them have names [`PATH`, `SURFACE`, `COUNTERS`; values.py]. The scene is constants by then:
+what it lacks (a kind of primitive, a second light, a rotation) is in no program. Numbers of it that shall
+move are inputs of all four [scene_inputs.py].
 """
 
 from __future__ import annotations
@@ -27,42 +27,29 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl import frame, vectors
+from ...refimpl import frame
 from ...refimpl.light import following, intersection, render, transport
 from ...refimpl.light.intersection import Hit, Surface, reflecting
 from ...refimpl.light.scene import Scene, scene_digest
 from ...refimpl.light.transport import Counters, Path, Settings, World
-from ..core.ir import Program, Type
+from ..core.ir import Program
 from ..core.loops import USUAL, Forms
 from ..core.passes import pipeline
-from ..core.trace import Traced, trace
-from ..core.verify import verify
-from .forms import as_statements, planted
+from .hierarchy import as_statements, planted
 from .scene_inputs import Places, SceneInputs, flattened, lay_out
-
-XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
-"""Endings of the names of a vector's, a colour's and a number's components."""
-
-FLOAT, INTEGER, COUNTER, TRUTH = "float32", "int32", "uint32", "bool"
-"""Kinds of numbers of the values between programs."""
-
-Values = Mapping[str, tuple[tuple[str, ...], str]]
-"""Values by name: the endings of their components, and their kind of number."""
+from .values import COUNTER, INTEGER, NUMBER, RGB, TRUTH, XYZ, Given, Values, floats, lowered
 
 PATH: Values = {
-    "origin": (XYZ, FLOAT),
-    "direction": (XYZ, FLOAT),
-    "beta": (RGB, FLOAT),
-    "radiance": (RGB, FLOAT),
-    "pdf": (NUMBER, FLOAT),
+    **floats("origin", "direction", ends=XYZ),
+    **floats("beta", "radiance", ends=RGB),
+    **floats("pdf"),
 }
 """State of a path between bounces, as refimpl/light/transport.py: Path."""
 
 SURFACE: Values = {
-    "point": (XYZ, FLOAT),
-    "normal": (XYZ, FLOAT),
-    "reflectance": (RGB, FLOAT),
-    "t": (NUMBER, FLOAT),
+    **floats("point", "normal", ends=XYZ),
+    **floats("reflectance", ends=RGB),
+    **floats("t"),
     "surface": (NUMBER, INTEGER),
 }
 """What a scattering needs to know of the surface that was hit."""
@@ -71,29 +58,31 @@ COUNTERS: Values = dict.fromkeys(("seed", "pixel", "sample_number"), (NUMBER, CO
 """What names a path's random numbers: Counters of refimpl/light/transport.py (GLSL reserves sample)."""
 
 LAYERS: Values = {
-    "albedo": (RGB, FLOAT),
-    "normal": (XYZ, FLOAT),
-    "depth": (NUMBER, FLOAT),
-    "position": (XYZ, FLOAT),
-    "direction": (XYZ, FLOAT),
-    "unshadowed": (RGB, FLOAT),
+    **floats("albedo", ends=RGB),
+    **floats("normal", ends=XYZ),
+    **floats("depth"),
+    **floats("position", "direction", ends=XYZ),
+    **floats("unshadowed", ends=RGB),
 }
 """The feature layers of the first hit, as refimpl/light/render.py: first_hit_layers."""
 
 SEEN: Values = {
     **{seen: LAYERS[first] for seen, first in frame.FIRST_HIT.items()},
-    "seen_emission": (RGB, FLOAT),
+    **floats("seen_emission", ends=RGB),
 }
 """The feature layers past mirrors and glass, as refimpl/light/following.py: see."""
 
-LIT: Values = {frame.DIRECT: (RGB, FLOAT)}
+LIT: Values = floats(frame.DIRECT, ends=RGB)
 """The feature layer of shadow rays, as refimpl/light/transport.py: direct."""
 
-SHADOW: Values = {"shadow_number": (NUMBER, COUNTER)}
-"""The number of a shadow ray among those of a camera ray."""
-
-WAY: Values = {"way_going": (NUMBER, TRUTH), "way_length": (NUMBER, FLOAT)}
+WAY: Values = {"way_going": (NUMBER, TRUTH), **floats("way_length")}
 """State of the way to what is seen, as refimpl/light/following.py: Way."""
+
+DEPTH: Values = {"depth": (NUMBER, COUNTER)}
+"""The number of scatterings so far."""
+
+ALIVE: Values = {"alive": (NUMBER, TRUTH)}
+"""Whether a path continues."""
 
 MATERIALS = "world.materials."
 """How the paths of the tables of materials begin: if one has an input, any metal may be nearly a mirror."""
@@ -152,43 +141,38 @@ def lower_scene(
     """
     moving = moving or SceneInputs(settings, ())
     laid, values, statements = _laid_out(scene, settings, forms, moving)
-    world_of = partial(_world, laid, moving)
+    start = partial(_started, laid, moving)
 
-    def arrive(given: Mapping[str, Any]) -> dict[str, Any]:
-        path, surface, hit = transport.arrive(world_of(given), _path(given))
-        return {**_taken({"radiance": PATH["radiance"]}, path), **_taken(SURFACE, surface, hit)}
+    def world_of(given: Given) -> World:
+        found: World = moving.opened(laid, given)["world"]
+        return found
 
-    def look(given: Mapping[str, Any]) -> dict[str, Any]:
-        toward = _vector(given, "direction", XYZ)
-        return _components(LAYERS, render.first_hit_layers(world_of(given), *_surface(given), toward))
-
-    def scatter(given: Mapping[str, Any]) -> dict[str, Any]:
-        surface, hit = _surface(given)
-        counters = Counters(*(given[name] for name in COUNTERS))
-        path, alive = transport.scatter(world_of(given), _path(given), surface, hit, given["depth"], counters)
-        return {**_taken(PATH, path), "alive": alive}
-
-    numbers = dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))
-    size, depth = dict.fromkeys(("width", "height"), (NUMBER, FLOAT)), {"depth": (NUMBER, COUNTER)}
-    scene_numbers = dict.fromkeys(moving.names, (NUMBER, FLOAT))
-    lowered = partial(_lowered, most_unrolled=None if statements else 1, keep_places=keep_places)
-    start, started = partial(_started, laid, moving), {**numbers, **size, **scene_numbers}
-    arriving = lowered("arrive", arrive, {**PATH, **scene_numbers})
-    scattering = lowered("scatter", scatter, {**PATH, **SURFACE, **COUNTERS, **depth, **scene_numbers})
-    parts = {
-        "start": lowered("start", partial(start, settings.sampler), started),
-        "arrive": arriving,
-        "look": lowered("look", look, {**SURFACE, "direction": PATH["direction"], **scene_numbers}),
-        "scatter": _reached(scattering, arriving),
-    }
     most = _most_followed(laid["world"], moving)
+    numbers = dict.fromkeys(("x", "y", "seed", "sample_number"), (NUMBER, COUNTER))
+    ray = {**numbers, **floats("width", "height")}
+    begun, toward = {**PATH, "pixel": (NUMBER, COUNTER)}, {"direction": PATH["direction"]}
+    rows: dict[str, tuple[Callable[[Given], Given], Values, Values]] = {
+        "start": (partial(start, settings.sampler), ray, begun),
+        "arrive": (partial(_arrive, world_of), PATH, {"radiance": PATH["radiance"], **SURFACE}),
+        "look": (partial(_look, world_of), {**SURFACE, **toward}, LAYERS),
+        "scatter": (partial(_scatter, world_of), {**PATH, **SURFACE, **COUNTERS, **DEPTH}, {**PATH, **ALIVE}),
+    }
     if shadow_rays:
-        lit = partial(_shadow, world_of, shadow_rays)
-        parts["shadow"] = lowered("shadow", lit, {**SURFACE, **COUNTERS, **SHADOW, **scene_numbers})
-    if seen:
-        parts["see"] = lowered("see", *_see(world_of, most, scene_numbers))
+        number = {"shadow_number": (NUMBER, COUNTER)}
+        rows["shadow"] = partial(_shadow, world_of, shadow_rays), {**SURFACE, **COUNTERS, **number}, LIT
+    if seen and most:
+        state = {"beta": PATH["beta"], **toward, **DEPTH, **ALIVE, **WAY}
+        rows["see"] = partial(_see, world_of, most), {**SURFACE, **state}, {**SEEN, **WAY}
+    elif seen:
+        rows["see"] = partial(_first_seen, world_of), {**SURFACE, **toward}, SEEN
     if rays:
-        parts["ray"] = lowered("ray", partial(start, rays.sampler), started)
+        rows["ray"] = partial(start, rays.sampler), ray, begun
+    options = {"most_unrolled": None if statements else 1, "keep_places": keep_places}
+    parts = {
+        name: lowered(name, function, {**inputs, **floats(*moving.names)}, outputs, PASSES, **options)
+        for name, (function, inputs, outputs) in rows.items()
+    }
+    parts["scatter"] = _reached(parts["scatter"], parts["arrive"])
     numbers_of_scene = moving.names, moving.places, tuple(map(float, values))
     identity = scene.name, scene_digest(scene), settings
     return PathPrograms(*identity, parts, *numbers_of_scene, most if seen else 0, rays, shadow_rays)
@@ -232,42 +216,29 @@ def _most_followed(world: World, moving: SceneInputs) -> int:
     return following.most_followed(world)
 
 
-def _see(
-    world_of: Callable[[Mapping[str, Any]], World], most: int, scene_numbers: Values
-) -> tuple[Callable[[Mapping[str, Any]], dict[str, Any]], Values]:
-    """Return the function that sees, and its inputs; with nothing to follow it has no state."""
+# ---- the programs' functions, of values by name -----------------------------------------------------------
 
-    def first(given: Mapping[str, Any]) -> dict[str, Any]:
-        layers = render.first_hit_layers(world_of(given), *_surface(given), _vector(given, "point", XYZ))
-        found = {name: layers[of] for name, of in frame.FIRST_HIT.items()}
-        return _components(SEEN, {**found, "seen_emission": _emitting(world_of(given), given)[0].emission})
-
-    def see(given: Mapping[str, Any]) -> dict[str, Any]:
-        way = following.Way(given["way_going"] & given["alive"], given["way_length"])
-        path = Path(*[None] * 5)._replace(beta=_vector(given, "beta", RGB))  # type: ignore[arg-type]
-        world, depth = world_of(given), given["depth"]
-        way, layers = following.see(world, way, path, *_emitting(world, given), depth, most)
-        return {**_components(SEEN, layers), "way_going": way.going, "way_length": way.length}
-
-    if not most:
-        return first, {**SURFACE, "direction": PATH["direction"], **scene_numbers}
-    arrived = {name: PATH[name] for name in ("beta", "direction")}
-    state = {"depth": (NUMBER, COUNTER), "alive": (NUMBER, TRUTH)}
-    return see, {**SURFACE, **arrived, **state, **WAY, **scene_numbers}
+WorldOf = Callable[[Given], World]
+"""From the scene's numbers to the world."""
 
 
-def _shadow(
-    world_of: Callable[[Mapping[str, Any]], World], rays: int, given: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return what a shadow ray adds to the layer `direct`."""
-    counters = Counters(*(given[name] for name in COUNTERS))
-    at = world_of(given), *_surface(given), counters
-    return _components(LIT, {frame.DIRECT: transport.direct(*at, rays, given["shadow_number"])})
+def _path(given: Given) -> Path:
+    """Return the state of a path."""
+    return Path(**{name: given[name] for name in PATH})
 
 
-def _started(
-    laid: dict[str, Any], moving: SceneInputs, sampler: str, given: Mapping[str, Any]
-) -> dict[str, Any]:
+def _surface(given: Given) -> tuple[Surface, Hit]:
+    """Return surface and hit; a scattering asks for neither emission nor light."""
+    surface = reflecting(given["point"], given["normal"], given["reflectance"])
+    return surface, Hit(given["t"], given["surface"])
+
+
+def _counters(given: Given) -> Counters:
+    """Return a path's counters."""
+    return Counters(*(given[name] for name in COUNTERS))
+
+
+def _started(laid: dict[str, Any], moving: SceneInputs, sampler: str, given: Given) -> Given:
     """Return the path at the camera, with its pixel's counter."""
     # As in refimpl/light/render.py: pixel_counter.
     pixel = given["x"] + np.uint32(render.MAX_IMAGE_SIDE_PX) * given["y"]
@@ -275,83 +246,51 @@ def _started(
     x, y = (given[n].astype(np.float32) for n in "xy")
     basis, size = moving.opened(laid, given)["camera"], (given["width"], given["height"])
     path = render.start(basis, x, y, *size, counters, np.float32, sampler)
-    return {**_taken(PATH, path), "pixel": pixel}
+    return {**path._asdict(), "pixel": pixel}
 
 
-def _world(laid: dict[str, Any], moving: SceneInputs, given: Mapping[str, Any]) -> World:
-    """Return the world, with those of its numbers that are inputs as they are given."""
-    world: World = moving.opened(laid, given)["world"]
-    return world
+def _arrive(world_of: WorldOf, given: Given) -> Given:
+    """Return the next surface, and the radiance so far."""
+    path, surface, hit = transport.arrive(world_of(given), _path(given))
+    return {**surface._asdict(), **hit._asdict(), "radiance": path.radiance}
 
 
-def names(values: Values) -> list[str]:
-    """Return the names of all components, in order."""
-    return [name + end for name, (ends, _) in values.items() for end in ends]
+def _look(world_of: WorldOf, given: Given) -> Given:
+    """Return the feature layers of a first surface."""
+    return render.first_hit_layers(world_of(given), *_surface(given), given["direction"])
 
 
-def kinds(values: Values) -> dict[str, str]:
-    """Return the kind of number of each component."""
-    return {name + end: kind for name, (ends, kind) in values.items() for end in ends}
+def _scatter(world_of: WorldOf, given: Given) -> Given:
+    """Return the path after a surface, and whether it continues."""
+    at = world_of(given), _path(given), *_surface(given)
+    path, alive = transport.scatter(*at, given["depth"], _counters(given))
+    return {**path._asdict(), "alive": alive}
 
 
-def _lowered(
-    name: str, function: Any, values: Values, most_unrolled: int | None, keep_places: bool
-) -> Program:
-    """Trace a function of named numbers, and run the passes."""
-    inputs = {component: Type(kind) for component, kind in kinds(values).items()}
-    program = trace(
-        lambda *given: function(dict(zip(inputs, given, strict=True))),
-        inputs,
-        most_unrolled=most_unrolled,
-        keep_places=keep_places,
-    )
-    return pipeline.run(verify(program, f"traced {name}"), PASSES)
+def _shadow(world_of: WorldOf, rays: int, given: Given) -> Given:
+    """Return what a shadow ray adds to the layer `direct`."""
+    at = world_of(given), *_surface(given), _counters(given)
+    return {frame.DIRECT: transport.direct(*at, rays, given["shadow_number"])}
 
 
-def _vector(given: Mapping[str, Any], name: str, ends: tuple[str, ...]) -> Any:
-    """Join a value from its components."""
-    parts = [given[name + end] for end in ends]
-    return vectors.vector(*parts) if len(parts) > 1 else parts[0]
-
-
-def _path(given: Mapping[str, Any]) -> Path:
-    """Return the state of a path from its components."""
-    return Path(**{name: _vector(given, name, ends) for name, (ends, _) in PATH.items()})
-
-
-def _surface(given: Mapping[str, Any]) -> tuple[Surface, Hit]:
-    """Return surface and hit from their components; a scattering asks for neither emission nor light."""
-    point, normal, reflectance = (
-        _vector(given, name, SURFACE[name][0]) for name in ("point", "normal", "reflectance")
-    )
-    return reflecting(point, normal, reflectance), Hit(given["t"], given["surface"])
-
-
-def _emitting(world: World, given: Mapping[str, Any]) -> tuple[Surface, Hit]:
+def _emitting(world: World, given: Given) -> tuple[Surface, Hit]:
     """Return surface and hit, with the emission: it is looked up again, as `arrive` hands on only its sum."""
     surface, hit = _surface(given)
-    direction = _vector(given, "direction", XYZ)
-    emission = intersection.emission_at(world.geometry, hit, direction)
-    return surface._replace(emission=transport.with_sky(world, hit, direction, emission)), hit
+    emission = intersection.emission_at(world.geometry, hit, given["direction"])
+    return surface._replace(emission=transport.with_sky(world, hit, given["direction"], emission)), hit
 
 
-def _taken(values: Values, *tuples: Any) -> dict[str, Traced]:
-    """Return the components of the fields named in `values`, each from the first tuple that has it."""
-    return {
-        component: value
-        for name, (ends, _) in values.items()
-        for component, value in _split(
-            name, ends, next(t._asdict() for t in reversed(tuples) if name in t._fields)
-        )
-    }
+def _first_seen(world_of: WorldOf, given: Given) -> Given:
+    """Return the layers of what is seen where nothing is followed: those of the first surface."""
+    layers = render.first_hit_layers(world_of(given), *_surface(given), given["point"])
+    found = {name: layers[of] for name, of in frame.FIRST_HIT.items()}
+    return {**found, "seen_emission": _emitting(world_of(given), given)[0].emission}
 
 
-def _components(values: Values, found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the components of values by name."""
-    return {part: number for name, (ends, _) in values.items() for part, number in _split(name, ends, found)}
-
-
-def _split(name: str, ends: tuple[str, ...], values: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Return the components of one value by name."""
-    whole = values[name]
-    return [(name + end, whole[..., i] if len(ends) > 1 else whole) for i, end in enumerate(ends)]
+def _see(world_of: WorldOf, most: int, given: Given) -> Given:
+    """Return the layers of what is seen past mirrors and glass, and the way after it."""
+    way = following.Way(given["way_going"] & given["alive"], given["way_length"])
+    path = Path(*[None] * 5)._replace(beta=given["beta"])  # type: ignore[arg-type]
+    world = world_of(given)
+    way, layers = following.see(world, way, path, *_emitting(world, given), given["depth"], most)
+    return {**layers, "way_going": way.going, "way_length": way.length}

@@ -3,6 +3,8 @@
 1. Run the passes of the profile on each program (lower_scene.py has run the common ones).
 2. Emit the source in the target's dialect for a number of paths at once [targets.py: Language.paths].
 3. Put both together with a manifest [`compile_path`].
+4. A feature of a noisy picture is one pass of a host: a kernel that encodes what it adds up, over one sample
+   per pixel, and returns channels [`feature_pass`, `HOSTS`].
 
 A path kernel has no error bound: its decisions may fall differently from the reference's where a path passes
 an edge by less than the rounding error. Everything is a function of scene, settings, target, profile and
@@ -19,6 +21,7 @@ from typing import Any
 
 from ...refimpl.errors import CompileError
 from ...refimpl.light.scene import Scene
+from ...refimpl.network.dataset import Normalization
 from ..artifact import Artifact
 from ..compile import Draft, Entry, asdict_finite, assemble
 from ..core import ir, profiles
@@ -26,14 +29,17 @@ from ..core.ir import Image
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
-from ..languages.dialect import Dialect
+from ..languages.dialect import Dialect, Parts
+from ..languages.glsl_es import GLSLES
+from ..languages.hosts import NO_PRECISE, GodotDenoise
 from ..languages.listing import Listing
 from ..languages.openings import IMAGES
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named
 from . import emit_path
 from .emit_path import Encoding
-from .forms import as_statements
+from .encode_kernel import encoding_of, layers_of
+from .hierarchy import as_statements
 from .lower_scene import PASSES, PathPrograms
 from .scene_inputs import SceneInputs, Tables, lay_out
 
@@ -222,3 +228,108 @@ def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Se
         ("fixed", [fixed]),
         ("sums", written),
     ]
+
+
+# ---- passes of hosts --------------------------------------------------------------------------------------
+
+
+class _ShadertoyPath(GLSLES):
+    """The words of a path, and of the encoding at its end, whose channels are those of a variable."""
+
+    target = "shadertoy"
+    language = "Shadertoy (GLSL ES 3.00), one buffer a feature"
+    suffix = ".glsl"
+    first: tuple[str, ...] = ()
+    preamble = NO_PRECISE
+    most_numbers = 0
+    said = {interface.PATH: ""}
+    paints = True
+    fragment = ("at.x", "at.y")
+    ends = {
+        interface.PATH: """\
+    return image;
+}
+
+void mainImage(out vec4 fragColor, in vec2 fragCoord)
+{
+    fragColor = wamnet_trace(ivec2(fragCoord), int(iResolution.x), int(iResolution.y), uint(iFrame));
+}"""
+    }
+    takes = "ivec2 at, int width, int height, uint seed_number"
+    uniforms_of_host: tuple[str, ...] = ()
+
+    def path_begin(self, kernel: interface.Interface, parts: Parts) -> list[str]:
+        """Return what follows the first lines of a path kernel."""
+        return [
+            parts.top,
+            *self.uniforms_of_host,
+            "",
+            f"vec4 wamnet_trace({self.takes})",
+            "{",
+            "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
+            *ONE_SAMPLE,
+            *self.places(kernel),
+        ]
+
+    def read(self, array: interface.Array, index: Sequence[str], lanes: int) -> str:
+        """Return a channel of the image."""
+        return f"image[{index[-1]}]"
+
+
+ONE_SAMPLE = (
+    "    const int first_row = 0;",
+    "    const int samples = 1;",
+    "    const uint first_sample = 0u;",
+)
+"""What is a uniform elsewhere."""
+
+NUMBERS = (("width", 512), ("height", 512), ("seed_number", 0))
+"""What a script of Godot sets, with values to start with: the item's size in pixels, a number each frame."""
+
+
+class _GodotPath(_ShadertoyPath):
+    """The same for Godot, which knows no `precise` either and has words of its own for what is shared."""
+
+    target = "godot"
+    language = "Godot 4 shading language, one canvas item a feature"
+    suffix = ".gdshader"
+    first = GodotDenoise.first
+    qualifiers = {}
+    ends = {
+        interface.PATH: """\
+    return image;
+}
+
+void fragment()
+{
+    ivec2 at = ivec2(UV * vec2(float(width), float(height)));
+    COLOR = wamnet_trace(at, uint(seed_number));
+}"""
+    }
+    takes = "ivec2 at, uint seed_value"
+    uniforms_of_host = tuple(f"uniform int {name} = {value};" for name, value in NUMBERS)
+
+    def begin(self, kernel: interface.Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        return "\n".join(self.path_begin(kernel, parts))
+
+    def integer(self, kernel: interface.Interface, name: str) -> str:
+        """Return the text of an integer that the kernel is given."""
+        return "seed_value" if name == "seed_number" else name
+
+
+HOSTS = {"shadertoy": _ShadertoyPath(), "godot": _GodotPath()}
+"""The dialect of a pass, by target; every frame of a host has random numbers of its own."""
+
+
+def feature_pass(
+    programs: PathPrograms,
+    feature: str,
+    normalization: Normalization,
+    language: str,
+    header: Sequence[str],
+    whole: bool = False,
+) -> str:
+    """Return the pass that traces one sample a pixel and writes one encoded feature; `whole`: in integers."""
+    encoding = encoding_of((feature,), normalization, whole=whole)
+    return renderer_of(programs, HOSTS[language], layers_of((feature,)), encoding=encoding).source(header)

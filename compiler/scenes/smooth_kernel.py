@@ -2,7 +2,10 @@
 
     layers -> guide -> planes of guides and light -> smooth, once a level -> encode -> feature image
 
-1. Trace the filter [lower_smooth.py], and run the passes of the profile.
+1. Trace the reference's filter [`lower_smooth`], and run the passes of the profile. `guide` is what a pixel's
+   layers give once a frame: light that is clipped, and what the filter compares; a factor that is the same at
+   all pixels is a constant of the next program, equal ones are one plane. `tap`: the sums of a pixel with one
+   more tap of SMO-3. `mean`: what these sums give in the end.
 2. `guide` is one statement an operation [`guide_kernel`], `smooth` two loops over taps around those of a tap
    [`smooth_kernel`]; a tap beyond the image reads its nearest pixel.
 3. Put both together with manifests, and with the encoding that exists for sums [`compile_smoothing`].
@@ -13,17 +16,20 @@ tap and level by level, give one for every channel of every pixel [`error_at`].
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...refimpl.frame import LAYERS
 from ...refimpl.network import smoothing
-from ...refimpl.network.dataset import Normalization
+from ...refimpl.network.dataset import Normalization, check_normalization
 from ..artifact import Artifact, SmoothKernels
 from ..core import profiles
-from ..core.ir import Program
+from ..core.ir import Image, Program
 from ..core.passes import pipeline
 from ..kernel.interface import (
     GUIDE,
@@ -59,22 +65,10 @@ from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
 from ..targets import Language, language_named
-from .encode_kernel import compile_encode
-from .lower_encode import SAMPLES, channel_name
-from .lower_smooth import (
-    GUIDED,
-    HERE,
-    LAYERS_READ,
-    PASSES,
-    SPLINE,
-    SUMS,
-    THERE,
-    WEIGHTS,
-    SmoothPrograms,
-    lower_smooth,
-)
-from .lower_smooth import LIGHT as LIGHT_PLANES
+from .emit_path import GROUPS
+from .encode_kernel import PASSES, SAMPLES, compile_encode
 from .plane_kernel import check_lanes, compiled, reads
+from .values import RGB, XYZ, Given, floats, lowered, names, numbered
 
 SCHEMA = "wamnet-smooth-kernel-1"
 """Name and version of the manifest's form; described in spec/smoothing.md."""
@@ -87,6 +81,88 @@ FEATURE = "color"
 
 TABLE = "SPLINE"
 """Name of the table of the spline along an axis."""
+
+LIGHT_PLANES = tuple(GROUPS[FEATURE])
+"""Planes of light, named as those of sums: the encoding of colour reads them."""
+
+SUMS = tuple(names(floats("total", ends=RGB)))
+"""What a pixel's taps add up to, beside their weights."""
+
+WEIGHTS, SPLINE = "weights", "spline"
+"""The sum of a pixel's weights, and a tap's share of the spline."""
+
+HERE, THERE = "here_", "there_"
+"""What the planes of pixel and tap are called in a program."""
+
+GUIDED = tuple(names(floats(*smoothing.GUIDES, ends=XYZ)))
+"""Planes of what is compared."""
+
+LAYERS_READ = tuple(
+    Image(each, LAYERS[each].channels, -np.inf, np.inf)
+    for each in (FEATURE, *smoothing.GUIDES, smoothing.DEPTH)
+)
+"""The layers of a frame that are read, not encoded."""
+
+
+@dataclass(frozen=True)
+class SmoothPrograms:
+    """The three programs; `guides` are the planes that `guide` writes beside the light, in order."""
+
+    guide: Program
+    tap: Program
+    mean: Program
+    guides: tuple[str, ...]
+
+
+# ---- programs -----------------------------------------------------------------------------------------
+
+
+def lower_smooth(normalization: Normalization) -> SmoothPrograms:
+    """Return the programs of the filter for a model's scales."""
+    check_normalization(normalization)
+    light, sums = floats(FEATURE, ends=RGB), {**floats("total", ends=RGB), **floats(WEIGHTS)}
+    whole = lowered(
+        "filter",
+        partial(_guide, normalization.exposure_stops),
+        {layer.name: numbered(layer.channels) for layer in LAYERS_READ},
+        {**light, **floats("", "factor_", ends=GUIDED)},
+        PASSES,
+    )
+    planes: dict[int, str] = {}
+    factors: list[str | float] = []
+    for each, index in whole.outputs:
+        node = whole.nodes[index]
+        constant = each.startswith("factor") and node.op == "constant"
+        where = float(node["value"]) if constant else planes.setdefault(index, each)  # type: ignore[arg-type]
+        if each.startswith("factor"):
+            factors.append(where)
+    kept = tuple((each, index) for index, each in planes.items())
+    guide = pipeline.run(replace(whole, outputs=kept), ("eliminate_dead",))
+    guides = tuple(each for each, _ in kept if each not in LIGHT_PLANES)
+    here = floats(*(f"{HERE}{each}" for each in guides))
+    there = {**floats(THERE, ends=GUIDED), **light, **floats(SPLINE)}
+    tap = lowered("filter", partial(_tap, factors), {**here, **there, **sums}, sums, PASSES)
+    return SmoothPrograms(guide, tap, lowered("filter", _mean, sums, light, PASSES), guides)
+
+
+def _guide(exposure_stops: float, layers: Given) -> Given:
+    """Return the light and the guides of a pixel, with the factors of their differences."""
+    compared, factors = smoothing.guides_of(layers)
+    return {FEATURE: smoothing.dimmed(layers[FEATURE], exposure_stops), "": compared, "factor_": factors}
+
+
+def _tap(factors: Sequence[str | float], given: Given) -> Given:
+    """Return the sums of a pixel with one more tap."""
+    here = np.stack([given[f"{HERE}{each}"] for each in GUIDED], axis=-1)
+    known = [given[f"{HERE}{factor}"] if isinstance(factor, str) else factor for factor in factors]
+    sums = given["total"], given[WEIGHTS], given[FEATURE], given[SPLINE]
+    total, weights = smoothing.added(*sums, here, given[THERE], np.stack(known, axis=-1))
+    return {"total": total, WEIGHTS: weights}
+
+
+def _mean(given: Given) -> Given:
+    """Return the means of a pixel's sums."""
+    return {FEATURE: smoothing.mean(given["total"], given[WEIGHTS])}
 
 
 def compile_smoothing(
@@ -203,7 +279,7 @@ def error_at(kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDAr
         light = _enclosed(kernels, programs.mean, sums)
     one = {SAMPLES: _exactly(np.ones((height, width)))}
     found = _enclosed(kernels, kernels.encode.programs, {**light, **one})
-    return np.stack([found[channel_name(FEATURE, c)].read for c in range(len(LIGHT_PLANES))], axis=-1)
+    return np.stack([found[f"{FEATURE}_{c}"].read for c in range(len(LIGHT_PLANES))], axis=-1)
 
 
 def _exactly(values: NDArray[Any]) -> Enclosure:

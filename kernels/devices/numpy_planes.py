@@ -25,11 +25,19 @@ from ...compiler.kernel.interface import (
     SMOOTH,
 )
 from ...compiler.kernel.interface import SUMS as SUMS_ARRAY
-from ...compiler.scenes import lower_history
-from ...compiler.scenes.lower_encode import SAMPLES, channel_name
-from ...compiler.scenes.lower_history import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
-from ...compiler.scenes.lower_smooth import GUIDED, HERE, LAYERS_READ, SPLINE, SUMS, THERE, WEIGHTS
-from ...compiler.scenes.lower_smooth import LIGHT as LIGHT_PLANES
+from ...compiler.scenes import history_kernel
+from ...compiler.scenes.encode_kernel import SAMPLES
+from ...compiler.scenes.history_kernel import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
+from ...compiler.scenes.smooth_kernel import (
+    GUIDED,
+    HERE,
+    LAYERS_READ,
+    LIGHT_PLANES,
+    SPLINE,
+    SUMS,
+    THERE,
+    WEIGHTS,
+)
 from ...refimpl.network import smoothing
 
 
@@ -51,7 +59,7 @@ def _encoded(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, i
     samples = np.full(held[SUMS_ARRAY].shape[1:], integers["sample_count"], np.float32)
     found = interpret(kernel.programs, {**sums, SAMPLES: samples})
     for image in kernel.images:
-        channels = [found[channel_name(image.name, c)] for c in range(image.channels)]
+        channels = [found[f"{image.name}_{c}"] for c in range(image.channels)]
         held[f"{IMAGE}{image.name}"][:] = np.stack(channels, axis=-1)
 
 
@@ -76,11 +84,11 @@ def _followed(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, 
     """Fill the planes (P, H, W) of a history with one picture more."""
     programs, (_, height, width) = kernel.programs, held[PAST].shape
     motions, color = held[MOTIONS], held[f"{IMAGE}color"]
-    here = dict(zip(lower_history.FIRST, held[FIRST], strict=True))
+    here = dict(zip(history_kernel.FIRST, held[FIRST], strict=True))
     here |= {name: color[..., c] for c, name in enumerate(COLOR)}
     here |= dict(zip(MOTION, np.moveaxis(motions[here[NUMBER].astype(np.int32)], -1, 0), strict=True))
     sizes = dict(zip(SIZE, (np.float32(width), np.float32(height)), strict=True))
-    here |= {**dict(zip(lower_history.CAMERAS, held[CAMERAS], strict=True)), **sizes}
+    here |= {**dict(zip(history_kernel.CAMERAS, held[CAMERAS], strict=True)), **sizes}
     here |= interpret(programs.find, here)
     sums = {
         name: np.full((height, width), start, np.float32) for name, start in zip(TOTALS, STARTS, strict=True)
@@ -91,14 +99,14 @@ def _followed(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, 
         inside = here["ahead"] & (line >= 0) & (line < height) & (column >= 0) & (column < width)
         at = np.where(inside, line, 0), np.where(inside, column, 0)
         there = {
-            f"{THERE}{name}": plane[at] for name, plane in zip(lower_history.PAST, held[PAST], strict=True)
+            f"{THERE}{name}": plane[at] for name, plane in zip(history_kernel.PAST, held[PAST], strict=True)
         }
         rests = motions[there[f"{THERE}{NUMBER}"].astype(np.int32), MOTION.index(RESTS)]
         flags = dict(zip(BEYOND, (np.asarray(beyond[1]), np.asarray(beyond[0])), strict=True))
         found = interpret(programs.take, {**here, **there, **flags, **sums, f"{THERE}{RESTS}": rests})
         sums = {name: np.where(inside, found[name], sums[name]) for name in TOTALS}
     here |= interpret(programs.blend, {**here, **sums})
-    held[RESULT][:] = [here[name] for name in lower_history.PAST]
+    held[RESULT][:] = [here[name] for name in history_kernel.PAST]
 
 
 INTERPRETED: Mapping[str, Callable[[Artifact, Mapping[str, Any], Mapping[str, int]], None]] = {

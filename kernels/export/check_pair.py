@@ -28,7 +28,7 @@ from ...compiler.core.lower import lower
 from ...compiler.kernel.interface import SCENE_NUMBERS
 from ...compiler.plan import Plan, plan_program
 from ...compiler.scenes import emit_path
-from ...compiler.scenes.lower_encode import layers_of
+from ...compiler.scenes.encode_kernel import layers_of
 from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.schedules.common import kernel_gather

@@ -28,11 +28,9 @@ from ...compiler.core.ir import sha256
 from ...compiler.core.lower import lower
 from ...compiler.kernel.interface import DENOISE
 from ...compiler.plan import plan_program
-from ...compiler.scenes.encode_kernel import compile_encode
-from ...compiler.scenes.host_pass import feature_pass
-from ...compiler.scenes.lower_encode import layers_of, learned_rays, sees
+from ...compiler.scenes.encode_kernel import compile_encode, layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
-from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.scenes.path_kernel import compile_path, feature_pass
 from ...compiler.schedules.names import remedy
 from ...compiler.targets import Language, language_named
 from ...compiler.variants import FULL, parse, plan_model, vary

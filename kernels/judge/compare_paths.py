@@ -29,8 +29,9 @@ from ...compiler.artifact import Artifact
 from ...compiler.proof import ranges
 from ...compiler.proof.ranges import Arithmetic, Range
 from ...compiler.scenes.emit_path import END
-from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, kinds, lower_scene, names
+from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.scenes.values import kinds, names
 from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene

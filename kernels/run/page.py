@@ -33,8 +33,14 @@ from ...compiler.core.lower import lower
 from ...compiler.languages.glsl import MOST_UNIFORMS
 from ...compiler.languages.glsl_es import MOST_BUFFERS
 from ...compiler.plan import Expected, plan_program
-from ...compiler.scenes.encode_kernel import compile_encode
-from ...compiler.scenes.lower_encode import feature_rays, layers_of, learned_rays, planes_of, sees
+from ...compiler.scenes.encode_kernel import (
+    compile_encode,
+    feature_rays,
+    layers_of,
+    learned_rays,
+    planes_of,
+    sees,
+)
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying

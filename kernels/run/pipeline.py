@@ -1,8 +1,8 @@
 """One pipeline: a noisy picture is path-traced, encoded and denoised without leaving the device.
 
 1. Three kernels of one executor: the scene's paths, which add up the planes that the features need; the
-   encoding of the features, traced from the reference (compiler/scenes/lower_encode.py); the model's denoiser
-   [`Pipeline`]. On a processor the encoding is the end of the paths' kernel.
+   encoding of the features, traced from the reference (compiler/scenes/encode_kernel.py); the model's
+   denoiser [`Pipeline`]. On a processor the encoding is the end of the paths' kernel.
 2. [`Pipeline.draw`] starts them one after another. Sums, feature images and the result stay on the device
    (kernels/devices/passes.py).
 3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`]. Of an
@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.scenes.emit_path import FRAME_GROUPS, planes
-from ...compiler.scenes.encode_kernel import compile_encode, encoding_of
-from ...compiler.scenes.lower_encode import layers_of, sees
+from ...compiler.scenes.encode_kernel import compile_encode, encoding_of, layers_of, sees
 from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs

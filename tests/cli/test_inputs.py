@@ -11,7 +11,7 @@ import pytest
 from wamnet import models
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
-from wamnet.compiler.scenes.lower_encode import feature_rays
+from wamnet.compiler.scenes.encode_kernel import feature_rays
 from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame

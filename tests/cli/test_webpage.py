@@ -30,8 +30,7 @@ from small_page import (
 )
 
 from wamnet.cli.reports import webpage
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
-from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at, layers_of
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.devices.kernel import Part

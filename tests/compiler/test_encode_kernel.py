@@ -10,8 +10,14 @@ import pytest
 from wamnet.compiler import artifact
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
-from wamnet.compiler.scenes.lower_encode import SAMPLES, channel_name, layers_of, lower_encode, planes_of
+from wamnet.compiler.scenes.encode_kernel import (
+    SAMPLES,
+    compile_encode,
+    error_at,
+    layers_of,
+    lower_encode,
+    planes_of,
+)
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE, Normalization, encode_sums
 
@@ -52,7 +58,7 @@ def test_the_program_is_the_reference(samples):
     for name, values in expected.items():
         for channel in range(FEATURES[name].channels):
             wanted = values[..., channel] if FEATURES[name].channels > 1 else values
-            assert np.array_equal(found[channel_name(name, channel)], wanted)
+            assert np.array_equal(found[f"{name}_{channel}"], wanted)
 
 
 @pytest.mark.parametrize("samples", [1, 3])
@@ -63,7 +69,7 @@ def test_float32_is_within_the_bound_which_is_small(samples):
     for name, errors in error_at(artifact, sums, samples).items():
         assert np.all(errors <= 2.0**-18)
         for channel in range(FEATURES[name].channels):
-            both = [values[channel_name(name, channel)].astype(np.float64) for values in (exact, found)]
+            both = [values[f"{name}_{channel}"].astype(np.float64) for values in (exact, found)]
             assert np.all(np.abs(both[0] - both[1]) <= errors[..., channel])
 
 

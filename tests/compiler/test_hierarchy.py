@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, TREES
-from wamnet.compiler.scenes import forms, hierarchy
+from wamnet.compiler.scenes import hierarchy
 from wamnet.compiler.scenes.hierarchy import Walked, holding, plant, walk, walked
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.scene_inputs import varying
@@ -77,7 +77,7 @@ def rays(scene, seed, count=400):
 def with_tree(scene, visit=60.0):
     """Return list and tree; the cheaper a visit, the more nodes there are."""
     geometry = intersection.build(scene)
-    costs = [forms.row_cost(group) for group in geometry.groups]
+    costs = [hierarchy.row_cost(group) for group in geometry.groups]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hierarchy, "VISIT", visit)
         found = walked(geometry, scene, costs, range(len(costs)))
@@ -254,7 +254,7 @@ def test_hits_are_within_their_boxes():
 def test_a_row_costs_its_operations():
     """Sixteen for a division or root; what boxes share is outside of the row."""
     cost = {
-        kind: forms.row_cost(intersection.build(scene_of(2, 8, [kind])).groups[0])
+        kind: hierarchy.row_cost(intersection.build(scene_of(2, 8, [kind])).groups[0])
         for kind in ("sphere", "quad", "turned", "shared", "box")
     }
     assert cost["box"] == cost["shared"] == 26
@@ -266,12 +266,12 @@ def test_cheap_boxes_stay_out_of_the_tree():
     """100 boxes that share a rotation cost less as a list; what is beside them is in a tree."""
     alone, mixed = crowd("shared", 100), crowd("mixture", 100)
     geometry = intersection.build(alone)
-    assert forms.planted(geometry, alone) is geometry
-    assert forms.tree_cost(geometry) == 0
+    assert hierarchy.planted(geometry, alone) is geometry
+    assert hierarchy.tree_cost(geometry) == 0
     listed = intersection.build(mixed)
-    grown = forms.planted(listed, mixed)
+    grown = hierarchy.planted(listed, mixed)
     assert [isinstance(group, Walked) for group in grown.groups] == [False, True, True, True]
-    assert 0 < forms.tree_cost(grown) < forms.list_cost(listed)
+    assert 0 < hierarchy.tree_cost(grown) < hierarchy.list_cost(listed)
 
 
 def test_a_scene_that_moves_has_no_tree():
@@ -289,4 +289,4 @@ def test_a_shape_without_an_extent_keeps_the_list(monkeypatch):
     monkeypatch.setattr(Sphere, "extent", None)
     assert holding(scene) is None
     geometry = intersection.build(scene)
-    assert forms.planted(geometry, scene) is geometry
+    assert hierarchy.planted(geometry, scene) is geometry

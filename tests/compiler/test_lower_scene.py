@@ -11,7 +11,8 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, USUAL
 from wamnet.compiler.core.loops import loops as loops_of
-from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene, names
+from wamnet.compiler.scenes.lower_scene import LAYERS, PATH, SURFACE, lower_scene
+from wamnet.compiler.scenes.values import names
 from wamnet.refimpl import rng
 from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light import scenes, transport

@@ -14,10 +14,9 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES
 from wamnet.compiler.kernel.interface import SCENE_NUMBERS
 from wamnet.compiler.kernel.run import run_on
-from wamnet.compiler.scenes.emit_path import DIRECT, FRAME_GROUPS, GROUPS, PAST, path_kernel, planes
-from wamnet.compiler.scenes.encode_kernel import encoding_of
-from wamnet.compiler.scenes.lower_encode import SAMPLES
-from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
+from wamnet.compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, path_kernel, planes
+from wamnet.compiler.scenes.encode_kernel import SAMPLES, encoding_of
+from wamnet.compiler.scenes.lower_scene import LIT, SEEN, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import LANGUAGES
@@ -36,7 +35,7 @@ TRACED = [target.name for target in LANGUAGES.values() if target.paths]
 ENCODING = encoding_of(("color",), Normalization(exposure_stops=-1.0))
 """Encoded colour."""
 
-ALL_GROUPS = tuple(group for group in GROUPS if group not in {*PAST, *DIRECT})
+ALL_GROUPS = tuple(group for group in GROUPS if group not in {*SEEN, *LIT})
 """Groups of planes that any programs have."""
 
 
@@ -112,7 +111,7 @@ def test_a_kernel_runs_in_numpy_with_the_interpreter_s_bits(name, forms, lanes):
     rays = FeatureRays(4, "net") if name == "furnace" else None
     scene = scenes.canonical(name)
     programs = lower_scene(scene, Settings(max_depth=3), forms, seen=name == "glossy", rays=rays)
-    groups = (*FRAME_GROUPS, "alive", *(PAST if name == "glossy" else ()))
+    groups = (*FRAME_GROUPS, "alive", *(SEEN if name == "glossy" else ()))
     made = compile_path(programs, "numpy", groups=groups)
     expected = NumpyExecutor().trace(made, Part(*RUN.values()))
     found = run_on(path_kernel(made.programs, lanes, groups), {}, RUN)

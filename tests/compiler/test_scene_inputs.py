@@ -9,9 +9,8 @@ import pytest
 
 from wamnet.compiler.core.ir import Node, attributes
 from wamnet.compiler.core.passes.rewrite import rewrite
-from wamnet.compiler.scenes.host_pass import feature_pass
 from wamnet.compiler.scenes.lower_scene import lower_scene
-from wamnet.compiler.scenes.path_kernel import can_move, compile_path
+from wamnet.compiler.scenes.path_kernel import can_move, compile_path, feature_pass
 from wamnet.compiler.scenes.scene_inputs import SceneInputs, lay_out, tables_of, varying
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor

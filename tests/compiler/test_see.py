@@ -10,10 +10,11 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.profiles import profile_named
-from wamnet.compiler.scenes.lower_encode import sees
-from wamnet.compiler.scenes.lower_scene import SEEN, FeatureRays, lower_scene, names
+from wamnet.compiler.scenes.encode_kernel import sees
+from wamnet.compiler.scenes.lower_scene import SEEN, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
+from wamnet.compiler.scenes.values import names
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl import rng

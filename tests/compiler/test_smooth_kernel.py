@@ -7,18 +7,19 @@ import pytest
 from rough import rough_layers
 
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.scenes.lower_smooth import (
+from wamnet.compiler.scenes.smooth_kernel import (
     GUIDED,
     HERE,
     LAYERS_READ,
-    LIGHT,
+    LIGHT_PLANES,
     SPLINE,
     SUMS,
     THERE,
     WEIGHTS,
+    compile_smoothing,
+    error_at,
     lower_smooth,
 )
-from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import smoothing
 from wamnet.refimpl.network.dataset import Normalization
@@ -39,7 +40,7 @@ def guided(programs, layers, dtype):
 
 def one_level(programs, planes, light, gap, dtype):
     """Return the light after a level, by the programs."""
-    height, width = light[LIGHT[0]].shape
+    height, width = light[LIGHT_PLANES[0]].shape
     sums = dict.fromkeys((*SUMS, WEIGHTS), np.zeros((height, width), dtype))
     here = {f"{HERE}{name}": planes[name] for name in programs.guides}
     for spline, rows, columns in smoothing.taps(height, width, gap):
@@ -57,12 +58,12 @@ def test_the_programs_are_the_reference(gap):
     programs, layers = lower_smooth(SCALES), rough_layers(9, 11)
     wide = {name: values.astype(np.float64) for name, values in layers.items()}
     planes = guided(programs, layers, np.float64)
-    light = {name: planes[name] for name in LIGHT}
+    light = {name: planes[name] for name in LIGHT_PLANES}
     dim = smoothing.dimmed(wide["color"], SCALES.exposure_stops)
     assert np.array_equal(np.stack(list(light.values()), axis=-1), dim)
     wanted = smoothing.smooth_once(dim, *smoothing.guides_of(wide), gap)
     found = one_level(programs, planes, light, gap, np.float64)
-    assert np.array_equal(np.stack([found[name] for name in LIGHT], axis=-1), wanted)
+    assert np.array_equal(np.stack([found[name] for name in LIGHT_PLANES], axis=-1), wanted)
 
 
 def test_equal_factors_are_one_plane_and_constants_none():
@@ -96,7 +97,7 @@ def test_manifests_name_what_was_made():
         assert f"void {entry}(" in made.source
         assert list(made.contents()) == list(made.manifest["files"]) == [made.source_name]
     assert (kernels.guide.lanes, kernels.smooth.lanes) == (1, 8)
-    assert kernels.encode.planes == LIGHT
+    assert kernels.encode.planes == LIGHT_PLANES
 
 
 @pytest.mark.parametrize(

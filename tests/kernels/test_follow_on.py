@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.scenes import lower_history
-from wamnet.compiler.scenes.history_kernel import compile_history
-from wamnet.compiler.scenes.lower_history import MOTION, PAST
+from wamnet.compiler.scenes import history_kernel
+from wamnet.compiler.scenes.history_kernel import MOTION, PAST, compile_history
 from wamnet.kernels.run import before
 from wamnet.kernels.run.follow_on import first_hits_on, follow_on
 from wamnet.kernels.run.render_on import Frames
@@ -207,8 +206,8 @@ def test_a_kernel_of_another_definition_is_noticed(monkeypatch, executor_named, 
     kernel = compile_history("numpy")
     with monkeypatch.context() as changed:
         changed.setattr(H, name, other)
-        changed.setattr(lower_history.history, name, other)
-        wrong = replace(kernel, programs=lower_history.lower_history())
+        changed.setattr(history_kernel.history, name, other)
+        wrong = replace(kernel, programs=history_kernel.lower_history())
     from wamnet.kernels.run import follow_on as module
 
     monkeypatch.setattr(module, "compile_history", lambda _: wrong)

@@ -14,8 +14,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.scenes.emit_path import GROUPS
-from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at
-from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at, layers_of
 from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank

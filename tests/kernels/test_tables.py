@@ -12,8 +12,8 @@ from wamnet.compiler.core.ir import Type
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES, USUAL, Forms
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
-from wamnet.compiler.scenes import forms, hierarchy
-from wamnet.compiler.scenes.forms import list_cost, row_cost
+from wamnet.compiler.scenes import hierarchy
+from wamnet.compiler.scenes.hierarchy import list_cost, row_cost
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.targets import language_named
@@ -198,7 +198,7 @@ def test_a_mask_of_lanes_tells_what_the_or_of_their_halves_tells(executor_named,
 def test_of_coincident_faces_a_tree_takes_the_first_listed(executor, first, monkeypatch):
     """Coincident shapes in a tree: as the list does, though leaves are met in another order."""
     monkeypatch.setattr(hierarchy, "VISIT", 1.0)
-    monkeypatch.setattr(forms, "LEAST_ROWS", 2)
+    monkeypatch.setattr(hierarchy, "LEAST_ROWS", 2)
     (listed, expected), (grown, found) = (sums(executor, coincident(first), f) for f in (LISTS, TREES))
     assert listed != grown
     assert np.array_equal(found, expected)

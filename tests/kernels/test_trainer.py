@@ -22,7 +22,7 @@ from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
-from wamnet.compiler.training import lower_step, step, step_kernel
+from wamnet.compiler.training import step, step_kernel
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.kernels.devices.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.run import trainer
@@ -185,7 +185,7 @@ def test_presets_derivatives_are_within_the_bound(opencl: Any, rank: int) -> Non
 
 def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
     """An omega_0 that is 0.1 % too large is found."""
-    lowered = lower_step.lower_step(SMALL.layer_widths, 1.0, 5.0 * 1.001, SMALL.batch)
+    lowered = step.lower_step(SMALL.layer_widths, 1.0, 5.0 * 1.001, SMALL.batch)
     assert gradient_excess(opencl, SMALL, step_kernel.compile_lowered(lowered, 5)) > 1
 
 
@@ -201,7 +201,7 @@ def adam_excess(opencl: Any, kernel: Artifact | None = None, recipe: Recipe = SM
     data = data_of(recipe)
     state = train.start(recipe, dataset.Normalization(), data.digest)
     run = begin(opencl, recipe, kernel or kernel_of(recipe), state, data)
-    right, program = kernel_of(recipe).programs, lower_step.lower_adam()
+    right, program = kernel_of(recipe).programs, step.lower_adam()
     worst, bounded = 0.0, []
     for number in range(recipe.steps):
         before = [trainer.named(arrays) for arrays in _groups(run.state(number))]

@@ -15,7 +15,7 @@ from wamnet.compiler.core.profiles import EMITTED_SINE
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.targets import LANGUAGES
-from wamnet.compiler.training.lower_step import lower_step
+from wamnet.compiler.training.step import lower_step
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import activation, siren
 from wamnet.refimpl.network.activation import ACTIVATIONS, Activation, activation_named

@@ -21,8 +21,7 @@ from ....compiler.core.trace import trace
 from ....compiler.plan import analysed
 from ....compiler.proof import bounds, ranges
 from ....compiler.proof.ranges import Range
-from ....compiler.training.lower_step import ADAM_INPUTS, lower_adam, step_of
-from ....compiler.training.step import SQUARES, sum_errors
+from ....compiler.training.step import ADAM_INPUTS, SQUARES, lower_adam, step_of, sum_errors
 from ....refimpl.errors import InputError
 from ....refimpl.network import adam, siren, train
 from ....refimpl.network.siren import Siren

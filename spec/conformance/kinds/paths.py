@@ -21,7 +21,8 @@ import numpy as np
 from ....compiler.core.loops import STATEMENTS
 from ....compiler.proof import ranges
 from ....compiler.proof.ranges import Range
-from ....compiler.scenes.lower_scene import LIT, PATH, SURFACE, PathPrograms, Values, kinds, lower_scene
+from ....compiler.scenes.lower_scene import LIT, PATH, SURFACE, PathPrograms, lower_scene
+from ....compiler.scenes.values import Values, kinds
 from ....refimpl import rng
 from ....refimpl.light import camera, render, transport
 from ....refimpl.light import scene as scene_module

@@ -12,8 +12,7 @@ from wamnet.compiler.kernel.kernel import FLOAT, Let, Store, const, load, name
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.kernel.verify import KernelError, verify
 from wamnet.compiler.scenes.encode_kernel import compile_encode
-from wamnet.compiler.scenes.history_kernel import compile_history
-from wamnet.compiler.scenes.lower_history import CAMERAS, FIRST, MOTION, PAST
+from wamnet.compiler.scenes.history_kernel import CAMERAS, FIRST, MOTION, PAST, compile_history
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, smooth_kernel
 from wamnet.kernels.devices.numpy_planes import INTERPRETED
 from wamnet.refimpl.network.dataset import Normalization

@@ -14,7 +14,7 @@ from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.training import derivatives, step
 from wamnet.compiler.training.derivatives import BEGIN, DY, FIRST, LAST, VECTOR, ZERO, E, N
-from wamnet.compiler.training.lower_step import ADAM_INPUTS, lower_adam
+from wamnet.compiler.training.step import ADAM_INPUTS, lower_adam
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from wamnet.refimpl.network import adam, factored

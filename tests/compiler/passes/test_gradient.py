@@ -15,7 +15,7 @@ from wamnet.compiler.core.passes.fuse_bias import fuse_bias
 from wamnet.compiler.core.passes.gradient import RULES, gradient
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.training import step
-from wamnet.compiler.training.lower_step import lower_step, step_of
+from wamnet.compiler.training.step import lower_step, step_of
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren, train
 from wamnet.refimpl.network.activation import ACTIVATIONS

@@ -10,8 +10,7 @@ import pytest
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.scenes.encode_kernel import compile_encode
-from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.kernels.devices.kernel import Part

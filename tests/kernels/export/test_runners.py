@@ -15,8 +15,7 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at
-from wamnet.compiler.scenes.lower_encode import layers_of
+from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
-from ..frame import DIRECT, FIRST_HIT, SUN, Frame, check_finite
+from ..frame import DIRECT, FIRST_HIT, LAYERS, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -147,112 +147,73 @@ def encode_position(values: Array, normalization: Normalization) -> Array:
 DISPLAY_FORMULA = "sRGB of (linear radiance * 2^{exposure_stops!r}) clipped to 0 .. 1 (IEC 61966-2-1)"
 """How colour is encoded, on the way in and on the way out."""
 
-FIRST_HITS: Mapping[str, Feature] = {
-    feature.name: feature
-    for feature in (
-        Feature("color", "color", 3, 0.0, 1.0, encode_color, DISPLAY_FORMULA),
-        Feature(
-            "normal",
-            "normal",
-            3,
-            -1.0,
-            1.0,
+SIGNED = (encode_signed, encode_position)
+"""Encodings to [-1, 1]; all others are to [0, 1]."""
+
+
+Row = tuple[Any, ...]
+"""Encoding, formula, and perhaps a layer of another name than the feature's, and guides."""
+
+
+def _features(rows: Mapping[str, Row]) -> dict[str, Feature]:
+    """Return the features of rows, by name."""
+    found = {}
+    for name, (encode, formula, *others) in rows.items():
+        layer, low = others[0] if others else name, -1.0 if encode in SIGNED else 0.0
+        guides = others[1] if len(others) > 1 else {}
+        found[name] = Feature(name, layer, LAYERS[layer].channels, low, 1.0, encode, formula, guides)
+    return found
+
+
+FIRST_HITS = _features(
+    {
+        "color": (encode_color, DISPLAY_FORMULA),
+        "normal": (
             encode_signed,
             "unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit",
         ),
-        Feature(
-            "albedo",
-            "albedo",
-            3,
-            0.0,
-            1.0,
+        "albedo": (
             encode_albedo,
             "linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit",
         ),
-        Feature(
-            "depth",
-            "depth",
-            1,
-            0.0,
-            1.0,
+        "depth": (
             encode_depth,
             "distance along the ray / {depth_scale!r}, clipped to 0 .. 1; 0 where nothing is hit",
         ),
-        Feature(
-            "position",
-            "position",
-            3,
-            -1.0,
-            1.0,
+        "position": (
             encode_position,
             "(world position - {position_center}) / {position_scale!r}, clipped to -1 .. 1; a miss is at 0",
         ),
-        Feature(
-            *("direction", "direction", 3, -1.0, 1.0, encode_signed),
-            "unit direction of the camera ray in world space",
-        ),
-        Feature(
-            "unshadowed",
-            "unshadowed",
-            3,
-            0.0,
-            1.0,
+        "direction": (encode_signed, "unit direction of the camera ray in world space"),
+        "unshadowed": (
             encode_color,
             "the lamps' radiance off the first hit, were it matt and nothing in between: " + DISPLAY_FORMULA,
         ),
-        Feature(
-            "highlights",
-            "color",
-            3,
-            0.0,
-            1.0,
+        "highlights": (
             encode_highlights,
             "sRGB of (linear radiance * 2^({exposure_stops!r} - 4)) clipped to 0 .. 1: what color clips",
+            "color",
         ),
-    )
-}
+    }
+)
 """Features of colour and of the first hit; a new one is one line here and one `encode_*` function."""
 
 PAST = "past mirrors and glass: "
 """How the formulas of features begin that are of what is seen there."""
 
-PICTURES_BEFORE: Mapping[str, Feature] = {
-    feature.name: feature
-    for feature in (
-        Feature(
-            "history",
-            "history",
-            3,
-            0.0,
-            1.0,
+PICTURES_BEFORE = _features(
+    {
+        "history": (
             encode_color,
             "mean with the pictures before, where each surface was: " + DISPLAY_FORMULA,
         ),
-        Feature(
-            "history_weight",
-            "history_weight",
-            1,
-            0.0,
-            1.0,
+        "history_weight": (
             encode_share,
             "share of the pictures before in that mean, 1 - 1 / (number of its samples); 0 where it is new",
         ),
-    )
-}
+    }
+)
 """Features of a picture that follows others (light/history.py)."""
-
-SMOOTHED: Mapping[str, Feature] = {
-    f"{past}smoothed": Feature(
-        f"{past}smoothed",
-        "color",
-        *(3, 0.0, 1.0, encode_color),
-        f"color smoothed, guided by {', '.join(guides.values())} (spec/smoothing.md); {DISPLAY_FORMULA}",
-        guides,
-    )
-    for past in ("", "seen_")
-    for guides in [{guide: past + guide for guide in (*GUIDES, DEPTH)}]
-}
-"""Smoothed colour, guided by the first hit or by what is seen past mirrors and glass."""
 
 FEATURES: Mapping[str, Feature] = {
     **FIRST_HITS,
@@ -260,19 +221,30 @@ FEATURES: Mapping[str, Feature] = {
         seen: replace(FIRST_HITS[first], name=seen, layer=seen, formula=PAST + FIRST_HITS[first].formula)
         for seen, first in FIRST_HIT.items()
     },
-    "seen_emission": Feature(
-        *("seen_emission", "seen_emission", 3, 0.0, 1.0, encode_color, PAST + "emission, " + DISPLAY_FORMULA)
-    ),
+    **_features({"seen_emission": (encode_color, PAST + "emission, " + DISPLAY_FORMULA)}),
     **PICTURES_BEFORE,
-    **SMOOTHED,
-    SUN: Feature(SUN, SUN, 3, -1.0, 1.0, encode_signed, "unit direction in world space towards the sun"),
-    DIRECT: Feature(
-        *(DIRECT, DIRECT, 3, 0.0, 1.0, encode_color),
-        "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA,
+    **_features(
+        {
+            f"{past}smoothed": (
+                encode_color,
+                f"color smoothed, guided by {', '.join(guides.values())} (spec/smoothing.md); "
+                + DISPLAY_FORMULA,
+                "color",
+                guides,
+            )
+            for past in ("", "seen_")
+            for guides in [{guide: past + guide for guide in (*GUIDES, DEPTH)}]
+        }
+    ),
+    **_features(
+        {
+            SUN: (encode_signed, "unit direction in world space towards the sun"),
+            DIRECT: (encode_color, "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA),
+        }
     ),
 }
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
-the first hit are, by the same scales."""
+the first hit are, by the same scales; smoothed colour is guided by the one or the other."""
 
 BORDERS: Mapping[str, str] = {"clamp": "edge", "zero": "constant"}
 """Border rules, by name, as NumPy's padding modes: repeat the nearest pixel, or see zeros."""

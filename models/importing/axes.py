@@ -12,8 +12,7 @@ from dataclasses import replace
 
 from .fields import CHANNEL, COLUMNS, PLACE_NUMBERS, ROWS, Field, joined
 from .graph import GraphNode
-from .reader import AGAIN, MOST_AXES, Reader
-from .rules import ANY, LISTED, NUMBER, Operator, only
+from .reader import AGAIN, ANY, LISTED, MOST_AXES, NUMBER, Operator, Reader, only
 
 
 def _transpose(reader: Reader, node: GraphNode) -> Field:

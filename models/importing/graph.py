@@ -106,6 +106,7 @@ def read(path: Path) -> Graph:
     content = read_file(path, "network", "give a file in ONNX's form (.onnx)")
     try:
         import onnx
+        from google.protobuf.message import DecodeError
     except ImportError as error:
         missing = f"package {error.name} cannot be imported: pip install 'wamnet[full]'"
         raise ExecutorUnavailable(missing) from None
@@ -117,23 +118,15 @@ def read(path: Path) -> Graph:
         return _plain(path, model)
     except InputError:
         raise
-    except (*BROKEN, RuntimeError, _decoding(), onnx.checker.ValidationError) as error:
+    except (*BROKEN, RuntimeError, DecodeError, onnx.checker.ValidationError) as error:
         rule = f"cannot be read as a graph: {error}"
         raise InputError("network", str(path), rule, way_out) from None
 
 
-def _decoding() -> type[Exception]:
-    """Return the error of a file that is not in the form of protobuf."""
-    from google.protobuf.message import DecodeError
-
-    found: type[Exception] = DecodeError
-    return found
-
-
 def _check_inside(path: Path, model: Any) -> None:
     """Refuse a graph that is large, or whose weights are in other files."""
-    tensors = [*model.graph.initializer, *(t for n in model.graph.node for t in _tensors(n))]
-    for tensor in tensors:
+    attributes = (each for node in model.graph.node for each in node.attribute)
+    for tensor in (*model.graph.initializer, *(each.t for each in attributes if each.HasField("t"))):
         if tensor.data_location == tensor.EXTERNAL:
             rule = "its numbers are in another file, which is not read"
             raise InputError(f"{path}: tensor", tensor.name, rule, "export with the weights embedded")
@@ -146,11 +139,6 @@ def _check_inside(path: Path, model: Any) -> None:
     ):
         if count > most:
             raise InputError(f"{path}: {what}", count, f"at most {most}", "import a smaller network")
-
-
-def _tensors(node: Any) -> list[Any]:
-    """Return the tensors among a node's attributes."""
-    return [each.t for each in node.attribute if each.HasField("t")]
 
 
 def _plain(path: Path, model: Any) -> Graph:
@@ -171,7 +159,8 @@ def _plain(path: Path, model: Any) -> Graph:
     graph = Graph(inputs, [], made.output[0].name, constants, opset, model.producer_name)
     nodes, computed = [], 0
     for number, each in enumerate(made.node):
-        attributes = {a.name: _decoded(helper.get_attribute_value(a)) for a in each.attribute}
+        values = {a.name: helper.get_attribute_value(a) for a in each.attribute}
+        attributes = {key: v.decode() if isinstance(v, bytes) else v for key, v in values.items()}
         results = tuple(name for name in each.output if name)
         name = each.name or f"number {number}"
         node = GraphNode(each.op_type, tuple(each.input), results, attributes, name)
@@ -186,11 +175,6 @@ def _plain(path: Path, model: Any) -> Graph:
             nodes.append(node)
     graph.nodes = nodes
     return graph
-
-
-def _decoded(value: Any) -> Any:
-    """Return an attribute's value: strings come as bytes."""
-    return value.decode() if isinstance(value, bytes) else value
 
 
 def _input(value: Any) -> GraphInput:

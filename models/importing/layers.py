@@ -67,7 +67,7 @@ def layered(values: Sequence[Value], output: Field, sources: Sequence[Source]) -
     at = _alone(output)
     last = values[at] if at is not None else None
     # A clip that nothing follows is the network's own.
-    if last is not None and last.argument is not None and last.step is not None and _clips(last.step):
+    if last and last.argument is not None and last.step and last.step.kind in ("relu", "clip"):
         (low, *rest), output = last.step.numbers, last.argument
         high = rest[0] if rest else math.inf
     output = output.folded()
@@ -99,11 +99,6 @@ def _alone(field: Field) -> int | None:
     ((value, dy, dx), term), *_ = field.terms.items()
     same = term.shape[0] == term.shape[1] and np.array_equal(term, np.eye(len(term)))
     return value if same and dy == dx == 0 else None
-
-
-def _clips(step: Step) -> bool:
-    """Return whether a step only clips."""
-    return step.kind in ("relu", "clip")
 
 
 def _needs(values: Sequence[Value], output: Field, depth: int) -> dict[Spot, int]:

@@ -2,7 +2,9 @@
 
 1. Read the graph: nodes that the inputs reach, the rest computed [graph.py].
 2. Take each input as an image, with its axis of channels and the range of its numbers [`_source`].
-3. Run the operators on fields [operators.py], and bring the output back to the picture's size [`_centred`].
+3. Run the operators on fields: an operator, attribute or value of one that has no row is rejected, as names,
+   types and numbers of inputs have been checked before [`run`, values.py, axes.py]. Bring the output back to
+   the picture's size [`_centred`].
 4. Lay out a neuron for each value at each place that a pixel depends on [layers.py].
 """
 
@@ -19,12 +21,14 @@ from ...refimpl.errors import InputError, choice
 from ...refimpl.network.dataset import BORDERS, Window
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.imported import MOST_CHANNELS, Source
+from ...refimpl.reading import BROKEN
 from ..model_file import imported_model
+from .axes import AXES
 from .fields import Field
-from .graph import GraphInput, read
+from .graph import GraphInput, GraphNode, read
 from .layers import layered
-from .operators import run
-from .reader import Reader
+from .reader import AGAIN, INFERENCE, NONE, Operator, Reader
+from .values import VALUES
 
 LAYOUTS: Mapping[int, str] = {1: "C", 2: "PC", 3: "HWC", 4: "NCHW"}
 """The axes of an input by their number, as labels [fields.py]: rows of values, or an image."""
@@ -46,6 +50,10 @@ TYPES: Mapping[str, tuple[float, float]] = {
     **{name: (np.iinfo(name).min, np.iinfo(name).max) for name in ("int8", "int16", "uint8", "uint16")},
 }
 """The types of inputs, and the range of each: that of integers is the default, and float32 holds it."""
+
+
+OPERATORS: Mapping[str, Operator] = {**VALUES, **AXES}
+"""All operators that are imported."""
 
 
 @dataclass(frozen=True)
@@ -160,3 +168,28 @@ def _centred(reader: Reader, output: Field) -> tuple[Field, int]:
     # What was cut off has no pixels in the graph, and what was added is in no pixel of the model.
     edges = zip(output.edges, (rows, columns, rows, columns), strict=True)
     return output, max(0, *(edge - grown // 2 for edge, grown in edges))
+
+
+def run(reader: Reader, node: GraphNode) -> None:
+    """Add the result of a node."""
+    operator = OPERATORS.get(node.op)
+    if operator is None:
+        rule = f"supported are {', '.join(sorted(OPERATORS))}"
+        node.refuse(node.op, rule, "export the network without it, or compute it outside")
+    for name, value in node.attributes.items():
+        allowed = operator.attributes.get(name, NONE)
+        if not allowed.holds(value):
+            node.refuse(f"{name}={value}", f"{name} must be {allowed.text}", allowed.remedy)
+    if len(node.outputs) > operator.outputs:
+        node.refuse(", ".join(node.outputs), "further outputs are for training", INFERENCE)
+    operands = [reader.fields[name] for name in node.inputs if name in reader.fields]
+    if any(x.integer for x in operands) and not operator.integers:
+        node.refuse("integers", "it would round or wrap integers", "Cast the input to float32 first")
+    try:
+        with np.errstate(all="ignore"):
+            result = operator.handler(reader, node)
+    except InputError:
+        raise
+    except (*BROKEN, RuntimeError) as error:
+        node.refuse(f"{type(error).__name__}: {error}", "its inputs or attributes do not fit", AGAIN)
+    reader.add(node, result)

@@ -16,16 +16,24 @@ import numpy as np
 from ...refimpl.network.imported import Step
 from .fields import BATCH, CHANNEL, COLUMNS, PLACE_NUMBERS, ROWS, Array, Field, added, convolved
 from .graph import GraphNode
-from .reader import AGAIN, MOST_AXES, Reader
-from .rules import ANY, INFERENCE, NUMBER, Handler, Operator, Rule, lists, only
+from .reader import (
+    AGAIN,
+    ANY,
+    DOUBLE,
+    FLOAT,
+    INFERENCE,
+    MOST_AXES,
+    NUMBER,
+    Handler,
+    Operator,
+    Reader,
+    Rule,
+    lists,
+    only,
+)
 
 CHANNELS_LAST = "a matrix maps the last axis, which must be the channels"
 """The rule of matrices."""
-
-
-def _same(reader: Reader, node: GraphNode) -> Field:
-    """Return the input: Identity."""
-    return reader.field(node)
 
 
 def _dropout(reader: Reader, node: GraphNode) -> Field:
@@ -33,11 +41,6 @@ def _dropout(reader: Reader, node: GraphNode) -> Field:
     if np.any(reader.constant(node, 2, False)):
         node.refuse("training_mode=1", "must be 0", "export a network in inference mode")
     return reader.field(node)
-
-
-def _cast(reader: Reader, node: GraphNode) -> Field:
-    """Cast to float32 or float64, which hold what kernels compute."""
-    return replace(reader.field(node), integer=False)
 
 
 def _conv(reader: Reader, node: GraphNode) -> Field:
@@ -97,11 +100,6 @@ def _gemm(reader: Reader, node: GraphNode) -> Field:
     return replace(x, constant=x.constant + float(node.attributes.get("beta", 1.0)) * constant)
 
 
-def _matmul(reader: Reader, node: GraphNode) -> Field:
-    """Map the last axis by a constant matrix."""
-    return _matrix(reader, node, reader.field(node), reader.weight(node, 1).T)
-
-
 def _matrix(reader: Reader, node: GraphNode, x: Field, weight: Array, rank: int = 0) -> Field:
     """Return weight (D, C) times a field; `rank`: how many axes it must have, 0 for any."""
     fits = x.layout and x.has_channels(-1) and weight.ndim == 2 and weight.shape[1:] == (x.channels,)
@@ -158,12 +156,6 @@ def _scaled(power: int) -> Handler:
     return handler
 
 
-def _negative(reader: Reader, node: GraphNode) -> Field:
-    """-x."""
-    x = reader.field(node)
-    return replace(x, scale=-x.scale)
-
-
 def _normalised(reader: Reader, node: GraphNode) -> Field:
     """Batch normalisation in inference: a scale and a constant for each channel, which are axis 1."""
     x = reader.field(node)
@@ -185,11 +177,6 @@ def _sin(reader: Reader, node: GraphNode) -> Field:
     scale = float(np.float32(x.scale))
     x = x if scale == x.scale else x.folded()
     return reader.activated(node, replace(x, scale=1.0), Step("sine", (x.scale,)))
-
-
-def _relu(reader: Reader, node: GraphNode) -> Field:
-    """The larger of x and 0."""
-    return reader.activated(node, reader.field(node).folded(), Step("relu", (0.0,)))
 
 
 def _leaky(reader: Reader, node: GraphNode) -> Field:
@@ -215,9 +202,6 @@ def _clip(reader: Reader, node: GraphNode) -> Field:
 
 # ---- the rows ------------------------------------------------------------------------------------------
 
-FLOAT, DOUBLE = 1, 11
-"""ONNX's numbers for float32 and float64."""
-
 VALUES: Mapping[str, Operator] = {
     "Add": Operator(_summed(1.0)),
     "BatchNormalization": Operator(
@@ -229,7 +213,11 @@ VALUES: Mapping[str, Operator] = {
             "training_mode": only(0, remedy=INFERENCE),
         },
     ),
-    "Cast": Operator(_cast, {"to": only(FLOAT, DOUBLE), "saturate": ANY}, integers=True),
+    "Cast": Operator(
+        lambda r, n: replace(r.field(n), integer=False),
+        {"to": only(FLOAT, DOUBLE), "saturate": ANY},
+        integers=True,
+    ),
     "Clip": Operator(_clip, {"min": ANY, "max": ANY}),
     "Conv": Operator(
         _conv,
@@ -249,12 +237,12 @@ VALUES: Mapping[str, Operator] = {
     "Div": Operator(_scaled(-1)),
     "Dropout": Operator(_dropout, {"ratio": ANY, "seed": ANY}, outputs=2),
     "Gemm": Operator(_gemm, {"alpha": NUMBER, "beta": NUMBER, "transA": only(0), "transB": only(0, 1)}),
-    "Identity": Operator(_same, integers=True),
+    "Identity": Operator(lambda r, n: r.field(n), integers=True),
     "LeakyRelu": Operator(_leaky, {"alpha": NUMBER}),
-    "MatMul": Operator(_matmul),
+    "MatMul": Operator(lambda r, n: _matrix(r, n, r.field(n), r.weight(n, 1).T)),
     "Mul": Operator(_scaled(1)),
-    "Neg": Operator(_negative),
-    "Relu": Operator(_relu),
+    "Neg": Operator(lambda r, n: replace(r.field(n), scale=-r.field(n).scale)),
+    "Relu": Operator(lambda r, n: r.activated(n, r.field(n).folded(), Step("relu", (0.0,)))),
     "Sin": Operator(_sin),
     "Sub": Operator(_summed(-1.0)),
 }

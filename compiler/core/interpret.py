@@ -92,14 +92,10 @@ def _value(
     if node.op == "loop":
         return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
     operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
-    if node.op == "affine" and kind == np.float32 and program.gather and _is_input(program, node.args[0]):
+    of_window = node.op == "affine" and program.nodes[node.args[0]].op == "input"
+    if of_window and kind == np.float32 and program.gather:
         return _in_parts(node, operands[0], parameters, program.gather)
     return apply(node, operands, parameters, kind)
-
-
-def _is_input(program: Program, index: int) -> bool:
-    """Return whether a value is the window."""
-    return program.nodes[index].op == "input"
 
 
 def _in_parts(node: Node, x: Any, parameters: Any, gather: Gather) -> Any:

@@ -63,11 +63,6 @@ def divide(a: Ends, b: Ends) -> Ends:
     return np.where(safe, low, -np.inf), np.where(safe, high, np.inf)
 
 
-def reciprocal(a: Ends) -> Ends:
-    """1 / a."""
-    return divide((1.0, 1.0), a)
-
-
 def negative(a: Ends) -> Ends:
     """The ends change places."""
     return -a[1], -a[0]
@@ -110,11 +105,6 @@ def sine_range(low: Any, high: Any) -> Ends:
     return np.maximum(least - RANGE_OUTWARD, -1.0), np.minimum(most + RANGE_OUTWARD, 1.0)
 
 
-def sine(a: Ends) -> Ends:
-    """As [`sine_range`]."""
-    return sine_range(*a)
-
-
 def cosine(a: Ends) -> Ends:
     """cos(a) = sin(a + pi/2); float64 rounds a + pi/2, which moves the sine by less than the slack."""
     slack = 2.0**-51 * (np.maximum(np.abs(a[0]), np.abs(a[1])) + 2.0)
@@ -126,19 +116,19 @@ def less(a: Ends, b: Ends) -> Ends:
     return a[1] < b[0], ~(a[0] >= b[1])
 
 
-def less_equal(a: Ends, b: Ends) -> Ends:
-    """a <= b is not b < a."""
-    return logical_not(less(b, a))
-
-
 def equal(a: Ends, b: Ends) -> Ends:
     """True of one number on both sides, false where the ranges do not meet."""
     return (a[0] == a[1]) & (b[0] == b[1]) & (a[0] == b[0]), ~((a[1] < b[0]) | (a[0] > b[1]))
 
 
-def not_equal(a: Ends, b: Ends) -> Ends:
-    """a != b is not a == b."""
-    return logical_not(equal(a, b))
+def greater(a: Ends, b: Ends) -> Ends:
+    """a > b is b < a."""
+    return less(b, a)
+
+
+def opposite(image: Image) -> Image:
+    """Return the image of what is true where a comparison is false."""
+    return lambda a, b: logical_not(image(a, b))
 
 
 def logical_not(a: Ends) -> Ends:

@@ -202,26 +202,6 @@ def _affine_value(x: Any, weight: Any, bias: Any = None) -> Any:
     return product if bias is None else product + bias
 
 
-def _stack_value(*numbers: Any) -> Any:
-    """n arrays (...) -> (..., n)."""
-    return np.stack(np.broadcast_arrays(*numbers), axis=-1)
-
-
-def _component_value(x: Any, index: int) -> Any:
-    """x (..., n) -> (...)."""
-    return x[..., index]
-
-
-def _convert_value(x: Any, dtype: Any) -> Any:
-    """x (...) in another kind of number."""
-    return np.asarray(x).astype(dtype)
-
-
-def _take_value(index: Any, table: Any) -> Any:
-    """index (...), table (K,) -> (...)."""
-    return np.take(table, index)
-
-
 def _no_definition(*_: Any, **__: Any) -> Any:
     """Inputs, constants, parameters and what makes up a loop are the interpreter's own."""
     raise NotImplementedError
@@ -248,11 +228,6 @@ def _compare(name: str, function: Callable[..., Any], image: Image) -> Op:
     return Op(name, 2, _comparison, function, "exact", elementwise=True, image=image)
 
 
-def _bits(name: str, function: Callable[..., Any]) -> Op:
-    """Return the row of an operation on the bits of an integer."""
-    return Op(name, 2, _elementwise(("uint32",)), function, "exact", elementwise=True)
-
-
 OPS: Mapping[str, Op] = {
     op.name: op
     for op in (
@@ -273,7 +248,7 @@ OPS: Mapping[str, Op] = {
         _row("subtract", np.subtract, 2, "nearest", NUMBERS, intervals.subtract),
         _row("multiply", np.multiply, 2, "nearest", NUMBERS, intervals.multiply),
         _row("divide", np.divide, 2, "divide", image=intervals.divide),
-        _row("reciprocal", np.reciprocal, 1, "divide", image=intervals.reciprocal),
+        _row("reciprocal", np.reciprocal, 1, "divide", image=lambda a: intervals.divide((1.0, 1.0), a)),
         _row("negative", np.negative, 1, image=intervals.negative),
         _row("absolute", np.absolute, 1, image=intervals.absolute),
         _row("minimum", np.minimum, 2, kinds=NUMBERS),
@@ -282,23 +257,40 @@ OPS: Mapping[str, Op] = {
         _row("sqrt", np.sqrt, 1, "sqrt", image=intervals.sqrt),
         _row("power", np.power, 2, "power", image=intervals.power),
         _row("exp", np.exp, 1, "exp", image=intervals.exponential),
-        _row("sin", np.sin, 1, "sine", image=intervals.sine),
+        _row("sin", np.sin, 1, "sine", image=lambda a: intervals.sine_range(*a)),
         _row("cos", np.cos, 1, "cosine", image=intervals.cosine),
         _compare("less", np.less, intervals.less),
-        _compare("less_equal", np.less_equal, intervals.less_equal),
-        _compare("greater", np.greater, lambda a, b: intervals.less(b, a)),
-        _compare("greater_equal", np.greater_equal, lambda a, b: intervals.less_equal(b, a)),
+        _compare("less_equal", np.less_equal, intervals.opposite(intervals.greater)),
+        _compare("greater", np.greater, intervals.greater),
+        _compare("greater_equal", np.greater_equal, intervals.opposite(intervals.less)),
         _compare("equal", np.equal, intervals.equal),
-        _compare("not_equal", np.not_equal, intervals.not_equal),
+        _compare("not_equal", np.not_equal, intervals.opposite(intervals.equal)),
         _row("logical_and", np.logical_and, 2, kinds=("bool",)),
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
         _row("logical_not", np.logical_not, 1, kinds=("bool",), image=intervals.logical_not),
-        _bits("bitwise_and", np.bitwise_and),
-        _bits("bitwise_xor", np.bitwise_xor),
-        _bits("right_shift", np.right_shift),
+        *(
+            Op(each.__name__, 2, _elementwise(("uint32",)), each, "exact", elementwise=True)
+            for each in (np.bitwise_and, np.bitwise_xor, np.right_shift)
+        ),
         Op("select", 3, _select, np.where, "exact", elementwise=True, image=intervals.select),
-        Op("convert", 1, _convert, _convert_value, "nearest", required=("dtype",), elementwise=True),
-        Op("take", 1, _take, _take_value, "exact", required=("table",), parameters=("table",)),
+        Op(
+            "convert",
+            1,
+            _convert,
+            lambda x, dtype: np.asarray(x).astype(dtype),
+            "nearest",
+            required=("dtype",),
+            elementwise=True,
+        ),
+        Op(
+            "take",
+            1,
+            _take,
+            lambda index, table: np.take(table, index),
+            "exact",
+            required=("table",),
+            parameters=("table",),
+        ),
         Op("carried", 1, _carried, _no_definition, "exact", required=("index", "loop")),
         Op("row", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
         Op("branch", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
@@ -312,8 +304,8 @@ OPS: Mapping[str, Op] = {
             optional=("first", "parts", "skip"),
             parameters=("first", "skip"),
         ),
-        Op("stack", None, _stack, _stack_value, "exact"),
-        Op("component", 1, _component, _component_value, "exact", required=("index",)),
+        Op("stack", None, _stack, lambda *x: np.stack(np.broadcast_arrays(*x), axis=-1), "exact"),
+        Op("component", 1, _component, lambda x, index: x[..., index], "exact", required=("index",)),
     )
 }
 """All operations, by name."""

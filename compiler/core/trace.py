@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -62,10 +63,6 @@ class Tracer(Builder):
         self.most_unrolled = most_unrolled
         self.keeps_places = keeps_places
         self.loops = 0
-
-    def unrolls(self, rows: int) -> bool:
-        """Tell whether a fold over so many rows is unrolled."""
-        return self.most_unrolled is None or rows <= self.most_unrolled
 
     def where(self) -> tuple[str, ...]:
         """Return the lines of the reference that are being executed, callers first."""
@@ -156,24 +153,19 @@ class Traced(NDArrayOperatorsMixin):
         _refuse("iteration over a value")
 
 
-class Table:
-    """A constant table (K,) that np.take looks up at a traced index."""
-
-    def __init__(self, builder: Builder, array: NDArray[Any]) -> None:
-        self.builder, self.array = builder, array
-
-    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
-        return _call(self.builder, function, args, options)
-
-
+@dataclass(frozen=True)
 class Planes:
     """Components stacked on the first axis, on their way to the last one by np.moveaxis."""
 
-    def __init__(self, builder: Builder, numbers: Any) -> None:
-        self.builder, self.numbers = builder, numbers
+    builder: Builder
+    held: Any
 
     def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Any:
         return _call(self.builder, function, args, options)
+
+
+class Table(Planes):
+    """A constant table (K,) that np.take looks up at a traced index."""
 
 
 def trace(
@@ -225,7 +217,7 @@ def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
     """
     if isinstance(value, Traced):
         return value.index
-    if isinstance(value, Planes):
+    if type(value) is Planes:
         _refuse("np.stack with axis=0 outside of np.moveaxis(np.stack(...), 0, -1)")
     if _is_mixed(value):
         return _operand(builder, emit(builder, "stack", *value) if value.ndim else value.item(), beside)
@@ -302,9 +294,9 @@ def _stack(builder: Builder, numbers: Any, axis: int = 0) -> Traced | Planes:
 
 def _moveaxis(builder: Builder, planes: Any, source: int, destination: int) -> Traced:
     """np.moveaxis(np.stack(numbers), 0, -1): components side by side."""
-    if not isinstance(planes, Planes) or (source, destination) != (0, -1):
+    if type(planes) is not Planes or (source, destination) != (0, -1):
         _refuse("np.moveaxis of anything but np.moveaxis(np.stack(...), 0, -1)")
-    return emit(builder, "stack", *planes.numbers)
+    return emit(builder, "stack", *planes.held)
 
 
 def _where(builder: Builder, condition: Any, a: Any, b: Any) -> Traced:
@@ -332,16 +324,6 @@ def _full_like(builder: Builder, like: Traced, value: Any, dtype: Any = None) ->
     return emit(builder, "stack", *[number] * like.shape[0]) if like.shape else number
 
 
-def _zeros_like(builder: Builder, like: Traced, dtype: Any = None) -> Traced:
-    """np.zeros_like is np.full_like with 0."""
-    return _full_like(builder, like, 0, dtype)
-
-
-def _ones_like(builder: Builder, like: Traced, dtype: Any = None) -> Traced:
-    """np.ones_like is np.full_like with 1."""
-    return _full_like(builder, like, 1, dtype)
-
-
 def _asarray(builder: Builder, array: Any) -> Table:
     """np.asarray(table, like=index) is a table that can be looked up."""
     if not isinstance(array, np.ndarray) or array.ndim != 1:
@@ -353,11 +335,11 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
     """np.take from a table at a traced index."""
     if not isinstance(table, Table):
         _refuse("np.take from anything but np.asarray(table, like=index)")
-    if not _is_mixed(table.array):
-        return emit(builder, "take", index, table=builder.table(_known(table.array)))
+    if not _is_mixed(table.held):
+        return emit(builder, "take", index, table=builder.table(_known(table.held)))
     # The constants are a table as ever; each traced entry is a selection.
-    traced = {i: entry for i, entry in enumerate(table.array) if isinstance(entry, Traced)}
-    constants = np.array([0.0 if i in traced else entry for i, entry in enumerate(table.array)], np.float32)
+    traced = {i: entry for i, entry in enumerate(table.held) if isinstance(entry, Traced)}
+    constants = np.array([0.0 if i in traced else entry for i, entry in enumerate(table.held)], np.float32)
     value = emit(builder, "take", index, table=builder.table(constants))
     for i, entry in traced.items():
         value = emit(builder, "select", emit(builder, "equal", index, i), entry, value)
@@ -366,10 +348,13 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
 
 def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
     """A fold over more rows than are unrolled is a loop whose body is one step."""
-    trips = len(tables[0])
-    if not isinstance(builder, Tracer) or builder.unrolls(trips) or any(map(_is_mixed, tables)):
+    if not isinstance(builder, Tracer) or builder.most_unrolled is None or any(map(_is_mixed, tables)):
         return NotImplemented
-    return _looped(builder, step, tables, start)
+    if len(tables[0]) <= builder.most_unrolled:
+        return NotImplemented
+    number, carried = _carried(builder, start)
+    after = _stepped(builder, step, tables, number, carried)
+    return _results(builder, number, len(tables[0]), carried, after, {})
 
 
 def walk_rows(
@@ -390,13 +375,6 @@ def walk_rows(
     names = {"first": builder.table(first.reshape(-1)), "skip": builder.table(skip), "parts": len(parts)}
     trips = sum(len(tables[0]) for _, tables in parts)
     return _results(builder, number, trips, carried, [*chain(*after), entered], names)
-
-
-def _looped(builder: Tracer, step: Any, tables: Any, start: Any) -> Any:
-    """Return a loop's results."""
-    number, carried = _carried(builder, start)
-    after = _stepped(builder, step, tables, number, carried)
-    return _results(builder, number, len(tables[0]), carried, after, {})
 
 
 def _carried(builder: Tracer, start: Any) -> tuple[int, list[Traced]]:
@@ -484,8 +462,8 @@ _FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
     np.moveaxis: _moveaxis,
     np.where: _where,
     np.full_like: _full_like,
-    np.zeros_like: _zeros_like,
-    np.ones_like: _ones_like,
+    np.zeros_like: lambda builder, like, dtype=None: _full_like(builder, like, 0, dtype),
+    np.ones_like: lambda builder, like, dtype=None: _full_like(builder, like, 1, dtype),
     np.asarray: _asarray,
     np.take: _take,
 }

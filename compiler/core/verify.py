@@ -70,7 +70,8 @@ def types_follow(program: Program) -> Iterator[str]:
     """Every node has the type that its operation's rule gives."""
     for index, node in enumerate(program.nodes):
         try:
-            found = node_type(program, node)
+            types = [program.nodes[arg].type for arg in node.args]
+            found = OPS[node.op].type_rule(types, dict(node.attributes), program.parameters)
         except TypeRuleError as error:
             yield f"%{index} {node.op}: {error}"
         else:
@@ -235,9 +236,3 @@ def verify(program: Program, when: str = "program") -> Program:
         for sentence in rule(program):
             raise CompileError(f"{when}: {sentence} (rule {rule.__name__})")
     return program
-
-
-def node_type(program: Program, node: Node) -> Type:
-    """Return the type that the node's operation gives for its operands."""
-    types = [program.nodes[arg].type for arg in node.args]
-    return OPS[node.op].type_rule(types, dict(node.attributes), program.parameters)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..ir import Node, Program
+from ..ir import Program
 from ..ops import OPS
 
 
@@ -20,11 +20,6 @@ def eliminate_dead(program: Program) -> Program:
         replace(program.nodes[i], args=tuple(moved[arg] for arg in program.nodes[i].args)) for i in kept
     )
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
-    used = {name for node in nodes for name in _parameter_names(node)}
+    used = {str(name) for node in nodes for key, name in node.attributes if key in OPS[node.op].parameters}
     parameters = {name: array for name, array in program.parameters.items() if name in used}
     return replace(program, nodes=nodes, outputs=outputs, parameters=parameters)
-
-
-def _parameter_names(node: Node) -> list[str]:
-    """Return the names of the parameters that a node reads."""
-    return [str(value) for name, value in node.attributes if name in OPS[node.op].parameters]

@@ -35,12 +35,8 @@ def _rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
     dtype = node.type.dtype
     result = constant_of(builder, table[-1], dtype)
     for change in reversed(changes):
-        before = builder.add(Node("less", (args[0], _index(builder, change)), Type("bool")))
+        place = constant_of(builder, np.int32(change), "int32")
+        before = builder.add(Node("less", (args[0], place), Type("bool")))
         value = constant_of(builder, table[change - 1], dtype)
         result = builder.add(Node("select", (before, value, result), node.type))
     return result
-
-
-def _index(builder: Builder, value: int) -> int:
-    """Return the index of an integer constant."""
-    return constant_of(builder, np.int32(value), "int32")

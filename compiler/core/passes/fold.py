@@ -11,7 +11,7 @@ known index, or in a table of equal entries, is a constant.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,8 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
         if node.op == "constant" and node.type.dtype == "float32":
             return constant_of(builder, kind.type(node["value"]), "float32")
         constants = [_constant(builder.nodes[arg]) for arg in args]
-        if args and all(value is not None for value in constants) and _computable(node):
+        number = not node.type.shape and (OPS[node.op].elementwise or node.op == "take")
+        if args and number and all(value is not None for value in constants):
             return _computed(builder, node, args, kind)
         for simplify in (_neutral, _decided, _selected, _looked_up, _negated):
             index = simplify(builder, node, args, constants)
@@ -68,13 +69,6 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
 
 Known = list[bool | int | float | None]
 """The values of a node's operands, None for those that are not constants."""
-
-Simplification = Callable[[Builder, Node, tuple[int, ...], Known], int | None]
-
-
-def _computable(node: Node) -> bool:
-    """Return whether a node of constant operands is a number that can be computed now."""
-    return not node.type.shape and (OPS[node.op].elementwise or node.op == "take")
 
 
 def _computed(builder: Builder, node: Node, args: tuple[int, ...], kind: np.dtype[Any]) -> int | None:

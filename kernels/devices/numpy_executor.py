@@ -1,7 +1,7 @@
-"""The interpreter of the IR as an executor: all windows of a block of rows at once, in float32.
+"""The interpreters of the IR as an executor: all windows of a block of rows at once, in float32.
 
-Its path tracer is the skeleton that path kernels have (compiler/scenes/emit_path.py), with all paths of a
-part as lanes: it defines what they add up.
+Kernels on planes are run as they are (compiler/kernel/run.py). The path tracer is the skeleton that path
+kernels have (compiler/scenes/emit_path.py), with all paths of a part as lanes: it defines what they add up.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import NONE, Artifact
 from ...compiler.core.interpret import interpret
-from ...compiler.kernel.interface import DENOISE, IMAGE, PATH, RESULT, SCENE_NUMBERS
+from ...compiler.kernel.interface import DENOISE, IMAGE, PATH, READ, RESULT, SCENE_NUMBERS
 from ...compiler.kernel.interface import SUMS as PATH_SUMS
+from ...compiler.kernel.run import run_on
 from ...compiler.scenes.lower_scene import WAY, PathPrograms
 from ...compiler.schedules.common import kernel_gather
 from ...refimpl.network import dataset
 from .executor import Executor
 from .kernel import Memory
-from .numpy_planes import INTERPRETED
 
 BLOCK_NUMBERS = 2**22
 """Numbers in the windows of one block of rows: 16 MiB in float32, for images of any height."""
@@ -50,7 +50,9 @@ class NumpyExecutor(Executor):
             images = [held[f"{IMAGE}{image.name}"] for image in kernel.images]
             _denoised(kernel, np.concatenate(images, axis=-1), held[RESULT])
         else:
-            INTERPRETED[kernel.role](kernel, held, integers)
+            taken = {a.name: held[a.name] for a in kernel.interface.arrays if a.access == READ}
+            for name, content in run_on(kernel.kernel, taken, integers).items():
+                held[name][:] = content
 
 
 def _traced(

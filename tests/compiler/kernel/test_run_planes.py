@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plane_meanings import INTERPRETED
 from rough import rough_layers
 
 from wamnet.compiler.kernel.kernel import FLOAT, Let, Store, const, load, name
@@ -14,7 +15,6 @@ from wamnet.compiler.kernel.verify import KernelError, verify
 from wamnet.compiler.scenes.encode_kernel import compile_encode
 from wamnet.compiler.scenes.history_kernel import CAMERAS, FIRST, MOTION, PAST, compile_history
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, smooth_kernel
-from wamnet.kernels.devices.numpy_planes import INTERPRETED
 from wamnet.refimpl.network.dataset import Normalization
 
 SCALES = Normalization(exposure_stops=-1.5)

@@ -1,4 +1,4 @@
-"""Kernels on planes, interpreted: all pixels at once, each program by NumPy's operations."""
+"""A second meaning of kernels on planes: all pixels at once, each program by NumPy's operations."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...compiler.artifact import Artifact
-from ...compiler.core.interpret import interpret
-from ...compiler.kernel.interface import (
+from wamnet.compiler.artifact import Artifact
+from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.kernel.interface import (
     CAMERAS,
     ENCODE,
     FIRST,
@@ -24,11 +24,11 @@ from ...compiler.kernel.interface import (
     RESULT,
     SMOOTH,
 )
-from ...compiler.kernel.interface import SUMS as SUMS_ARRAY
-from ...compiler.scenes import history_kernel
-from ...compiler.scenes.encode_kernel import SAMPLES
-from ...compiler.scenes.history_kernel import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
-from ...compiler.scenes.smooth_kernel import (
+from wamnet.compiler.kernel.interface import SUMS as SUMS_ARRAY
+from wamnet.compiler.scenes import history_kernel
+from wamnet.compiler.scenes.encode_kernel import SAMPLES
+from wamnet.compiler.scenes.history_kernel import BEYOND, COLOR, MOTION, NUMBER, RESTS, SIZE, STARTS, TOTALS
+from wamnet.compiler.scenes.smooth_kernel import (
     GUIDED,
     HERE,
     LAYERS_READ,
@@ -38,7 +38,7 @@ from ...compiler.scenes.smooth_kernel import (
     THERE,
     WEIGHTS,
 )
-from ...refimpl.network import smoothing
+from wamnet.refimpl.network import smoothing
 
 
 def _guided(kernel: Artifact, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:

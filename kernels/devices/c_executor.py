@@ -20,13 +20,11 @@ import subprocess
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import (
@@ -38,8 +36,6 @@ from ...compiler.kernel.interface import (
     PATH,
     PLAIN,
     SMOOTH,
-    WEIGHTS,
-    Interface,
 )
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from .. import cache
@@ -218,16 +214,6 @@ def glue_of(kernel: Artifact, header: str) -> str:
     return GLUE.format(header=header, body=body)
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    """The function of a loaded kernel, what the kernel takes, its weights, and the rows of a call."""
-
-    function: Any
-    interface: Interface
-    weights: NDArray[np.float32] | None
-    rows: int
-
-
 class CExecutor(Executor):
     """The system's C compiler; what it has built stays loaded as long as the process."""
 
@@ -286,24 +272,17 @@ class CExecutor(Executor):
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
         return {"options": self._options, "lanes": int(lanes), "bytes": byte_products == "1"}
 
-    def _prepare(self, kernel: Artifact) -> _Prepared:
-        rows, weights = 1, None
-        if kernel.role == DENOISE:
-            self._check_stack(kernel.manifest["private_bytes"])
-            rows = kernel.manifest["schedule"].get("rows", 1)
-            weights = np.ascontiguousarray(kernel.weights)
-        taken = kernel.interface
-        function = self._library(kernel, glue_of(kernel, _header(kernel)))
-        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
-        return _Prepared(function, taken, weights, rows)
-
-    def _check_stack(self, used: int) -> None:
-        """Refuse a kernel whose arrays take so many bytes a pixel."""
+    def _prepare(self, kernel: Artifact) -> Any:
+        """Return the function of a loaded kernel."""
+        used = kernel.manifest.get("private_bytes", 0)
         if used > PRIVATE_BYTES:
             raise CompileError(
                 f"{self.device}: arrays take {used} bytes per pixel; at most {PRIVATE_BYTES} fit "
                 "a thread's stack; use narrower layers, or executor numpy"
             )
+        function = self._library(kernel, glue_of(kernel, _header(kernel)))
+        function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
+        return function
 
     def _library(self, kernel: Artifact, glue: str) -> Any:
         """Return the function of a kernel's source and the glue around it, compiled and loaded."""
@@ -353,17 +332,17 @@ class CExecutor(Executor):
             )
 
     def _start(
-        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        taken = prepared.interface
-        held = {WEIGHTS: prepared.weights, **{name: memory.held for name, memory in arrays.items()}}
-        pointers = (ctypes.c_void_p * len(taken.arrays))(*(held[a.name].ctypes.data for a in taken.arrays))
+        taken = kernel.interface
+        held = (arrays[array.name].held.ctypes.data for array in taken.arrays)
         numbers = words(taken, integers)
-        call = partial(prepared.function, pointers, numbers.ctypes.data)
+        call = partial(prepared, (ctypes.c_void_p * len(taken.arrays))(*held), numbers.ctypes.data)
         if taken.role == ENCODE:
             call(0, integers["height"])
         else:
-            self._in_threads(integers[taken.rows], prepared.rows, call)
+            rows = kernel.manifest.get("schedule", {}).get("rows", 1)
+            self._in_threads(integers[taken.rows], rows, call)
 
     def _in_threads(self, height: int, whole: int, rows: Callable[[int, int], None]) -> None:
         """Call a function for blocks of rows [first, end), multiples of `whole`, shared out to threads."""

@@ -41,6 +41,7 @@ from ...compiler.kernel.interface import (
     RESULT,
     SCENE_NUMBERS,
     SUMS,
+    WEIGHTS,
 )
 from ...refimpl.errors import InputError
 from .images import Images, black, checked
@@ -67,9 +68,10 @@ INDEX_LIMIT = 2**31
 
 @dataclass(frozen=True)
 class Built:
-    """A kernel that is ready: what the device made of it, and the sizes at which it has run."""
+    """A kernel that is ready: what the device made of it, its weights there, and the sizes of its runs."""
 
     prepared: Any
+    weights: Memory | None = None
     run_at: set[Size] = field(default_factory=set)
 
 
@@ -117,7 +119,11 @@ class Executor(ABC):
 
     @abstractmethod
     def _prepare(self, kernel: Artifact) -> Any:
-        """Return a kernel, compiled, with its weights on the device."""
+        """Return a kernel, compiled."""
+
+    def _weights(self, kernel: Artifact) -> Memory:
+        """Return a network's weights on the device."""
+        return self._store(WEIGHTS, kernel.weights)
 
     def _discard(self, prepared: Any) -> None:
         """Give a compiled kernel back."""
@@ -142,7 +148,7 @@ class Executor(ABC):
     def _start(
         self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        """Start a kernel: arrays by the names of its interface, and at least its integers, by name."""
+        """Start a kernel: all arrays by the names of its interface, and at least its integers, by name."""
 
     def _fetch(self, name: str, memory: Memory) -> NDArray[np.float32]:
         """Wait for what was started, and return the memory's content."""
@@ -212,8 +218,11 @@ class Executor(ABC):
         """Build a kernel unless it is built, make it the newest, and drop the oldest ones."""
         built = self._built.pop(kernel.digest, None)
         if built is None:
-            with self._session():
-                built = Built(self._prepare(kernel))
+            with self._session(), ExitStack() as made:
+                prepared = self._prepare(kernel)
+                made.callback(self._discard, prepared)
+                built = Built(prepared, self._weights(kernel) if kernel.role == DENOISE else None)
+                made.pop_all()
         self._built[kernel.digest] = built
         self._drop([self._built.pop(next(iter(self._built))) for _ in range(len(self._built) - KEPT_KERNELS)])
 
@@ -242,6 +251,8 @@ class Executor(ABC):
             with self._session():
                 for built in dropped:
                     self._discard(built.prepared)
+                    if built.weights is not None:
+                        self._release(built.weights)
 
     def run(self, artifact: Artifact, inputs: Images) -> NDArray[np.float32]:
         """Return the output (H, W, C) for encoded feature images (H, W, C), float32, by name."""
@@ -281,8 +292,10 @@ class Executor(ABC):
             images = {image.name: result for image in artifact.images}
 
     def start(self, kernel: Artifact, arrays: Mapping[str, Memory], integers: Mapping[str, int]) -> None:
-        """Start a built kernel: arrays by the names of its interface, and at least its integers, by name."""
-        self._start(kernel, self._built[kernel.digest].prepared, arrays, integers)
+        """Start a built kernel: arrays but its weights by name, and at least its integers."""
+        built = self._built[kernel.digest]
+        held = {**arrays, WEIGHTS: built.weights} if built.weights is not None else arrays
+        self._start(kernel, built.prepared, held, integers)
 
     def call(self, kernel: Artifact, given: Images, integers: Mapping[str, int]) -> Images:
         """Return all arrays that a kernel writes, of any role but a network's, by the interface's names.

@@ -12,7 +12,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...compiler.kernel.interface import BLOCK, DENOISE, RESULT, SCENE_NUMBERS, WEIGHTS, Interface
+from ...compiler.kernel.interface import BLOCK, DENOISE, RESULT, SCENE_NUMBERS
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
@@ -73,17 +72,6 @@ BUILD_OPTIONS = ("-cl-std=CL1.2",)
 """Nothing here may allow what the standard's table of errors does not."""
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    """A kernel on the device, what it takes, its weights, work items (x, y) in a group, an item's pixels."""
-
-    kernel: Any
-    interface: Interface
-    weights: Any
-    local: tuple[int, int]
-    extent: tuple[int, int]
-
-
 class OpenCLExecutor(Executor):
     """One OpenCL device with its queue."""
 
@@ -132,18 +120,16 @@ class OpenCLExecutor(Executor):
         """PoCL compiles when a kernel is first enqueued."""
         return 1, 1
 
-    def _prepare(self, kernel: Artifact) -> _Prepared:
-        if kernel.role == DENOISE:
-            schedule = kernel.manifest["schedule"]
-            local, extent = self._local_size(kernel), (schedule["pixels"], schedule.get("rows", 1))
-        else:
-            local, extent = PATH_LOCAL_SIZE[min(kernel.lanes, 2)], (kernel.lanes, 1)
-        function = getattr(self._compiled(kernel.source), kernel.entry_point)
-        weights = None
-        if kernel.role == DENOISE:
-            # An empty buffer is not a buffer.
-            weights = self._copied(kernel.weights if kernel.weights.size else np.zeros(1, np.float32))
-        return _Prepared(function, kernel.interface, weights, local, extent)
+    def _prepare(self, kernel: Artifact) -> tuple[Any, tuple[int, int]]:
+        """Return a kernel on the device, and the work items (x, y) in a group."""
+        denoises = kernel.role == DENOISE
+        local = self._local_size(kernel) if denoises else PATH_LOCAL_SIZE[min(kernel.lanes, 2)]
+        return getattr(self._compiled(kernel.source), kernel.entry_point), local
+
+    def _weights(self, kernel: Artifact) -> Memory:
+        """Return a copy of the weights; an empty buffer is not a buffer."""
+        held = self._copied(kernel.weights if kernel.weights.size else np.zeros(1, np.float32))
+        return Memory(kernel.weights.shape, held)
 
     def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
         """Refuse images that do not fit one buffer of the device, or whose indices `int` does not hold."""
@@ -209,13 +195,16 @@ class OpenCLExecutor(Executor):
             ) from None
 
     def _start(
-        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        taken, (columns, rows) = prepared.interface, prepared.extent
-        items = (-(-integers["width"] // columns), -(-integers[taken.rows] // rows))
-        held = {WEIGHTS: prepared.weights, **{name: memory.held for name, memory in arrays.items()}}
-        arguments = [*(held[array.name] for array in taken.arrays), *in_order(taken, integers)]
-        prepared.kernel(self._queue, _whole(items, prepared.local), prepared.local, *arguments)
+        taken, (function, local) = kernel.interface, prepared
+        picked = kernel.manifest.get("schedule", {"pixels": kernel.lanes})
+        items = (
+            -(-integers["width"] // picked["pixels"]),
+            -(-integers[taken.rows] // picked.get("rows", 1)),
+        )
+        held = (arrays[array.name].held for array in taken.arrays)
+        function(self._queue, _whole(items, local), local, *held, *in_order(taken, integers))
 
     def sums_shape(self, kernel: Artifact, rows: int, width: int) -> tuple[int, int, int]:
         """Return the shape of whole groups of whole vectors; numbers beyond the part mean nothing."""

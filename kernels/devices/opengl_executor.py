@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import moderngl
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import DENOISE, PLANES, READ, SCENE_NUMBERS, WEIGHTS, WRITE, Interface
+from ...compiler.kernel.interface import DENOISE, PLANES, READ, SCENE_NUMBERS, WEIGHTS, Interface
 from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -72,23 +72,6 @@ GPU_SCHEDULE = "group:2"
 SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
 kernel computes some 14,000 pixels of the bundled network."""
-
-
-@dataclass(frozen=True)
-class _Prepared:
-    """A kernel on the device, what it takes, and its weights or None.
-
-    A compute shader has no triangle, and the pixels (x, y) of a group's `tile`. One in passes has a program
-    for each, and `schedule` says what is launched.
-    """
-
-    program: Any
-    triangle: Any
-    weights: Any
-    interface: Interface
-    tile: tuple[int, int] | None = None
-    passes: tuple[Any, ...] = ()
-    schedule: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -146,19 +129,19 @@ class OpenGLExecutor(Executor):
         height, width = size
         return 3 if height & (height - 1) else 2, 3 if width & (width - 1) else 2
 
-    def _prepare(self, kernel: Artifact) -> _Prepared:
+    def _prepare(self, kernel: Artifact) -> tuple[tuple[Any, ...], Any]:
+        """Return the programs, one for each launch, and the triangle of one that draws; others have none."""
+        if kernel.role == DENOISE:
+            self._check_promise(kernel)
+            self._check_loops(kernel)
         with ExitStack() as made:
-            weights = None
-            if kernel.role == DENOISE:
-                self._check_promise(kernel)
-                self._check_loops(kernel)
-                if {"group", "launches"} & set(kernel.manifest["schedule"]):
-                    return self._compile_compute(kernel)
-                weights = self._weights(kernel)
-                made.callback(weights.release)
-            program, triangle = self._program(kernel.source, made)
+            if _computes(kernel):
+                programs, triangle = self._computing(kernel, made), None
+            else:
+                program, triangle = self._program(kernel.source, made)
+                programs = (program,)
             made.pop_all()
-            return _Prepared(program, triangle, weights, kernel.interface)
+            return programs, triangle
 
     def _check_promise(self, artifact: Artifact) -> None:
         """Refuse a bound that the device cannot keep."""
@@ -179,42 +162,28 @@ class OpenGLExecutor(Executor):
                 "use executor c, opencl or numpy, or a variant with fewer products"
             )
 
-    def _discard(self, prepared: _Prepared) -> None:
-        for thing in (prepared.triangle, prepared.program, prepared.weights, *prepared.passes):
+    def _discard(self, prepared: tuple[tuple[Any, ...], Any]) -> None:
+        programs, triangle = prepared
+        for thing in (triangle, *programs):
             if thing is not None:
                 thing.release()
 
-    def _compile_compute(self, artifact: Artifact) -> _Prepared:
-        """Compile a compute shader, and put the weights into a storage buffer."""
-        schedule = artifact.manifest["schedule"]
+    def _computing(self, kernel: Artifact, made: ExitStack) -> tuple[Any, ...]:
+        """Return the compute shader of each launch; `made` gives them back if something fails."""
         if self._context.version_code < SHADER_VERSION:
             raise CompileError(
                 f"{self.device} has OpenGL {self._context.version_code / 100:.1f}: schedule "
-                f"{schedule['name']} is a compute shader, which needs OpenGL "
+                f"{kernel.manifest['schedule']['name']} is a compute shader, which needs OpenGL "
                 f"{SHADER_VERSION / 100:.1f}; use schedule plain"
             )
-        with ExitStack() as made:
-            data = artifact.weights.astype("<f4").tobytes() or bytes(16)
-            weights = self._context.buffer(data)
-            made.callback(weights.release)
-            if "launches" in schedule:
-                passes = tuple(self._compute(launch.source, made) for launch in artifact.launches)
-                made.pop_all()
-                return _Prepared(None, None, weights, artifact.interface, passes=passes, schedule=schedule)
-            program = self._compute(artifact.source, made)
-            made.pop_all()
-            width, height = schedule["group"]
-            tile = (width * schedule["pixels"], height)
-            return _Prepared(program, None, weights, artifact.interface, tile)
-
-    def _compute(self, source: str, made: ExitStack) -> Any:
-        """Return a compute shader; `made` gives it back if something fails."""
-        try:
-            program = self._context.compute_shader(source)
-        except moderngl.Error as error:
-            raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
-        made.callback(program.release)
-        return program
+        programs = []
+        for launch in kernel.launches or (kernel,):
+            try:
+                programs.append(self._context.compute_shader(launch.source))
+            except moderngl.Error as error:
+                raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
+            made.callback(programs[-1].release)
+        return tuple(programs)
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         """Return the shaders and the triangle that they draw; `made` gives them back if something fails."""
@@ -226,8 +195,11 @@ class OpenGLExecutor(Executor):
         made.callback(program.release)
         return program, self._context.vertex_array(program, [])
 
-    def _weights(self, artifact: Artifact) -> Any:
-        """Return the weights as a texture of whole rows."""
+    def _weights(self, artifact: Artifact) -> Memory:
+        """Return the weights as a texture of whole rows, those of compute shaders as a storage buffer."""
+        if _computes(artifact):
+            data = artifact.weights.astype("<f4").tobytes() or bytes(16)
+            return Memory(artifact.weights.shape, [self._context.buffer(data)])
         texel = artifact.manifest["schedule"].get(WEIGHTS_A_TEXEL, 1)
         rows = max(1, -(-artifact.weights.size // (WEIGHT_TEXTURE_WIDTH * texel)))
         largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
@@ -238,7 +210,7 @@ class OpenGLExecutor(Executor):
             )
         padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, texel), np.float32)
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
-        return self._texture("weights", padded)
+        return Memory(padded.shape, [self._texture("weights", padded)])
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         """Return an image or a table as a texture, planes as textures of four, numbers as uniforms."""
@@ -286,23 +258,20 @@ class OpenGLExecutor(Executor):
         self._context.finish()
 
     def _start(
-        self, kernel: Artifact, prepared: _Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        written = [arrays[array.name] for array in prepared.interface.arrays if array.access == WRITE]
-        targets = [texture for memory in written for texture in memory.held]
-        textures = self._named(prepared.interface, arrays)
-        if prepared.passes:
-            self._launch(prepared, textures, targets[0])
+        programs, triangle = prepared
+        targets = [texture for each in kernel.interface.written for texture in arrays[each.name].held]
+        textures = self._named(kernel.interface, arrays)
+        if triangle is None:
+            self._dispatch(kernel, programs, arrays[WEIGHTS].held[0], textures, targets[0])
             return
-        if prepared.tile is not None:
-            self._dispatch(prepared, textures, targets[0])
-            return
-        if prepared.weights is not None:
-            textures["weight_texture"] = prepared.weights
+        if WEIGHTS in arrays:
+            textures["weight_texture"] = arrays[WEIGHTS].held[0]
         values = dict(self._values(integers))
         if SCENE_NUMBERS in arrays:
             values[SCENE_NUMBERS] = arrays[SCENE_NUMBERS].held[0].vectors
-        self._draw(prepared.program, prepared.triangle, targets, textures, values)
+        self._draw(programs[0], triangle, targets, textures, values)
 
     def _draw(
         self,
@@ -339,26 +308,25 @@ class OpenGLExecutor(Executor):
         """Return a kernel's numbers under its uniforms' names."""
         return integers
 
-    def _dispatch(self, prepared: _Prepared, textures: Mapping[str, Any], into: Any) -> None:
-        """Run a compute shader, which writes a texture."""
-        self._bind(prepared.program, textures, {})
-        prepared.weights.bind_to_storage_buffer(0)
+    def _dispatch(
+        self, kernel: Artifact, programs: Sequence[Any], weights: Any, textures: Mapping[str, Any], into: Any
+    ) -> None:
+        """Run a compute shader, which writes a texture, or launches for one batch of tiles after another."""
+        schedule, (width, height) = kernel.manifest["schedule"], into.size
+        weights.bind_to_storage_buffer(0)
         into.bind_to_image(0, read=False, write=True)
-        tile = prepared.tile or (1, 1)
-        groups = (-(-n // size) for n, size in zip(into.size, tile, strict=True))
-        prepared.program.run(*groups, 1)
-        self._context.memory_barrier()
-
-    def _launch(self, prepared: _Prepared, textures: Mapping[str, Any], into: Any) -> None:
-        """Run passes for one batch of tiles after another, with memory for the largest."""
-        schedule, (width, height) = prepared.schedule, into.size
+        if "launches" not in schedule:
+            self._bind(programs[0], textures, {})
+            columns, rows = schedule["group"]
+            programs[0].run(-(-width // (columns * schedule["pixels"])), -(-height // rows), 1)
+            self._context.memory_barrier()
+            return
         batch, firsts = batches(schedule, (height, width))
         self._reserve([4 * count * batch for count in schedule["memory"].values()])
-        for number, buffer in enumerate((prepared.weights, *self._between_passes)):
+        for number, buffer in enumerate(self._between_passes, 1):
             buffer.bind_to_storage_buffer(number)
-        into.bind_to_image(0, read=False, write=True)
         for first in firsts:
-            for program, launch in zip(prepared.passes, schedule["launches"], strict=True):
+            for program, launch in zip(programs, schedule["launches"], strict=True):
                 self._bind(program, textures, {"first_tile": first, "tile_count": batch})
                 program.run(batch // (launch["tiles"] * schedule["items"]), launch["lines"], 1)
                 self._context.memory_barrier()
@@ -407,6 +375,11 @@ class OpenGLExecutor(Executor):
         """Release the context and all that lives in it."""
         self._built.clear()
         self._context.release()
+
+
+def _computes(kernel: Artifact) -> bool:
+    """Tell whether a kernel is compute shaders; all others draw."""
+    return bool({"group", "launches"} & set(kernel.manifest.get("schedule", ())))
 
 
 def _open(kind: str) -> tuple[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import BATCH, BLOCK, DENOISE, WEIGHTS, Interface
+from ...compiler.kernel.interface import BATCH, BLOCK, WEIGHTS, Interface
 from ...compiler.languages.glsl_buffers import GROUP
 from ..devices.executor import Executor
 from ..devices.kernel import Memory, batches, plane_shape, words
@@ -41,16 +41,6 @@ class Launch:
         return -(-width // columns), -(-height // rows)
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A kernel's launches, built, one or several; what it takes, its weights, and its schedule's facts."""
-
-    built: tuple[Any, ...]
-    interface: Interface
-    weights: Memory | None
-    schedule: Mapping[str, Any]
-
-
 class BufferRunner(Executor):
     """Runs kernels of one target; a subclass builds one [`_build`] and launches it [`_launch`].
 
@@ -69,33 +59,27 @@ class BufferRunner(Executor):
     def _launch(self, built: Any, launch: Launch) -> None:
         """Start a kernel."""
 
-    def _prepare(self, kernel: Artifact) -> Prepared:
-        schedule, weights = {}, None
-        if kernel.role == DENOISE:
-            schedule = kernel.manifest["schedule"]
-            whole = -kernel.weights.size % 4 or 4 * (not kernel.weights.size)
-            weights = self._store(WEIGHTS, np.pad(kernel.weights, (0, whole)))
-        group = schedule.get("group")
+    def _prepare(self, kernel: Artifact) -> tuple[Any, ...]:
+        """Return a kernel's launches, built, one or several."""
+        group = kernel.manifest.get("schedule", {}).get("group")
         waiting = None if group is None else (int(group[0]), int(group[1]))
-        launches = kernel.launches
-        built = tuple(self._build(each, waiting) for each in launches or [kernel])
-        return Prepared(built, kernel.interface, weights, schedule)
+        return tuple(self._build(each, waiting) for each in kernel.launches or [kernel])
 
-    def _discard(self, prepared: Prepared) -> None:
-        if prepared.weights is not None:
-            self._release(prepared.weights)
+    def _weights(self, kernel: Artifact) -> Memory:
+        """Return the weights in whole vectors of four."""
+        beyond = -kernel.weights.size % 4 or 4 * (not kernel.weights.size)
+        return self._store(WEIGHTS, np.pad(kernel.weights, (0, beyond)))
 
     def _start(
-        self, kernel: Artifact, prepared: Prepared, arrays: Mapping[str, Memory], integers: Mapping[str, int]
+        self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]
     ) -> None:
-        taken, picked = prepared.interface, prepared.schedule
-        held = {**arrays, WEIGHTS: prepared.weights} if prepared.weights else arrays
+        taken, picked = kernel.interface, kernel.manifest.get("schedule", {})
         if "launches" in picked:
-            self._batches(prepared, held, integers)
+            self._batches(kernel, prepared, arrays, integers)
             return
         threads = (-(-integers["width"] // picked.get("pixels", 1)), integers[taken.rows])
         group = tuple(picked.get("group", GROUP))
-        self._launch(prepared.built[0], self._of(taken, held, integers, threads, group))
+        self._launch(prepared[0], self._of(taken, arrays, integers, threads, group))
 
     def _of(
         self,
@@ -111,9 +95,11 @@ class BufferRunner(Executor):
         blocks = [numbers[array.name] for array in taken.arrays if array.home == BLOCK]
         return Launch(words(taken, integers), buffers, threads, group, blocks)
 
-    def _batches(self, prepared: Prepared, held: Mapping[str, Any], integers: Mapping[str, int]) -> None:
+    def _batches(
+        self, kernel: Artifact, prepared: Any, held: Mapping[str, Any], integers: Mapping[str, int]
+    ) -> None:
         """Start several launches for one batch of tiles after another."""
-        taken, picked = prepared.interface, prepared.schedule
+        taken, picked = kernel.interface, kernel.manifest["schedule"]
         count, firsts = batches(picked, (integers["height"], integers["width"]))
         shapes = {a.name: (*plane_shape(a.shape, {BATCH[1]: count}), a.lanes) for a in taken.both}
         if shapes != {name: memory.shape for name, memory in self._handed_on.items()}:
@@ -123,7 +109,7 @@ class BufferRunner(Executor):
                 self._handed_on[name] = self._memory(name, shape)
         for first in firsts:
             given = {**integers, **dict(zip(BATCH, (first, count), strict=True))}
-            for built, launch in zip(prepared.built, picked["launches"], strict=True):
+            for built, launch in zip(prepared, picked["launches"], strict=True):
                 threads = count // launch["tiles"], launch["lines"]
                 self._launch(
                     built, self._of(taken, {**held, **self._handed_on}, given, threads, (picked["items"], 1))

@@ -23,7 +23,7 @@ from ...compiler.languages.glsl_es import VERSION
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.kernel import Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor
-from .buffer_runner import BufferRunner, Launch, Prepared
+from .buffer_runner import BufferRunner, Launch
 
 
 class ESRunner(OpenGLExecutor):
@@ -61,10 +61,9 @@ class ComputeRunner(BufferRunner):
         except moderngl.Error as error:
             raise CompileError(f"{self.device} cannot build the kernel: {error}") from None
 
-    def _discard(self, prepared: Prepared) -> None:
-        for built in prepared.built:
+    def _discard(self, prepared: tuple[Any, ...]) -> None:
+        for built in prepared:
             built.release()
-        super()._discard(prepared)
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         return Memory(array.shape, self._context.buffer(np.ascontiguousarray(array).tobytes()))

@@ -7,7 +7,7 @@ A frame is laid out again and again until it fills the picture: times do not dep
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -66,6 +66,13 @@ def paper_model(
     widths = [dataset.n_inputs(tuple(features), window), *hidden, 3]
     network = siren.init(widths, OMEGA_0, OMEGA_0, seed=1, dtype=np.float32)
     return Model(network, tuple(features), window, dataset.Normalization(**scales))
+
+
+def random_model() -> Model:
+    """Return a small network of random weights, whose outputs are around 0.5."""
+    network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
+    network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
+    return Model(network, ("color", "normal"), dataset.Window(4, "clamp"), dataset.Normalization())
 
 
 def given(model: Model, frame: Frame) -> Given:

@@ -2,29 +2,32 @@
 
 1. [`run`] runs one in a folder of its own; the error for a missing one says how to get it.
 2. [`spirv`] makes SPIR-V from GLSL or HLSL and validates it; [`hlsl`] makes HLSL from SPIR-V.
-3. [`slang`] is a second reader of that HLSL.
+3. glslang gives a block that the source does not name an empty name, and a translator then makes one up:
+   `_709`. A host that binds by name, as Unity does, needs `weights` and `image_color`, which the manifest
+   says: a block has the name of its first member there [`named`].
 """
 
 from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...compiler.kernel.instructions import PORTABLE
+from ...compiler.kernel.interface import WEIGHTS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-from .spirv_names import named, unsourced
 
 PACKAGES: Mapping[str, str] = {
     "glslangValidator": "glslang-tools",
     "spirv-val": "spirv-tools",
     "spirv-cross": "spirv-cross",
     "nvcc": "nvidia-cuda-toolkit, or NVIDIA's own installer",
-    "slangc": "none of Debian's: put slangtorch/bin of PyPI's package slangtorch on the PATH",
     "c++": "g++",
     "cc": "gcc and libc6-dev",
 }
@@ -41,11 +44,6 @@ ENVIRONMENT = "vulkan1.0"
 
 HLSL_STYLES: Mapping[str, str] = {"fxc": "50", "dxc": "60"}
 """Shader models by the compiler that takes them."""
-
-
-def have(program: str) -> bool:
-    """Return whether a program is there."""
-    return shutil.which(_command(program)[0]) is not None
 
 
 def _command(program: str) -> list[str]:
@@ -86,21 +84,6 @@ def spirv(source: str, language: str = "glsl") -> bytes:
         return (folder / "kernel.spv").read_bytes()
 
 
-def slang(source: str) -> bytes:
-    """Return the validated SPIR-V that Slang makes of a compute shader in HLSL, registers as bindings."""
-    with tempfile.TemporaryDirectory(prefix="wamnet-slang-") as name:
-        folder = Path(name)
-        (folder / "kernel.hlsl").write_text(source, encoding="utf-8")
-        # -O0: what optimises is a library of its own, which some packages leave out.
-        options = ["-target", "spirv", "-O0", "-entry", "main", "-stage", "compute", "-profile", "spirv_1_3"]
-        for kind in ("b", "t", "u"):
-            options += [f"-fvk-{kind}-shift", "0", "0"]
-        run("slangc", "kernel.hlsl", *options, "-o", "kernel.spv", folder=folder)
-        (folder / "kernel.spv").write_bytes(unsourced((folder / "kernel.spv").read_bytes()))
-        validate(folder, "kernel.spv", "vulkan1.1")
-        return (folder / "kernel.spv").read_bytes()
-
-
 def validate(folder: Path, name: str, environment: str = ENVIRONMENT) -> None:
     """Refuse SPIR-V that is not valid."""
     run("spirv-val", "--target-env", environment, name, folder=folder)
@@ -118,3 +101,65 @@ def hlsl(binary: bytes, style: str) -> str:
             folder=folder,
         )
         return (folder / "kernel.hlsl").read_text(encoding="utf-8")
+
+
+# ---- names in SPIR-V --------------------------------------------------------------------------------------
+
+
+HEAD = 5
+"""Words before the first instruction."""
+
+NAME, MEMBER_NAME, POINTER, FUNCTION, VARIABLE = 5, 6, 32, 54, 59
+"""Numbers of OpName, OpMemberName, OpTypePointer, OpFunction and OpVariable."""
+
+UNIFORM, BLOCK_NAME = 2, "sizes"
+"""The storage class of buffers and blocks; what a block of integers is called, as manifests say it."""
+
+SHORT = {"w": WEIGHTS}
+"""What schedules of groups call an array for short."""
+
+Words = NDArray[np.uint32]
+
+
+def _instructions(words: Words) -> Iterator[tuple[int, Words]]:
+    """Yield the number and the operands of each instruction."""
+    at = HEAD
+    while at < len(words):
+        length = int(words[at] >> 16)
+        yield int(words[at] & 0xFFFF), words[at + 1 : at + length]
+        at += length
+
+
+def _text(words: Words) -> str:
+    """Return the text in operands."""
+    return words.tobytes().partition(b"\0")[0].decode()
+
+
+def _named(number: int, text: str) -> Words:
+    """Return the instruction that gives a number a name."""
+    raw = text.encode() + b"\0" * (4 - len(text) % 4)
+    operands = np.frombuffer(raw, "<u4")
+    return np.array([(len(operands) + 2) << 16 | NAME, number, *operands], np.uint32)
+
+
+def named(binary: bytes) -> bytes:
+    """Return a module whose buffers have the names of their first members, its block of integers `sizes`."""
+    words: Words = np.frombuffer(binary, "<u4").astype(np.uint32)
+    members, structures, names = dict[int, list[str]](), dict[int, int](), dict[int, str]()
+    for operation, given in _instructions(words):
+        if operation == MEMBER_NAME:
+            members.setdefault(int(given[0]), []).append(_text(given[2:]))
+        elif operation == POINTER and given[1] == UNIFORM:
+            structures[int(given[0])] = int(given[2])
+        elif operation == VARIABLE and given[2] == UNIFORM:
+            fields = members[structures[int(given[0])]]
+            first = SHORT.get(fields[0], fields[0])
+            names[int(given[1])] = first if len(fields) == 1 else BLOCK_NAME
+        elif operation == FUNCTION:
+            break
+    written = [words[:HEAD]]
+    for operation, given in _instructions(words):
+        number = int(given[0]) if operation == NAME else -1
+        head = np.array([(len(given) + 1) << 16 | operation], np.uint32)
+        written += [_named(number, names[number])] if number in names else [head, given]
+    return np.concatenate(written).astype("<u4").tobytes()

@@ -7,9 +7,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+import shelf
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME, MANIFEST_NAME
-from wamnet.kernels.export import shelf
 
 SHELF = Path(__file__).resolve().parents[2] / "kernels/shelf"
 """The shelf of the repository."""

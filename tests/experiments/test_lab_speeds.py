@@ -12,7 +12,7 @@ from wamnet.compiler.proof.checker import check
 from wamnet.compiler.reading.check import check_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.variants import FULL, plan_model
-from wamnet.kernels.export.shelf import random_model
+from wamnet.kernels.bench.workload import random_model
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 

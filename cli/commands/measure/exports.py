@@ -50,8 +50,8 @@ def exports(
     compared with the reference. A missing tool is reported in the table. The exit status is 1 if the image of
     a target is wrong.
     """
+    from ....kernels.bench.workload import random_model
     from ....kernels.export.check import HEAD
-    from ....kernels.export.shelf import random_model
     from ....kernels.export.targets import NAMES
     from ....models.data.scene_source import scene_source
 

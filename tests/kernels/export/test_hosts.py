@@ -20,12 +20,13 @@ import jsonschema
 import numpy as np
 import pytest
 from pages import browse
+from second_hlsl import slang
 
+from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export import tint_runner, tools
 from wamnet.kernels.export.hosts.host import FILES, SHARED
 from wamnet.kernels.export.hosts.table import HOSTS
 from wamnet.kernels.export.package import Request, export
-from wamnet.kernels.export.shelf import random_model
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
@@ -381,7 +382,7 @@ def test_slang_reads_the_same_hlsl(style, tmp_path, monkeypatch):
         pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
     folder = written(made("vulkan", variant="rank2"), tmp_path)
     for binary in folder.glob("*/*.spv"):
-        binary.write_bytes(tools.slang(tools.hlsl(binary.read_bytes(), style)))
+        binary.write_bytes(slang(tools.hlsl(binary.read_bytes(), style)))
     error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
     assert error <= allowed
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
+from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.package import Request, export
-from wamnet.kernels.export.shelf import random_model
 from wamnet.kernels.export.targets import TARGETS
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
@@ -34,7 +35,7 @@ int main({taken})
 
 def compiled(made, folder, compiler, *options):
     """Compile a file that includes all headers of an export and names their functions; return its macros."""
-    if not tools.have(compiler):
+    if not shutil.which(compiler):
         pytest.skip(f"{compiler} is not installed")
     heads, lines = [], []
     for name, data in made.contents().items():

@@ -11,8 +11,8 @@ from wamnet.compiler.artifact import CERTIFICATE_NAME
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.reading.check import check_text
 from wamnet.compiler.reading.lanes import Unread
+from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export.package import Request, export
-from wamnet.kernels.export.shelf import random_model
 from wamnet.kernels.export.targets import ONNX, TARGETS
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scenes import canonical

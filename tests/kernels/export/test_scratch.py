@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 
 import numpy as np
@@ -88,7 +89,7 @@ def test_a_thread_of_128_kib_denoises_in_scratch_memory(tmp_path, schedule):
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("schedule", SCHEDULES)
 def test_no_call_takes_more_stack_than_its_header_states(tmp_path, schedule, compiler):
-    if not tools.have(compiler):
+    if not shutil.which(compiler):
         pytest.skip(f"{compiler} is not installed")
     made = written(tmp_path, schedule)
     stated = int(re.search(r"stack: (\d+) bytes", made.denoiser.source)[1])

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import shelf
 
 from wamnet.compiler.artifact import CERTIFICATE_NAME
 from wamnet.compiler.proof.checker import check
-from wamnet.kernels.export import shelf
+from wamnet.kernels.bench.workload import random_model
 from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import InputError
 
@@ -21,7 +22,7 @@ SHELF = ROOT / "kernels/shelf"
 LARGEST_PROOFS = 500_000
 """Most bytes of all certificates and manifests of the shelf: whoever clones the repository has them."""
 
-WAY_OUT = "run python -m wamnet.kernels.export.shelf -o kernels/shelf MODELS, read git diff, and commit it"
+WAY_OUT = "run python experiments/shelf.py -o kernels/shelf MODELS, read git diff, and commit it"
 """What to do when a kernel has changed on purpose."""
 
 
@@ -30,7 +31,7 @@ def models(folder):
     names = sorted(path.name for path in folder.iterdir() if path.is_dir())
     assert names, f"kernels/shelf is empty: {WAY_OUT}"
     return {
-        name: shelf.random_model() if name == shelf.SMALL else load_model(ROOT / f"models/{name}.safetensors")
+        name: random_model() if name == shelf.SMALL else load_model(ROOT / f"models/{name}.safetensors")
         for name in names
     }
 

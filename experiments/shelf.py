@@ -1,6 +1,6 @@
 """The shelf: kernels of canonical models that are kept in the repository, with an index page.
 
-`python -m wamnet.kernels.export.shelf -o kernels/shelf MODEL.safetensors ...` writes it again; without
+`python experiments/shelf.py -o kernels/shelf MODEL.safetensors ...` writes it again; without
 models it is a small network of random weights. A test compares the files with what the command would write.
 The index says for each kernel its size, products a pixel, schedule, certified bound, and whether its text is
 one that `wamnet certify` reads, and as what language.
@@ -19,9 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from ...compiler.artifact import (
+from wamnet.compiler.artifact import (
     CERTIFICATE_NAME,
     MANIFEST_NAME,
     WEIGHTS_NAME,
@@ -29,16 +27,15 @@ from ...compiler.artifact import (
     manifest_text,
     weight_bytes,
 )
-from ...compiler.reading.languages import is_read
-from ...compiler.schedules.schedules import PLAIN
-from ...models.model_file import load_model
-from ...models.writing import is_regular, write_together
-from ...refimpl.errors import InputError, WamnetError
-from ...refimpl.network import siren
-from ...refimpl.network.dataset import Normalization, Window
-from ...refimpl.network.denoise import Model
-from ..bench.cost import products_of
-from .package import Request, export
+from wamnet.compiler.reading.languages import is_read
+from wamnet.compiler.schedules.schedules import PLAIN
+from wamnet.kernels.bench.workload import random_model
+from wamnet.kernels.export.package import Request, export
+from wamnet.kernels.run.denoise_on import products_of
+from wamnet.models.model_file import load_model
+from wamnet.models.writing import is_regular, write_together
+from wamnet.refimpl.errors import InputError, WamnetError
+from wamnet.refimpl.network.denoise import Model
 
 KEPT = ("opencl", "glsl", "glsl-es", "wgsl", "c", "cuda", "metal", "glsl-vulkan")
 """Targets whose files need no translator, so that they are the same on every machine."""
@@ -68,7 +65,7 @@ def contents(models: Mapping[str, Model]) -> Mapping[str, bytes]:
     lines = [
         "# Kernels of the canonical models",
         "",
-        "Written by `python -m wamnet.kernels.export.shelf`; a test keeps them equal to what the compiler",
+        "Written by `python experiments/shelf.py`; a test keeps them equal to what the compiler",
         "writes. Each kernel has its manifest and the certificate of its bound for all images in their",
         "ranges. `wamnet certify kernels/shelf/minicubes/wgsl` checks it, and whether the text computes the",
         "certified program; a test runs it on every row. Weights are one file a model, one folder above its",
@@ -112,13 +109,6 @@ def _row(folder: str, made: Artifact) -> str:
         f"yes, as {made.manifest['language'].partition(',')[0]}" if is_read(made.manifest) else "no",
     )
     return f"| {' | '.join(cells)} |"
-
-
-def random_model() -> Model:
-    """Return a small network of random weights, whose outputs are around 0.5."""
-    network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
-    network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
-    return Model(network, ("color", "normal"), Window(4, "clamp"), Normalization(), {})
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -105,7 +105,7 @@ PASSES_IDEA = (
 def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedules for processors: register tiles in each width of vector that the language has."""
     return tuple(
-        Tile(name, idea, dialect, lanes, pixels)
+        Tile(dialect, name, idea, lanes=lanes, pixels=pixels)
         for name, (pixels, idea) in TILES.items()
         if (lanes := parse(name)[1]) in dialect.tiles and (pixels > 1 or dialect.wide)
     )
@@ -118,32 +118,42 @@ def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
     time: the weights pass by twice as often. The other layers have the register tiles of the tiled schedules.
     """
     return tuple(
-        Fourier(f"fft:{lanes}", FFT_IDEA.format(lanes), dialect, lanes, TILES[f"tile:{lanes}"][0], 32, 2)
+        Fourier(
+            dialect,
+            f"fft:{lanes}",
+            FFT_IDEA.format(lanes),
+            instead=f"tile:{lanes}",
+            lanes=lanes,
+            pixels=TILES[f"tile:{lanes}"][0],
+            points=32,
+            tiles=2,
+        )
         for lanes in ((16, 8, 4) if dialect.transforms else ())
     )
 
 
 def passes(dialect: Dialect, instead: str = "group:4") -> tuple[Schedule, ...]:
     """Return the schedule of transforms for languages whose functions do not take such places."""
-    return (FourierPasses("fftpasses:32", PASSES_IDEA, dialect, 32, instead),)
+    return (FourierPasses(dialect, "fftpasses:32", PASSES_IDEA, instead=instead, points=32),)
 
 
 def dots(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedule of bytes for processors."""
     idea = "products of bytes, four at a time, of a network of integers"
-    return (Dot("dot:16", idea, dialect, 16, 14),) if dialect.dot_of_bytes else ()
+    return (Dot(dialect, "dot:16", idea, lanes=16, pixels=14),) if dialect.dot_of_bytes else ()
 
 
 def groups(dialect: Dialect) -> tuple[Schedule, ...]:
     """Return the schedules for graphics processors: more pixels share weights, until registers are short."""
     one = "a tile of the image in memory that a work group shares; layers in registers, one pixel an item"
-    found: list[Schedule] = [Grouped("group:1", one, dialect, 1)]
+    of = {"group": dialect.group}
+    found: list[Schedule] = [Grouped(dialect, "group:1", one, pixels=1, **of)]
     for pixels in (2, 4):
         idea = f"the same with {pixels} pixels an item, which share each weight"
-        found.append(Grouped(f"group:{pixels}", idea, dialect, pixels, instead="group:1"))
+        found.append(Grouped(dialect, f"group:{pixels}", idea, pixels=pixels, instead="group:1", **of))
     if dialect.words:
         idea = f"group:4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
-        found.append(GroupDot("groupdot:4", idea, dialect, 4, instead="group:4"))
+        found.append(GroupDot(dialect, "groupdot:4", idea, pixels=4, instead="group:4", **of))
     return tuple(found)
 
 

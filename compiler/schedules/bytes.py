@@ -15,19 +15,20 @@ counts four bytes as one number.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core import weights
 from ..core.ir import Image, Node, Program
+from ..core.weights import Slot
 from ..kernel.interface import WEIGHTS
 from ..kernel.kernel import (
     BYTE,
     INT,
     Array,
     Expr,
-    Kernel,
     Let,
     Statement,
     Store,
@@ -53,7 +54,6 @@ from .tile import (
     Tiled,
     blocks_of,
     matrices,
-    placed,
     readers_of_window,
     stored,
 )
@@ -140,19 +140,12 @@ def bytes_stored(program: Program, lanes: int, vectors: int) -> Mapping[str, NDA
     return found
 
 
-def tile_of_bytes(program: Program, lanes: int, pixels: int, wide: bool) -> Kernel:
-    """Return the kernel for processors; `wide`: the language has elementwise operations on vectors."""
-    return Bytes(program, placed(bytes_stored(program, lanes, 2)), lanes, pixels, 2, wide).built()
-
-
 class Bytes(Tiled):
     """Builds the tiled kernel of bytes."""
 
-    def __init__(
-        self, program: Program, slots: Mapping[str, object], lanes: int, pixels: int, vectors: int, wide: bool
-    ) -> None:
-        super().__init__(program, slots, lanes, pixels, vectors, wide)  # type: ignore[arg-type]
-        self.sum_type = INT.of(lanes)
+    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+        super().__init__(program, slots, **parameters)
+        self.sum_type = INT.of(self.lanes)
 
     def weight_type(self) -> Type:
         """Return the type of an element of the weights."""
@@ -256,11 +249,6 @@ def words_stored(program: Program) -> Mapping[str, NDArray[np.float32]]:
         words = filled[:, words_of(program, key)].transpose(1, 0, 2)
         found[key] = np.ascontiguousarray(words).view("<f4")[None, ..., 0]
     return found
-
-
-def group_of_bytes(program: Program, pixels: int, size: tuple[int, int], wide: bool) -> Kernel:
-    """Return the kernel for graphics processors."""
-    return GroupBytes(program, placed(words_stored(program)), pixels, size, wide).built()
 
 
 def planes_of(program: Program) -> int:

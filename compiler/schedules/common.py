@@ -124,12 +124,23 @@ Read = Callable[[int], Expr]
 
 
 class Nest:
-    """Builds the statements of one program."""
+    """Builds the statements of one program; a schedule's parameters are attributes.
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], lanes: int = 1) -> None:
-        self.program, self.slots, self.lanes = program, slots, lanes
+    `wide`: the language has elementwise operations on vectors.
+    """
+
+    lanes = 1
+    wide = True
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+        self.program, self.slots = program, slots
+        vars(self).update(parameters)
         self.groups, self.readers = groups_of(program), users(program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
+
+    def built(self) -> Kernel:
+        """Return the kernel of the program."""
+        raise NotImplementedError
 
     @cached_property
     def gather(self) -> Gather:

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ from ..kernel.kernel import (
 )
 from . import fourier
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
-from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, placed, readers_of_window
+from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, readers_of_window
 
 PARTS = 2
 """Values of a complex one: its real and its imaginary part."""
@@ -199,29 +200,16 @@ def codelet(title: str, points: int, kept: int, sign: int, kind: Type) -> Functi
 # ---- statements ------------------------------------------------------------------------------------------
 
 
-def fft(program: Program, lanes: int, pixels: int, points: int, tiles: int, wide: bool) -> Kernel:
-    """Return the kernel; `wide`: the language has elementwise operations on vectors."""
-    slots = placed(spectra_stored(program, lanes, points, tiles))
-    return Spectral(program, slots, lanes, pixels, points, tiles, wide).built()
-
-
 class Spectral(Tiled):
-    """Builds the kernel with Fourier transforms."""
+    """Builds the kernel with Fourier transforms of `points` in `tiles` tiles."""
 
-    def __init__(
-        self,
-        program: Program,
-        slots: Mapping[str, Slot],
-        lanes: int,
-        pixels: int,
-        points: int,
-        tiles: int,
-        wide: bool,
-    ) -> None:
-        super().__init__(program, slots, lanes, pixels, 2, wide)
-        self.points, self.tiles = points, tiles
-        self.sizes = sizes_of(program, lanes, points, tiles)
-        self.centres = fourier.arrangement(program, lanes).centres
+    points: int
+    tiles: int
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+        super().__init__(program, slots, **parameters)
+        self.sizes = sizes_of(program, self.lanes, self.points, self.tiles)
+        self.centres = fourier.arrangement(program, self.lanes).centres
 
     def constants(self) -> list[Constant]:
         """Return the sizes of tiles and transforms."""

@@ -14,11 +14,10 @@ No item ends before the others: those beyond the image's edge load, wait, comput
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 
 from ..core.ir import Gather, Node, Program
-from ..core.weights import Slot
 from ..kernel.kernel import (
     FLOAT,
     Array,
@@ -38,7 +37,6 @@ from ..kernel.kernel import (
 )
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
 from .straight import VECTOR, ZERO, Straight, variables
-from .tile import all_stored, placed
 
 MOST_CHANNELS = 4
 """Most channels of a tile: one of 64 x 8 pixels for windows of 12 x 12 then takes 23 KB, of the 32 KB that
@@ -57,11 +55,6 @@ TILE_WIDTH, TILE_HEIGHT, PLANE, TILE_NUMBERS = map(
 )
 COUNTER, DX, DY, AT, LOCAL_X, LOCAL_Y = map(name, ("i", "dx", "dy", "at", "local_x", "local_y"))
 TILE, FIRST = "tile", name("first")
-
-
-def group(program: Program, pixels: int, size: tuple[int, int], wide: bool) -> Kernel:
-    """Return the kernel of groups of `size` (x, y) items; `wide`: the language has arithmetic on vectors."""
-    return Group(program, placed(all_stored(program, 4, LARGEST_NUMBERS)), pixels, size, wide).built()
 
 
 def refused_by_group(program: Program, pixels: int) -> str:
@@ -102,17 +95,12 @@ def beyond_tile(gather: Gather) -> str:
 
 
 class Group(Straight):
-    """Builds the grouped kernel."""
+    """Builds the grouped kernel of groups of `group` (x, y) items."""
 
+    group: tuple[int, int]
     pixel_names = True
     element = FLOAT
     is_filled = False
-
-    def __init__(
-        self, program: Program, slots: Mapping[str, Slot], pixels: int, size: tuple[int, int], wide: bool
-    ) -> None:
-        super().__init__(program, slots, 4)
-        self.pixels, self.size, self.wide = pixels, size, wide
 
     def planes(self) -> int:
         """Return the most values of a pixel that are in the tile at once."""
@@ -124,8 +112,8 @@ class Group(Straight):
         across = GROUP_WIDTH * PIXELS + self.columns - 1
         return [
             *window,
-            Constant("GROUP_WIDTH", const(self.size[0]), "items of a group along a row"),
-            Constant("GROUP_HEIGHT", const(self.size[1])),
+            Constant("GROUP_WIDTH", const(self.group[0]), "items of a group along a row"),
+            Constant("GROUP_HEIGHT", const(self.group[1])),
             Constant("PIXELS", const(self.pixels), "pixels of an item, GROUP_WIDTH columns apart"),
             Constant("TILE_WIDTH", across, "all that windows touch"),
             Constant("TILE_HEIGHT", GROUP_HEIGHT + self.rows - 1),
@@ -148,9 +136,8 @@ class Group(Straight):
             body.append(If(inside, (self.written(Y, column, p),)))
         functions = tuple(self.functions())
         step = (PIXELS, const(1))
-        return self.kernel(
-            body, constants, functions=functions, step=step, group=self.size, weights=self.weights
-        )
+        more = {"functions": functions, "step": step, "group": self.group, "weights": self.weights}
+        return self.kernel(body, constants, **more)
 
     weights = VECTOR
 

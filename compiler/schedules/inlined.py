@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import Image, Node, Program
+from ..core.ir import Image, Node
 from ..core.sums import is_split
 from ..kernel.kernel import (
     Array,
@@ -31,11 +31,6 @@ from .straight import VECTOR, ZERO, Straight, variables
 
 LARGEST_WEIGHTS = 2**16
 """Most weights of a kernel: llvmpipe compiles some two thousand a second."""
-
-
-def inlined(program: Program) -> Kernel:
-    """Return the kernel."""
-    return Inlined(program, {}, 4).built()
 
 
 def numbers(array: NDArray[np.float32], vector: int) -> Expr:

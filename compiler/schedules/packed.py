@@ -21,7 +21,6 @@ from ..kernel.kernel import (
     Body,
     Comment,
     Expr,
-    Kernel,
     Let,
     Statement,
     Store,
@@ -35,7 +34,6 @@ from ..kernel.kernel import (
 from .common import X, Y, loop, weight
 from .plain import Plainly
 from .straight import VECTOR, ZERO
-from .tile import placed
 
 WEIGHTS_A_TEXEL = "weights_a_texel"
 """Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""
@@ -52,14 +50,10 @@ def packed_weights(program: Program) -> Mapping[str, NDArray[np.float32]]:
     return found
 
 
-def packed(program: Program) -> Kernel:
-    """Return the kernel."""
-    return Packed(program, placed(packed_weights(program)), 4).built()
-
-
 class Packed(Plainly):
     """Builds the packed kernel: the plain one by vectors."""
 
+    lanes = 4
     weights = VECTOR
 
     def vectors(self, index: int) -> int:

@@ -53,14 +53,13 @@ from ..kernel.kernel import (
     walk,
 )
 from ..kernel.sizes import handed_on, of_tile
-from ..languages.dialect import Dialect
 from . import fourier
 from .common import HEIGHT, WIDTH, clamp, loop, weight
 from .fft import OUT, PAIRS, POINTS, PRODUCTS, TILE, line, sizes_of, spectra_stored
 from .inlined import LARGEST_WEIGHTS, Inlined
-from .schedules import PLAIN, Fourier
+from .schedules import Fourier
 from .straight import VECTOR, ZERO, variables
-from .tile import placed, readers_of_window
+from .tile import readers_of_window
 
 HALF = 16
 """Neurons that share complex images with as many others."""
@@ -86,11 +85,6 @@ def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
     return {key: a for key, a in spectra_stored(program, HALF, points, 1).items() if key in own}
 
 
-def passes(program: Program, points: int, wide: bool = True) -> Kernel:
-    """Return the kernel of a program whose neurons are in order; `wide`: vectors have all operations."""
-    return Passes(program, placed(stored(program, points)), points, wide).built()
-
-
 def used(kernel: Kernel, launch: Launch) -> list[str]:
     """Return the arrays that a launch reads or writes, those of the kernel first."""
     statements = walk(launch.body)
@@ -103,12 +97,13 @@ def used(kernel: Kernel, launch: Launch) -> list[str]:
 
 
 class Passes(Inlined):
-    """Builds the launches."""
+    """Builds the launches, of a program whose neurons are in order."""
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], points: int, wide: bool) -> None:
-        super().__init__(program, slots, 4)
-        self.points, self.wide = points, wide
-        self.sizes = sizes_of(program, HALF, points, 1)
+    points: int
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+        super().__init__(program, slots, **parameters)
+        self.sizes = sizes_of(program, HALF, self.points, 1)
         self.centres = fourier.arrangement(program, HALF).centres
 
     def constants(self) -> list[Constant]:
@@ -342,9 +337,10 @@ class FourierPasses(Fourier):
         "second channel, neurons; weights of the layers after it are constants of the source"
     )
 
-    def __init__(self, name: str, idea: str, dialect: Dialect, points: int, instead: str = PLAIN) -> None:
-        super().__init__(name, idea, dialect, HALF, 1, points, 1)
-        self.instead = instead
+    builder = Passes
+    takes = ("points",)
+    lanes = HALF
+    tiles = 1
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -357,7 +353,7 @@ class FourierPasses(Fourier):
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
-        return passes(self.held(program), self.points, self.dialect.wide)
+        return super().build(self.held(program))
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return the weights outside the source as they are stored, by name."""

@@ -9,16 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..core.ir import Node, Program
+from ..core.ir import Node
 from ..core.sums import is_split
-from ..core.weights import layout
 from ..kernel.kernel import Array, Body, Comment, Expr, Kernel, Let, Statement, Store, Type, const, load, name
 from .common import Nest, X, Y, loop, output, weight
-
-
-def plain(program: Program) -> Kernel:
-    """Return the kernel of one pixel."""
-    return Plainly(program, layout(program)).built()
 
 
 class Plainly(Nest):

@@ -35,40 +35,39 @@ from ..languages.renderer import Renderer
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..proof.spectra import Spectra
-from . import fourier
+from . import fourier, packed
 from .bytes import (
     START,
+    Bytes,
+    GroupBytes,
     bytes_stored,
-    group_of_bytes,
     matrix_twice,
     refused_by_bytes,
-    tile_of_bytes,
     words_at_once,
     words_stored,
 )
-from .common import kernel_gather, output_channels
-from .fft import Sizes, fft, sizes_of, spectra_stored
+from .common import Nest, kernel_gather, output_channels
+from .fft import Sizes, Spectral, sizes_of, spectra_stored
 from .group import (
     LARGEST_NUMBERS,
     MOST_CHANNELS,
+    Group,
     beyond_tile,
-    group,
     refused_by_group,
     refused_by_statements,
     rows_at_once,
 )
-from .inlined import LARGEST_WEIGHTS, inlined
+from .inlined import LARGEST_WEIGHTS, Inlined
 from .names import remedy
-from .packed import WEIGHTS_A_TEXEL, packed, packed_weights
-from .plain import plain
+from .plain import Plainly
 from .tile import (
     LARGEST_PRIVATE,
+    Tiled,
     all_stored,
     placed,
     readers_of_window,
     refused_by_vectors,
     shared_matrix,
-    tile,
 )
 
 Images = Mapping[str, NDArray[np.float32]]
@@ -90,19 +89,22 @@ class Schedule:
     """One way to order a kernel's work; `idea` is the sentence that sets it apart from the one before.
 
     `instead` names the schedule of programs that it refuses; `order` says how a matrix is stored among the
-    weights. `bytewise`: its array of weights holds bytes. A schedule of kernels builds them as data, and
-    prints them in its language [`kernel`].
+    weights. `bytewise`: its array of weights holds bytes. Its `builder` makes kernels as data, and takes the
+    schedule's parameters that `takes` names.
     """
 
-    name: str
-    idea: str
+    name = ""
+    idea = ""
     dialect: Dialect
+    builder: type[Nest]
+    takes: tuple[str, ...] = ()
     instead: str = PLAIN
     bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
 
-    def __init__(self, dialect: Dialect) -> None:
-        self.dialect = dialect
+    def __init__(self, dialect: Dialect, name: str = "", idea: str = "", **parameters: Any) -> None:
+        own = {"dialect": dialect, "name": name or self.name, "idea": idea or self.idea}
+        vars(self).update(own | parameters)
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -121,7 +123,8 @@ class Schedule:
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
-        raise NotImplementedError
+        parameters = {key: getattr(self, key) for key in self.takes}
+        return self.builder(program, self.layout(program), wide=self.dialect.wide, **parameters).built()
 
     def renderer(self, program: Program, bounded: bool) -> Renderer:
         """Return what prints the kernel of a program.
@@ -199,10 +202,7 @@ class Plain(Schedule):
 
     name = PLAIN
     idea = "one pixel after another, loops over taps and neurons"
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return plain(program)
+    builder = Plainly
 
 
 class Stored(Schedule):
@@ -220,6 +220,12 @@ class Stored(Schedule):
         """Return the weights (count,) as `layout` places them."""
         return np.concatenate([np.zeros(0, np.float32), *(a.ravel() for a in self.stored(program).values())])
 
+    def beyond_stack(self, program: Program) -> str:
+        """Return why an item's memory cannot hold the arrays, or nothing."""
+        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
+            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        return ""
+
 
 class Tile(Stored):
     """A tile of `pixels` x `vectors` vectors of `lanes` neurons [tile.py]."""
@@ -229,23 +235,15 @@ class Tile(Stored):
         "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
     )
 
-    def __init__(
-        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, vectors: int = 2
-    ) -> None:
-        self.name, self.idea, self.dialect = name, idea, dialect
-        self.lanes, self.pixels, self.vectors = lanes, pixels, vectors
+    builder: type[Nest] = Tiled
+    takes = ("lanes", "pixels", "vectors")
+    lanes: int
+    vectors = 2
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        if reason := refused_by_vectors(program, self.dialect.max_output_channels) or shared_matrix(program):
-            return reason
-        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
-            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
-        return ""
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return tile(program, self.lanes, self.pixels, self.vectors, self.dialect.wide)
+        reason = refused_by_vectors(program, self.dialect.max_output_channels) or shared_matrix(program)
+        return reason or self.beyond_stack(program)
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
@@ -261,39 +259,28 @@ class Grouped(Stored):
         "then channel by channel"
     )
 
-    def __init__(
-        self,
-        name: str,
-        idea: str,
-        dialect: Dialect,
-        pixels: int,
-        size: tuple[int, int] | None = None,
-        instead: str = PLAIN,
-    ) -> None:
-        self.name, self.idea, self.dialect, self.instead = name, idea, dialect, instead
-        size = size or dialect.group
-        assert size is not None, f"{dialect.language} has no work groups"
-        self.pixels, self.group = pixels, size
+    builder: type[Nest] = Group
+    takes = ("pixels", "group")
+    pixels: int
+    group: tuple[int, int]
+    rows_at_once = staticmethod(rows_at_once)
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        if reason := refused_by_vectors(program, self.dialect.max_output_channels) or shared_matrix(program):
-            return reason
-        if reason := beyond_tile(kernel_gather(program)) or refused_by_group(program, self.pixels):
-            return reason
-        if reason := refused_by_statements(program, self.pixels, rows_at_once(program)):
-            return reason
-        return self.beyond_memory(program)
+        return (
+            refused_by_vectors(program, self.dialect.max_output_channels)
+            or shared_matrix(program)
+            or ("" if self.bytewise else beyond_tile(kernel_gather(program)))
+            or refused_by_group(program, self.pixels)
+            or refused_by_statements(program, self.pixels, self.rows_at_once(program))
+            or self.beyond_memory(program)
+        )
 
     def beyond_memory(self, program: Program) -> str:
         """Return why a group's memory cannot hold the tile, or nothing."""
         if (shared := shared_bytes(self.kernel(program))) > (most := self.dialect.largest_shared):
             return f"its tile takes {shared} bytes that a group shares, of at most {most}"
         return ""
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return group(program, self.pixels, self.group, self.dialect.wide)
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
@@ -310,6 +297,7 @@ class Inline(Schedule):
     name = "inlined"
     idea = "all loops unrolled, every weight a constant of the source"
     order = "every weight is a constant of the source"
+    builder = Inlined
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
@@ -323,10 +311,6 @@ class Inline(Schedule):
     def impossible(self, program: Program) -> str:
         """Return why there is no kernel of this program at all, or nothing."""
         return refused_by_vectors(program, self.dialect.max_output_channels)
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return inlined(program)
 
     def layout(self, program: Program) -> Mapping[str, Slot]:
         """Return nothing: no weight lies outside the source."""
@@ -343,22 +327,19 @@ class Packed(Stored):
     name = "packed"
     idea = "four weights a texel, four neurons a `vec4`"
     order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
+    builder = packed.Packed
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         return refused_by_vectors(program, self.dialect.max_output_channels)
 
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return packed(program)
-
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
-        return packed_weights(program)
+        return packed.packed_weights(program)
 
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return the form of the texture."""
-        return {WEIGHTS_A_TEXEL: 4}
+        return {packed.WEIGHTS_A_TEXEL: 4}
 
 
 class Dot(Tile):
@@ -371,14 +352,11 @@ class Dot(Tile):
     )
     bytewise = True
     instead = "tile:16"
+    builder = Bytes
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         return refused_by_bytes(program) or matrix_twice(program) or super().refusal(program)
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return tile_of_bytes(program, self.lanes, self.pixels, self.dialect.wide)
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
@@ -395,22 +373,12 @@ class GroupDot(Grouped):
         "by tap in rows, then word by word"
     )
     bytewise = True
+    builder = GroupBytes
+    rows_at_once = staticmethod(words_at_once)
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        most = self.dialect.max_output_channels
-        return (
-            refused_by_bytes(program)
-            or refused_by_vectors(program, most)
-            or shared_matrix(program)
-            or refused_by_group(program, self.pixels)
-            or refused_by_statements(program, self.pixels, words_at_once(program))
-            or self.beyond_memory(program)
-        )
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return group_of_bytes(program, self.pixels, self.group, self.dialect.wide)
+        return refused_by_bytes(program) or super().refusal(program)
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
@@ -432,16 +400,11 @@ class Fourier(Stored):
         "matrices block by block of neurons: blocks x D_in x neurons"
     )
 
-    def __init__(
-        self, name: str, idea: str, dialect: Dialect, lanes: int, pixels: int, points: int, tiles: int
-    ) -> None:
-        self.name, self.idea, self.dialect = name, idea, dialect
-        self.lanes, self.pixels, self.points, self.tiles = lanes, pixels, points, tiles
-        self.instead = f"tile:{lanes}"
-
-    def build(self, program: Program) -> Kernel:
-        """Return the kernel of a program."""
-        return fft(program, self.lanes, self.pixels, self.points, self.tiles, self.dialect.wide)
+    builder: type[Nest] = Spectral
+    takes: tuple[str, ...] = ("lanes", "pixels", "points", "tiles")
+    lanes: int
+    points: int
+    tiles: int
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
@@ -513,8 +476,8 @@ class Fourier(Stored):
         names = [node["weight"] for node in program.nodes if node.op == "affine"]
         if names.count(readers[0]["weight"]) != 1:
             return "a matrix is applied to the window and to a layer"
-        if (found := self.private_bytes(program)) > LARGEST_PRIVATE:
-            return f"its arrays take {found} bytes a work item, of at most {LARGEST_PRIVATE}"
+        if reason := self.beyond_stack(program):
+            return reason
         direct, spectra = self.operations(program)
         if COST * spectra > direct:
             return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"

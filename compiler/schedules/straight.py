@@ -35,10 +35,10 @@ VECTOR = FLOAT.of(4)
 
 
 class Straight(Nest):
-    """Builds straight code of one or several pixels; `wide`: the language has arithmetic on vectors."""
+    """Builds straight code of one or several pixels."""
 
+    lanes = 4
     pixels = 1
-    wide = True
 
     def vectors(self, index: int) -> int:
         """Return the vectors of four that hold a value."""

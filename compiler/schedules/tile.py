@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,22 +174,16 @@ def all_stored(program: Program, lanes: int, vectors: int) -> dict[str, NDArray[
 # ---- statements ------------------------------------------------------------------------------------------
 
 
-def tile(program: Program, lanes: int, pixels: int, vectors: int, wide: bool) -> Kernel:
-    """Return the kernel; `wide`: the language has elementwise operations on vectors."""
-    slots = placed(all_stored(program, lanes, vectors))
-    return Tiled(program, slots, lanes, pixels, vectors, wide).built()
-
-
 class Tiled(Nest):
-    """Builds the tiled kernel."""
+    """Builds the tiled kernel of `pixels` x `vectors` vectors of `lanes` neurons."""
 
-    def __init__(
-        self, program: Program, slots: Mapping[str, Slot], lanes: int, pixels: int, vectors: int, wide: bool
-    ) -> None:
-        super().__init__(program, slots, lanes)
-        self.pixels, self.vectors, self.wide = pixels, vectors, wide
-        self.vector = self.sum_type = Type("float32", lanes)
-        self.element = self.vector if wide else FLOAT
+    pixels: int
+    vectors = 2
+
+    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+        super().__init__(program, slots, **parameters)
+        self.vector = self.sum_type = FLOAT.of(self.lanes)
+        self.element = self.vector if self.wide else FLOAT
 
     def blocks(self, neurons: int) -> Blocks:
         """Return how neurons fill blocks."""

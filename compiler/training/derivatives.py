@@ -89,7 +89,7 @@ class Derivatives(Nest):
     def __init__(self, step: Step, size: int) -> None:
         self.copies = transposed_slots(step)
         self.places = {**slots(step), **self.copies}
-        super().__init__(step.program, {}, LANES)
+        super().__init__(step.program, {}, lanes=LANES)
         self.step, self.size, self.vectors = step, size, 0
         self.outputs = dict(self.program.outputs)
         self.gathered = next(i for i, n in enumerate(self.program.nodes) if n.get("name") == WINDOW)

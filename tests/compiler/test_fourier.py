@@ -363,7 +363,7 @@ def test_golden_spectra(golden) -> None:
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
     idea = "small tiles"
     for dialect in (OpenCL(), C()):
-        tiny = schedules.Fourier("fft4", idea, dialect, 4, 2, 4, 1)
+        tiny = schedules.Fourier(dialect, "fft4", idea, lanes=4, pixels=2, points=4, tiles=1)
         golden(
             f"fft4.denoise{dialect.suffix}", tiny.renderer(analysed(traced), True).source(["a tiny kernel"])
         )

@@ -39,10 +39,10 @@ def model(border="zero", activation="sine", images=("color", "normal", "albedo",
 def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
-    tiny = schedules.Fourier("fft8", "small tiles", dialect, 4, 6, points, tiles)
+    tiny = schedules.Fourier(dialect, "fft8", "small tiles", lanes=4, pixels=6, points=points, tiles=tiles)
     if target in ("opengl", "glsl-vulkan"):
         words = GLSLCompute() if target == "opengl" else Vulkan()
-        tiny = FourierPasses("fftpasses:8", "small tiles", words, points, "plain")
+        tiny = FourierPasses(words, "fftpasses:8", "small tiles", points=points)
     whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedules, "COST", 0.0)

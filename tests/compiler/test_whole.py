@@ -168,7 +168,7 @@ def smallest(channels) -> Program:
 
 @pytest.mark.parametrize("dialect", [CUDA(), WGSL(), Vulkan(), OpenCL()])
 def test_the_text_of_grouped_dots(golden, dialect) -> None:
-    tiny = GroupDot("groupdot:1", "a tiny group", dialect, 1, (4, 2))
+    tiny = GroupDot(dialect, "groupdot:1", "a tiny group", pixels=1, group=(4, 2))
     found = tiny.renderer(smallest({"a": 3, "b": 2}), False).source(["a tiny kernel"])
     golden(f"groupdot.denoise{dialect.suffix}", found)
 
@@ -177,7 +177,7 @@ def test_the_text_of_grouped_dots(golden, dialect) -> None:
 def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
     """Read the array as the kernel does: four words at a time, tap by tap, word by word."""
     found, held = smallest(channels), sum(channels.values())
-    tiny = GroupDot("groupdot:1", "a tiny group", CUDA(), 1, (4, 2))
+    tiny = GroupDot(CUDA(), "groupdot:1", "a tiny group", pixels=1, group=(4, 2))
     packed, slots = tiny.pack(found), tiny.layout(found)
     windowed = True
     for name, matrix in found.parameters.items():
@@ -202,14 +202,14 @@ def test_the_words_of_grouped_dots_are_the_weights(channels) -> None:
 def test_a_tile_of_words_takes_a_quarter() -> None:
     """Five channels are two words of a pixel; 21 are six, of which four are in the tile at once."""
     for channels, words in (({"a": 3, "b": 2}, 2), ({"a": 4, "b": 17}, 4)):
-        tiny = GroupDot("groupdot:4", "a tiny group", WGSL(), 4, (8, 8))
+        tiny = GroupDot(WGSL(), "groupdot:4", "a tiny group", pixels=4, group=(8, 8))
         assert tiny.details(smallest(channels))["shared_bytes"] == 4 * words * (8 * 4 + 1) * (8 + 1)
 
 
 def test_the_text_of_dots(golden) -> None:
     found = smallest(CHANNELS)
     for dialect in (C(), OpenCL()):
-        tiny = Dot("dot:4", "a tiny tile", dialect, 4, 2)
+        tiny = Dot(dialect, "dot:4", "a tiny tile", lanes=4, pixels=2)
         golden(f"dot4.denoise{dialect.suffix}", tiny.renderer(found, True).source(["a tiny kernel"]))
 
 
@@ -222,7 +222,7 @@ def test_the_bytes_of_dots_are_the_weights() -> None:
             lambda x: forward_whole(net, x), {"window": Type(shape=(16,))}, Gather(Window(2, "clamp"), images)
         )
     )
-    dot = Dot("dot:4", "a tiny tile", C(), 4, 2)
+    dot = Dot(C(), "dot:4", "a tiny tile", lanes=4, pixels=2)
     packed, slots = dot.pack(found), dot.layout(found)
     assert packed.size == sum(int(np.prod(slot.shape)) for slot in slots.values())
     for name, matrix in found.parameters.items():
@@ -264,7 +264,8 @@ def test_what_bytes_do_not_hold_is_refused(changed, reason) -> None:
     net = changed(network())
     pixel = forward_whole if isinstance(net, Whole) else siren.forward
     found = program(lambda window: pixel(net, window), is_whole=isinstance(net, Whole))
-    assert reason in Dot("dot:16", "", C(), 16, 14).refusal(found)
-    assert bool(reason) == bool(Dot("dot:16", "", C(), 16, 14).refusal(found))
-    assert (reason in GroupDot("groupdot:4", "", WGSL(), 4).refusal(found)) or not reason
-    assert bool(reason) == bool(GroupDot("groupdot:4", "", WGSL(), 4).refusal(found))
+    tile = Dot(C(), lanes=16, pixels=14).refusal(found)
+    group = GroupDot(WGSL(), pixels=4, group=(8, 8)).refusal(found)
+    assert reason in tile
+    assert (reason in group) or not reason
+    assert bool(reason) == bool(tile) == bool(group)

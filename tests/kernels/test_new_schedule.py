@@ -16,7 +16,6 @@ from wamnet.compiler.parsing.canonical import canonical
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import parse
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.schedules.plain import plain
 from wamnet.compiler.schedules.schedules import Plain
 
 
@@ -35,7 +34,7 @@ class Backwards(Plain):
             value = replace(value, args=args)
             return load(WEIGHTS, last - args[0]) if value.value == WEIGHTS else value
 
-        kernel = plain(program)
+        kernel = super().build(program)
         return replace(kernel, body=rewritten(kernel.body, turned))
 
     def pack(self, program):

@@ -48,8 +48,7 @@ from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.reading.check import passes_of
-from wamnet.compiler.schedules.plain import plain
-from wamnet.compiler.schedules.tile import all_stored, tile
+from wamnet.compiler.schedules.schedules import Plain, Tile
 from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
@@ -71,9 +70,13 @@ def read(source, target, kernel):
 
 def tiled(program, target, lanes=4, pixels=3, vectors=2):
     """Return a tile of a language and its weights."""
-    stored = all_stored(program, lanes, vectors).values()
-    kernel = tile(program, lanes, pixels, vectors, target == "opencl")
-    return kernel, np.concatenate([np.ravel(each) for each in stored])
+    tile = Tile(OpenCL() if target == "opencl" else C(), lanes=lanes, pixels=pixels, vectors=vectors)
+    return tile.build(program), tile.pack(program)
+
+
+def plain(program):
+    """Return the plain kernel of a program."""
+    return Plain(C()).build(program)
 
 
 def rendered(kernel, target, weights, bounded=True):

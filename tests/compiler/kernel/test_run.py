@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.ir import Gather, Image
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.core.weights import pack
 from wamnet.compiler.kernel.domain import Domain
 from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
@@ -49,17 +48,13 @@ from wamnet.compiler.kernel.kernel import (
 from wamnet.compiler.kernel.run import Runner, run
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.cuda import CUDA
+from wamnet.compiler.languages.glsl import GLSL, GLSLCompute
+from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.schedules.bytes import bytes_stored, group_of_bytes, tile_of_bytes, words_stored
-from wamnet.compiler.schedules.fft import fft, spectra_stored
-from wamnet.compiler.schedules.group import LARGEST_NUMBERS, group
-from wamnet.compiler.schedules.inlined import inlined
-from wamnet.compiler.schedules.packed import packed, packed_weights
-from wamnet.compiler.schedules.passes import passes
-from wamnet.compiler.schedules.passes import stored as passes_stored
-from wamnet.compiler.schedules.plain import plain
-from wamnet.compiler.schedules.tile import all_stored, tile
+from wamnet.compiler.schedules.passes import FourierPasses
+from wamnet.compiler.schedules.schedules import Dot, Fourier, GroupDot, Grouped, Inline, Packed, Plain, Tile
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
@@ -86,11 +81,11 @@ int main(void)
 
 def scheduled(program, shape=None):
     """Return a kernel of a program and its weights: plain, or a tile of (lanes, pixels, vectors, wide)."""
-    if shape is None:
-        return plain(program), pack(program)
-    lanes, _, vectors, _ = shape
-    stored = all_stored(program, lanes, vectors).values()
-    return tile(program, *shape), np.concatenate([np.ravel(each) for each in stored])
+    schedule = Plain(C())
+    if shape is not None:
+        lanes, pixels, vectors, wide = shape
+        schedule = Tile(OpenCL() if wide else C(), lanes=lanes, pixels=pixels, vectors=vectors)
+    return schedule.build(program), schedule.pack(program)
 
 
 def pictures(channels, size, seed=1):
@@ -138,18 +133,13 @@ def test_kernels_are_near_the_reference(kit, case):
         assert (np.abs(result - expected.value) <= expected.bound).all()
 
 
-def flat(arrays):
-    """Return arrays one after another."""
-    return np.concatenate([np.ravel(each) for each in arrays.values()])
-
-
 SCHEDULES = {
-    "group": lambda p: (group(p, 2, (4, 2), True), flat(all_stored(p, 4, LARGEST_NUMBERS))),
-    "group, by components": lambda p: (group(p, 1, (2, 4), False), flat(all_stored(p, 4, LARGEST_NUMBERS))),
-    "inlined": lambda p: (inlined(p), np.zeros(0, np.float32)),
-    "packed": lambda p: (packed(p), flat(packed_weights(p))),
-    "fft": lambda p: (fft(p, 4, 2, 4, 2, True), flat(spectra_stored(p, 4, 4, 2))),
-    "fft in passes": lambda p: (passes(p, 4), flat(passes_stored(p, 4))),
+    "group": Grouped(OpenCL(), pixels=2, group=(4, 2)),
+    "group, by components": Grouped(CUDA(), pixels=1, group=(2, 4)),
+    "inlined": Inline(GLSL()),
+    "packed": Packed(GLSL()),
+    "fft": Fourier(OpenCL(), lanes=4, pixels=2, points=4, tiles=2),
+    "fft in passes": FourierPasses(GLSLCompute(), points=4),
 }
 
 
@@ -158,14 +148,15 @@ SCHEDULES = {
 def test_other_schedules_are_near_the_reference(kit, schedule, border):
     program = kit.denoiser(kit.network([36, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 3, border)
     plan, images = plan_program(program, "opencl"), pictures({"a": 3, "b": 1}, (3, 5))
-    expected, (kernel, weights) = plan.expected(images), SCHEDULES[schedule](plan.emitted)
+    expected, kernel = plan.expected(images), SCHEDULES[schedule].build(plan.emitted)
+    weights = SCHEDULES[schedule].pack(plan.emitted)
     far = 4 if schedule.startswith("fft") else 1  # another order of sums, whose own bound is larger
     assert (np.abs(run(kernel, images, weights) - expected.value) <= far * expected.bound).all()
 
 
 BYTEWISE = {
-    "tile": lambda p: (tile_of_bytes(p, 4, 3, True), flat(bytes_stored(p, 4, 2))),
-    "group": lambda p: (group_of_bytes(p, 2, (4, 2), True), flat(words_stored(p))),
+    "tile": Dot(OpenCL(), lanes=4, pixels=3),
+    "group": GroupDot(OpenCL(), pixels=2, group=(4, 2)),
 }
 
 
@@ -179,7 +170,7 @@ def test_integer_networks_are_exact(schedule):
     plan = plan_program(program, "opencl")
     random = np.random.default_rng(3)
     images = {key: random.integers(-127, 128, (3, 5, n)).astype(np.float32) for key, n in channels.items()}
-    kernel, weights = BYTEWISE[schedule](plan.emitted)
+    kernel, weights = BYTEWISE[schedule].build(plan.emitted), BYTEWISE[schedule].pack(plan.emitted)
     assert np.array_equal(run(kernel, images, weights), plan.expected(images).value)
 
 
@@ -214,9 +205,10 @@ def test_passes_have_the_bits_of_the_fft_schedule(kit, widths, size):
     """Both add the same numbers in the same order: with several tiles, groups of neurons, for one pixel."""
     program = kit.denoiser(kit.network(list(widths), (3.0, 5.0)), {"a": 3}, 4, "zero")
     plan, images = plan_program(program, "opencl"), pictures({"a": 3}, size)
-    one, many = fft(plan.emitted, 16, 2, 16, 1, True), passes(plan.emitted, 16)
-    found = run(many, images, flat(passes_stored(plan.emitted, 16)))
-    assert np.array_equal(found, run(one, images, flat(spectra_stored(plan.emitted, 16, 16, 1))))
+    one = Fourier(OpenCL(), lanes=16, pixels=2, points=16, tiles=1)
+    both = one, FourierPasses(GLSLCompute(), points=16)
+    found, other = (run(each.build(plan.emitted), images, each.pack(plan.emitted)) for each in both)
+    assert np.array_equal(found, other)
 
 
 def launched(*bodies):

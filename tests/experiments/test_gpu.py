@@ -8,10 +8,7 @@ import json
 import gpu
 import numpy as np
 import pytest
-from lab import nvcc
 from lab.results import Results
-
-from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 
 pytestmark = pytest.mark.nightly  # it runs with the experiments
 
@@ -43,17 +40,6 @@ def test_a_process_that_takes_too_long_ends(executor_named, tmp_path):
     assert "status -9" in record["values"]["missing"]
 
 
-@pytest.mark.parametrize(
-    ("change", "least"), [(lambda v: v, 0), (lambda v: v + 1, 1), (lambda v: v * np.float32(np.nan), 1)]
-)
-def test_errors_are_shares_of_the_bound(change, least):
-    value = np.zeros((2, 2, 3), np.float32)
-    patch = (slice(0, 2), slice(0, 2))
-    wanted = gpu.Wanted([patch], [value.astype(np.float64)], [np.full(value.shape, 0.5)])
-    error, share = wanted.share(change(value))
-    assert (share > 1, error >= least) == (least == 1, True)
-
-
 def test_what_is_prepared_is_what_is_computed(tmp_path):
     plan, images = gpu.planned(NETWORK, "numpy", "plain"), gpu.images_for(NETWORK, (16, 70))
     computed = gpu.wanted(plan, NETWORK, images, None)
@@ -74,17 +60,6 @@ def test_c_is_checked_and_timed_as_webassembly(tmp_path):
         assert 0 < values["share"] <= 1
         assert 0 < values["least"] <= values["ms"]
         assert values["read"]
-
-
-def test_an_unknown_language_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"language or network 'hlsl': must be among cuda, opencl"):
-        gpu.main(["--only", "hlsl", "-o", str(tmp_path)])
-
-
-def test_nvcc_without_a_device_or_a_compiler_is_missing(monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    with pytest.raises(ExecutorUnavailable, match="nvcc is not installed"):
-        nvcc.NvccRunner()
 
 
 def test_tasks_end_with_what_may_not_end():

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import math
-import statistics
-
-import numpy as np
 import pytest
-from lab import command, figures
-from lab.results import Results, fill, summary
+from lab import command
+from lab.results import Results, fill
 from lab.tables import Column, markdown, table
 
 from wamnet.refimpl.errors import InputError, TrainingError
@@ -39,24 +34,6 @@ def test_an_interrupted_run_goes_on(results):
     fill(later, {"a": lambda seed: pytest.fail("it is there")}, (0, 1, 2))
 
 
-def test_a_record_replaces_an_older_one(results):
-    results.put("a", 0, {"psnr": 1.0})
-    results.put("a", 0, {"psnr": 2.0})
-    assert results.get("a", 0) == {"psnr": 2.0}
-    assert results.get("a", 1) is None
-
-
-def test_a_mean_has_a_spread(results):
-    for seed, value in enumerate((1.0, 2.0, 6.0)):
-        results.put("a", seed, {"psnr": value})
-    found = results.summary("a", "psnr")
-    assert (found.mean, found.deviation, found.count) == (3.0, statistics.stdev((1.0, 2.0, 6.0)), 3)
-    assert results.text("a", "psnr") == "3.00 ± 2.65"
-    assert results.text("a", "ssim") == ""
-    assert math.isnan(summary([1.0]).deviation)
-    assert summary([1.0]).text(1) == "1.0"
-
-
 def test_another_experiment_s_file_is_refused(results):
     with pytest.raises(InputError, match="belongs to test with settings"):
         Results.open(results.path, "test", {"size": 16})
@@ -65,12 +42,6 @@ def test_another_experiment_s_file_is_refused(results):
     results.path.write_text("{")
     with pytest.raises(InputError, match="is not a file of results"):
         Results.open(results.path, "test", {"size": 8})
-
-
-def test_settings_may_hold_tuples(tmp_path):
-    for _ in range(2):
-        Results.open(tmp_path / "found.json", "test", {"sizes": (1, 2)})
-    assert json.loads((tmp_path / "found.json").read_text())["settings"] == {"sizes": [1, 2]}
 
 
 def test_a_file_says_which_commands_made_it(results, tmp_path):
@@ -94,13 +65,6 @@ def test_a_file_says_which_commands_made_it(results, tmp_path):
     assert Results.read(results.path).records() == results.records()
 
 
-def test_a_file_of_another_form_is_refused(results):
-    results.put("a", 0, {"psnr": 30.0})
-    results.path.write_text(json.dumps({**results.data(), "schema": "wamnet-experiment-3"}))
-    with pytest.raises(InputError, match="is not a file of results"):
-        results.records()
-
-
 def test_numbers_of_each_pose_have_an_interval(results):
     for seed, poses in enumerate(([30.0, 34.0], [31.0, 35.0])):
         results.put("a", seed, {"psnr": sum(poses) / 2, "ms": 2.0, "per_frame": {"psnr": poses}})
@@ -122,14 +86,6 @@ def test_tables_have_empty_cells_for_what_was_not_measured(results):
     )
 
 
-def test_figures_are_pictures(tmp_path):
-    image = np.linspace(0.0, 1.0, 8 * 8 * 3).reshape(8, 8, 3)
-    figures.sheet(tmp_path / "sheet.png", [("row", [("a", image), ("map", image[..., 0])])])
-    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match=r"pictures in each row \[1, 2\]"):
-        figures.sheet(tmp_path / "x.png", [("", [("", image)]), ("", [("", image), ("", image)])])
-
-
 def test_errors_end_with_one_line_and_a_status(capsys):
     def refused(arguments):
         raise TrainingError("the loss is not finite")
@@ -144,11 +100,3 @@ def test_errors_end_with_one_line_and_a_status(capsys):
     with pytest.raises(SystemExit) as left:
         command.begin(interrupted, [])
     assert left.value.code == 130
-
-
-def test_the_scale_for_tests_is_not_offered(capsys):
-    with pytest.raises(SystemExit):
-        command.parser("text", "name").parse_args(["--help"])
-    shown = capsys.readouterr().out
-    assert "{small,paper}" in shown
-    assert "toy" not in shown

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from lab import scores
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.errors import InputError
 
-flip_evaluator = pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
+pytest.importorskip("flip_evaluator", reason="flip-evaluator is not installed")
 
 RNG = np.random.default_rng(1)
 REFERENCE = RNG.uniform(0.0, 1.5, (16, 16, 3))
@@ -35,12 +33,6 @@ def test_scores_are_those_of_the_metrics():
     assert abs(found["mse255"] - 65025.0 * found["mse"]) <= 2.0**-51 * found["mse255"]
 
 
-def test_linear_radiance_is_scored_itself_where_it_is_known():
-    found = scores.score(encoding.to_display(REFERENCE), REFERENCE, linear=REFERENCE)
-    assert (found["mse"], found["relmse"], found["smape"], found["flip"]) == (0.0, 0.0, 0.0, 0.0)
-    assert found["psnr"] == found["paper"] == math.inf
-
-
 @pytest.mark.parametrize(("mse", "printed"), [(82.93, 66.67), (79.03, 67.16), (48.04, 72.17), (39.28, 74.18)])
 def test_the_paper_s_figure_is_what_its_table_prints(mse, printed):
     # Table 1 of "WAMnet for Image Denoising" rounds both; its own numbers agree to 0.07 (spec/metrics.md).
@@ -54,10 +46,6 @@ def test_squares_of_eight_bits_wrap_around():
     a, b = (np.random.default_rng(7).integers(0, 256, (8, 8, 3)).astype(np.uint8) for _ in range(2))
     b = b[::-1]
     assert scores.wrapped_mse(a / 255.0, b / 255.0) == np.mean((a - b) ** 2)  # NumPy's own 8 bits
-
-
-def test_means_are_over_pictures():
-    assert scores.mean_scores([{"mse": 1.0}, {"mse": 3.0}]) == {"mse": 2.0}
 
 
 # ---- FLIP ------------------------------------------------------------------------------------------------
@@ -106,28 +94,6 @@ def test_flip_of_constant_pictures_is_the_published_formula(a, b):
     assert abs(scores.flip(*pictures) - flip_of_constants(a, b)) <= 200 * 82 * ULP
 
 
-def test_flip_of_green_and_blue_is_one():
-    """Section 4.1.3 scales the largest distance of two colours, that of green and blue, to 1."""
-    green, blue = (np.broadcast_to(np.float32(c), (24, 24, 3)) for c in ((0, 1, 0), (0, 0, 1)))
-    assert abs(scores.flip(green, blue) - 1.0) <= 200 * 82 * ULP
-
-
-def test_flip_of_the_authors_pair():
-    """Their test (NVlabs/flip, src/tests/test.py) expects 0.159691 for images/reference.png and test.png.
-
-    The pictures are theirs, 4 MB each, and not part of this project: WAMNET_FLIP_IMAGES names the folder.
-    """
-    folder = os.environ.get("WAMNET_FLIP_IMAGES")
-    if not folder:
-        pytest.skip(
-            "WAMNET_FLIP_IMAGES does not name the folder with reference.png and test.png of NVlabs/flip"
-        )
-    from wamnet.cli.files.images import read_png
-
-    reference, test = (read_png(Path(folder) / name) for name in ("reference.png", "test.png"))
-    assert abs(scores.flip(test, reference) - 0.159691) <= 0.5e-6
-
-
 def test_flip_refuses_what_is_not_encoded():
     with pytest.raises(InputError, match=r"range of the picture '0.* to 1.*': FLIP takes display-encoded"):
         scores.flip(REFERENCE, PICTURE)
@@ -146,13 +112,6 @@ def test_a_ladder_of_one_over_n_is_exact():
         # A handful of roundings of exp and log.
         assert abs(ladder.spp_of(1.0 / spp) - spp) <= 32 * 2.0**-52 * spp
     assert ladder.spp_of(0.0) == math.inf
-
-
-def test_a_ladder_gives_back_the_errors_that_it_was_asked_for():
-    ladder = scores.Ladder((1, 4, 32), (0.5, 0.2, 0.01))
-    for mse in (2.0, 0.5, 0.3, 0.2, 0.05, 0.01, 0.001):
-        # Logarithms of numbers below 10 and an exponential: a few roundings each.
-        assert abs(ladder.mse_of(ladder.spp_of(mse)) - mse) <= 64 * 2.0**-52 * mse
 
 
 def test_a_ladder_is_measured_and_must_fall():

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import shutil
 
 import mutant
 import mutants
 import pytest
 from lab import mutation, mutation_c, trial, trial_c
-from lab.blame import Clauses
-from lab.trial import Outcome
-from lab.users import Users
 
 pytestmark = pytest.mark.nightly  # it runs with the experiments
 
@@ -55,14 +51,6 @@ def test_changes_are_those_of_a_programmer():
     assert details("arguments")[0] == "draw(seed, x, 1, 2) -> (draw(x, seed, 1, 2))"
 
 
-def test_every_mutant_is_another_program_with_the_same_lines():
-    found = mutation.mutants("m.py", SOURCE)
-    assert len({m.name for m in found}) == len(found)
-    texts = [mutation.mutated(m, SOURCE) for m in found]
-    assert {text.count("\n") for text in texts} == {SOURCE.count("\n")}
-    assert ast.dump(ast.parse(SOURCE)) not in {ast.dump(ast.parse(text)) for text in texts}
-
-
 def test_mutants_of_the_c_program_change_one_line():
     (source,) = mutants.texts(c99=True).values()
     found = mutation_c.mutants(mutants.C99, source)
@@ -82,62 +70,9 @@ def test_changes_are_named_by_the_place_that_they_are_in_not_by_lines():
     assert places == {"LIMIT", "clamp()", "clamp"}
 
 
-def test_changes_in_a_class_are_named_by_its_fields():
-    source = "class Job:\n    seed: int = 7\n    kind = -1.0\n\n    def f(self, a=2): return a + 3\n"
-    found = [m.change for m in mutation.mutants("m.py", source)]
-    assert "m.py:Job.seed:constant:7 -> (8)" in found
-    assert "m.py:Job.kind:sign:-1.0 -> (1.0)" in found
-    assert "m.py:Job.f:operand dropped:a + 3 -> (a)" in found
-
-
-def test_reasons_have_a_sort_and_fit_changes(tmp_path):
-    known = mutants.reasons()
-    some = mutants.chosen(["dielectric.py:fresnel:exchanged:ratio"], None, 0)
-    assert {mutants.excuse(m, known) for m in some} == {"equal"}
-    other = tmp_path / "reasons.txt"
-    other.write_text("dielectric.py:* | 3 | boring | nobody asks\n", encoding="utf-8")
-    with pytest.raises(AssertionError, match="a reason is one of"):
-        mutants.reasons(other)
-
-
 def test_each_reason_fits_as_many_mutants_as_it_says():
     every = mutants.chosen([], None, 0) + mutants.chosen([], None, 0, c99=True)
     assert mutants.faults(every, mutants.reasons()) == []
-
-
-def test_reasons_that_fit_nothing_more_than_they_say_or_what_has_one_are_wrong(tmp_path):
-    path = tmp_path / "reasons.txt"
-    rows = ("m.py:gone:* | 1", "m.py:clamp:comparison:* | 1", "m.py:LIMIT:* | 1", "m.py:LIMIT:*(1.0) | 1")
-    path.write_text("".join(f"{row} | equal | words\n" for row in rows), encoding="utf-8")
-    wrong = mutants.faults(mutation.mutants("m.py", SOURCE), mutants.reasons(path))
-    assert len(wrong) == 3
-    assert "fits 0 mutants, not 1" in wrong[0]
-    assert "fits 2 mutants, not 1" in wrong[1]
-    assert wrong[2] == "m.py:LIMIT:constant:0.5 -> (1.0) has more than one reason"
-
-
-def test_a_reason_may_hold_the_sign_between_columns(tmp_path):
-    path = tmp_path / "reasons.txt"
-    path.write_text("m.py:f:operand dropped:a | b -> (a) | 1 | equal | b is 0\n", encoding="utf-8")
-    (mutant, *_) = mutation.mutants("m.py", "def f(a, b):\n    return a | b\n")[1:]
-    assert mutants.excuse(mutant, mutants.reasons(path)) == "equal"
-
-
-def test_blame_is_right_near_or_neither():
-    mutant, *_ = mutants.chosen(["rng.py:uniform_floats:exchanged"], None, 0)
-    clauses = Clauses()
-    assert clauses.broken(mutant) == {"RNG-5"}
-    assert clauses.near(mutant, "RNG-3")
-    assert not clauses.near(mutant, "SMP-1")
-
-
-def test_a_table_counts_what_came(monkeypatch):
-    some = mutants.chosen(["refimpl/rng.py:uniform_floats:"], 3, 0)
-    came = (Outcome(2, "random.block/0", "RNG-5", "", "fail"), Outcome(2), Outcome(0))
-    kept = {m.name: outcome for m, outcome in zip(some, came, strict=True)}
-    monkeypatch.setattr(mutants, "reasons", list)
-    last = mutants.table("module", {"rng": some}, kept).splitlines()[-1]
-    assert last == "| all | 3 | 2 | 1 | 0 | 0 | 1 | 50.0 | 100.0 | 100.0 |"
 
 
 @pytest.mark.needs("programs")
@@ -163,14 +98,6 @@ def test_a_mutant_of_the_c_program_is_caught(tmp_path):
     assert {outcome.verdict for outcome in came if outcome} == {"fail"}
 
 
-def test_a_default_is_used_by_the_methods_of_its_class():
-    source = (
-        "FULL = 1.0\n\n\nclass Job:\n    share: float = FULL\n\n    def f(self):\n        return self.share\n"
-    )
-    constant = mutation.mutants("m.py", source)[0]
-    assert Users({"m.py": source}).lines(constant) == {("m.py", line) for line in (1, 4, 5, 6, 7, 8)}
-
-
 # ---- one mutant -----------------------------------------------------------------------------------------
 
 BEHIND = "sphere.py:*:(discriminant > 0.0) & (t_far > 0.0) -> (discriminant > 0.0)"
@@ -190,35 +117,6 @@ def test_one_mutant_is_shown_with_those_who_see_it(capsys):
     assert said[5] == "  intersection.nearest: 1 of 14 cases, blamed on ISC-1"
     assert said[6] == "  intersection.occluded: 1 of 27 cases, blamed on ISC-10"
     assert said[7] == "look first at ISC-6: intersection.sphere/1 (away from it)"
-
-
-@pytest.mark.needs("programs")
-def test_a_survivor_is_shown_with_its_reason_or_as_missed(capsys):
-    mutant.main(["sphere.py:*:b < 0.0 -> (b <= 0.0)", "-k", "intersection.sphere"])
-    assert capsys.readouterr().out.splitlines()[-1].startswith("equal: at b = 0 ")
-    mutant.main([BEHIND, "-k", "intersection.sphere/2"])
-    assert capsys.readouterr().out.splitlines()[-2:] == [
-        "0 of 1 cases see it",
-        "other cases may see it: ask without -k",
-    ]
-
-
-@pytest.mark.needs("programs")
-def test_a_mutant_that_the_whole_suite_does_not_see_is_missed():
-    (some,) = mutants.chosen(["sphere.py:sphere_distance:comparison:b < 0.0 -> (b <= 0.0)"], None, 0)
-    unknown = some._replace(change="m.py:f:constant:1 -> (2)")
-    said = list(mutant.told(unknown, mutants.texts(c99=False)[some.module], [], [], whole=True))
-    assert said[-1] == "missed: a case, or a reason, is still to be written"
-
-
-@pytest.mark.needs("programs")
-def test_a_mutant_that_cannot_be_imported_fails_each_case():
-    (some,) = mutants.chosen(["sphere.py:Sphere.closed:constant"], None, 0)
-    broken = some._replace(start=0, end=0, text="raise SystemExit\n")
-    (source,) = (text for path, text in mutants.texts(c99=False).items() if path == some.module)
-    asked = mutant.cases(["random.block"])
-    failures = trial.failures(broken, source, asked)
-    assert [failed and failed[3] for failed in failures] == ["crash"] * len(asked)
 
 
 @pytest.mark.parametrize(

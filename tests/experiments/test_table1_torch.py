@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import table1
 from baselines import rows
@@ -52,11 +51,3 @@ def test_rows_of_open_image_denoise(row, cache, executor_named):
         display, linear = ready.picture(case)
     assert linear is not None
     assert scores.metrics.psnr(display, rows.to_display(case.reference["color"])) > 15.0
-
-
-def test_pictures_are_enlarged_by_means():
-    needed("torch")
-    flat = rows.larger(np.full((3, 2, 3), 0.25, np.float32), 4)
-    assert flat.shape == (12, 8, 3)
-    # Weights of the cubic kernel sum up to one.
-    assert np.max(np.abs(flat - 0.25)) <= 16 * 2.0**-24

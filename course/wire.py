@@ -118,6 +118,7 @@ class Expression:
         self.source = source
 
     def __call__(self, *args: Any) -> Any:
+        """Return the value of the function."""
         return evaluated(self.source)(*args)
 
     def __reduce__(self) -> tuple[Any, ...]:

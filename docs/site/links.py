@@ -33,6 +33,7 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note anchors and links."""
         given = dict(attrs)
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}  # type: ignore[misc]
         self.addresses += [given[name] or "" for name in ADDRESSES if name in given and tag != "object"]

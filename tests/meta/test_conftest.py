@@ -87,12 +87,6 @@ def test_what_is_missing_and_required_fails(missing):
     result.stdout.fnmatch_lines_random([*lines, *[f"*package torch is required and {TORCH}"] * 2])
 
 
-def test_unknown_name_is_refused(run):
-    result = run("opencl,metal")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*WAMNET_REQUIRE names ?'metal'?: it may list only numpy, opencl*"])
-
-
 TIERS = """
 import pytest
 
@@ -164,7 +158,6 @@ def test_it(number):
         ("ci", ("--budget", "600"), "true", 5, True),
         ("ci", ("--budget", "0.001", "--nightly"), "true", 13, True),
         ("long", ("--budget", "0.001"), "", 13, False),
-        ("long", ("--hypothesis-seed=7",), "true", 13, True),
     ],
 )
 def test_a_tier_says_what_it_leaves_out(run, pytester, monkeypatch, profile, options, ci, passed, alike):
@@ -190,11 +183,6 @@ def test_a_tier_says_what_it_leaves_out(run, pytester, monkeypatch, profile, opt
     assert ("TOO MUCH" in result.stdout.str()) is exceeded
     if "--budget" in options:
         result.stdout.fnmatch_lines([f"processor time: * s, budget {options[1]} s*"])
-
-
-def test_a_case_that_is_named_runs_in_every_tier(run, pytester):
-    file = pytester.makepyfile(TIERS)
-    run("", f"{file.name}::test_nightly").assert_outcomes(passed=1)
 
 
 APART = """
@@ -254,20 +242,6 @@ def test_a_file_apart_has_a_process_of_its_own(run, pytester):
     )
 
 
-def test_folders_around_a_file_apart_are_left_as_around_any(run, pytester):
-    """The test before it keeps what it shares with it; that of another folder came next, and was refused."""
-    test = "import pytest\n\npytestmark = [{}]\n\ndef test_it():\n    assert True\n"
-    for name, mark in (("a/test_1", ""), ("a/test_2", "pytest.mark.apart"), ("b/test_3", "")):
-        path = pytester.path / f"{name}.py"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(test.format(mark))
-    for folder in ("a", "b"):
-        (pytester.path / folder / "conftest.py").write_text("")
-    for path in pytester.path.glob("test_*.py"):
-        path.unlink()
-    run("").assert_outcomes(passed=3)
-
-
 QUICK = """
 import subprocess
 import sys
@@ -306,13 +280,6 @@ def test_a_quick_run_has_no_packages_devices_or_programs(run, pytester):
             "1 tests or files: it runs kernels or other renderers; make test runs it",
         ]
     )
-
-
-def test_a_need_that_nobody_knows_is_refused(run, pytester):
-    pytester.makepyfile('import pytest\n\n@pytest.mark.needs("luck")\ndef test_it():\n    assert True\n')
-    result = run("")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*needs('luck',): the words are devices, packages, programs, time"])
 
 
 def test_a_quick_run_works_where_nothing_else_is_installed(tmp_path):

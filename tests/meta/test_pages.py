@@ -35,16 +35,3 @@ def test_each_page_says_what_it_is_good_for_and_how_long_it_takes(house):
     house.refuse(
         wrong, "A page begins with what its reader will learn and how long it takes: *You will learn to ...*"
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("*You will learn to draw. Half an\nhour.*", True),
-        ("*You will have a file. Ten minutes.*", True),
-        ("You will learn to draw. Half an hour.", False),
-        ("*It will be nine.*", False),
-    ],
-)
-def test_the_pattern(text, found):
-    assert bool(PROMISE.search(text)) is found

@@ -81,11 +81,6 @@ def test_no_extra_or_group_needs_a_package_without_files(project, system, machin
     assert {"pyopencl", "pocl-binary-distribution", "moderngl"} - lacking <= full
 
 
-def test_users_have_three_extras(project):
-    """The package index shows users what they need; the rest is for a clone of the repository."""
-    assert list(project["project"]["optional-dependencies"]) == ["opencl", "opengl", "full"]
-
-
 def test_each_name_of_an_extra_or_a_group_exists(house, project):
     """In messages, documents and scripts: what they say to install can be installed."""
     extras, groups = project["project"]["optional-dependencies"], project["dependency-groups"]
@@ -116,13 +111,3 @@ def test_all_sources_are_of_the_oldest_python(house):
     oldest = tuple(int(part) for part in PYTHONS[0].split("."))
     for source in house.installed():
         assert ast.parse((house.root / source.path).read_text(encoding="utf-8"), feature_version=oldest)
-
-
-def test_the_guide_names_what_is_left_out(house, project):
-    page = (house.root / "docs/guide/install.md").read_text(encoding="utf-8")
-    marked = re.findall(
-        r'"([\w-]+)[^";]*; (?:sys_platform|platform_machine)', (house.root / "pyproject.toml").read_text()
-    )
-    assert len(marked) == 3
-    for name in marked:
-        assert name.removesuffix("-binary-distribution").lower() in page.lower()

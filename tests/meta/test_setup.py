@@ -3,9 +3,7 @@
 import fnmatch
 import os
 import re
-import shutil
 import subprocess
-import sys
 
 import pytest
 
@@ -47,59 +45,6 @@ def test_python_that_is_too_old(house, tmp_path):
     )
 
 
-def test_python_that_makes_no_environments(house, tmp_path):
-    script = f'case "$2" in *ensurepip*) exit 1;; esac; exec {sys.executable} "$@"'
-    nothing_else = python_that_says(tmp_path, script)
-    # Without apt-get on PATH nothing can be installed.
-    for tool in ("bash", "env", "dirname", "cat", "sh", "ls"):
-        (tmp_path / tool).symlink_to(shutil.which(tool))
-    done = setup(house, "all", PYTHON=nothing_else, PATH=str(tmp_path))
-    assert done.returncode == 1
-    assert re.search(
-        r"cannot make virtual environments: install python3\.\d+-venv .* and try again", done.stderr
-    )
-
-
-def test_folder_that_is_no_environment(house, tmp_path):
-    (tmp_path / "precious").write_text("kept")
-    done = setup(house, "all", VENV=str(tmp_path))
-    assert (done.returncode, done.stdout) == (1, "")
-    assert "is a folder that holds something else" in done.stderr
-    assert (tmp_path / "precious").read_text() == "kept"
-
-
-def test_all_stands_for_its_groups_and_not_for_the_baselines(house, tmp_path):
-    """With a stand-in for Python that notes what pip has to install."""
-    (tmp_path / "bin").mkdir()
-    python_that_says(tmp_path / "bin", f'case "$*" in *"pip install"*) echo "$*" >>{tmp_path}/asked;; esac')
-    (tmp_path / ".wamnet").mkdir()
-    (tmp_path / ".wamnet/tools-tried").touch()  # nothing is installed through apt
-    editable = " ".join(f"--editable=./{folder}" for folder in house.distributions)
-    for group in ("full", "full", "all", "all", "full", "docs", "quick", "baselines", "baselines"):
-        done = setup(house, group, VENV=str(tmp_path))
-        assert done.returncode == 0, done.stderr
-    asked = (tmp_path / "asked").read_text().splitlines()
-    others = [line for line in asked if "--no-deps" in line]
-    assert others == 3 * [f"-m pip install --quiet --disable-pip-version-check --no-deps {editable}"]
-    package = [line for line in asked if line not in others]
-    assert [line.partition("--constraint .ci/constraints.txt ")[2] for line in package] == [
-        "--editable .[full]",
-        "--editable .[full] --group all",
-        "--editable .[full] --group baselines",
-    ]
-
-
-def test_pytorch_has_one_version_in_one_place(house):
-    pinned = [
-        line
-        for path in house.files()
-        if path.suffix in {"", ".txt", ".toml"}
-        for line in path.read_text(errors="ignore").splitlines()
-        if line.startswith("torch==")
-    ]
-    assert len(pinned) == 1
-
-
 @pytest.mark.parametrize(
     ("given", "required"),
     [
@@ -118,21 +63,6 @@ def test_what_make_requires(house, given, required):
         [*command, rule, "shown"], capture_output=True, text=True, check=True, env=environment
     )
     assert fnmatch.fnmatch(done.stdout.strip(), required)
-
-
-def test_ci_requires_the_baselines_that_it_installs(house):
-    steps = (house.root / ".ci/run").read_text().splitlines()
-    first, second = (
-        n for n, step in enumerate(steps) if " baselines" in step or "ALSO=" in step if step[0] != "#"
-    )
-    assert steps[first].endswith(" baselines")
-    assert "ALSO=torch,pyoidn" in steps[second]
-
-
-def test_the_group_must_be_named(house):
-    done = setup(house)
-    assert done.returncode != 0
-    assert "usage: .ci/setup GROUP" in done.stderr
 
 
 @pytest.mark.parametrize("script", ["setup", "lint", "run", "long"])
@@ -174,14 +104,6 @@ def test_a_long_run_counts_its_cases_and_says_how_to_repeat_them(house, tmp_path
     assert given.endswith(" tests/some.py")
     assert counted == "long: 17 cases passed, 2 failed, in 2 phases of tests"
     assert last == f"long: exit status 1; to repeat: {again}; the log is {tmp_path / 'log'}"
-
-
-def test_a_long_run_without_a_seed_draws_one(house, tmp_path):
-    seeds = set()
-    for name in "ab":
-        (tmp_path / name).mkdir()
-        seeds.add(re.search(r"SEED=(\d+) EXAMPLES=2000", long(house, tmp_path / name, SEED="").stdout)[1])
-    assert len(seeds) == 2  # alike once in 2^32 runs
 
 
 def test_a_seed_that_is_no_number_is_refused(house, tmp_path):

@@ -146,11 +146,6 @@ def test_public_code_has_a_clause(house):
     )
 
 
-def test_the_rule_knows_public_code():
-    tree = ast.parse("def a(): ...\ndef a(): ...\ndef _b(): ...\nclass C:\n    def d(self): ...\nE = 1\n")
-    assert public_names(tree) == ["a", "C"]
-
-
 def test_mentioned_clauses_exist(house):
     known = {c.number for c in clauses(house)}
     prefixes = {number.partition("-")[0] for number in known}

@@ -113,33 +113,3 @@ def test_decisions_about_the_paper_are_in_the_appendix() -> None:
     assert not missing, (
         f"spec/departures.md says how {missing} departs from the paper, or what it leaves open"
     )
-
-
-SAMPLE = """
-<!-- worked: low_rank -->
-stale
-<!-- end -->
-
-<!-- not run: needs a network -->
-```sh
-false
-```
-```python
-raise SystemExit(3)
-```
-"""
-"""A chapter with a stale example, a marked block and one that fails."""
-
-
-@pytest.mark.needs("programs")
-def test_a_stale_example_and_a_failing_block_are_found(tmp_path: Path) -> None:
-    assert "stale" not in filled(SAMPLE)
-    chapter = tmp_path / "x.md"
-    chapter.write_text(SAMPLE)
-    assert [(mark, language) for mark, _, language, _ in fenced(chapter)] == [
-        ("not run:", "sh"),
-        (None, "python"),
-    ]
-    with pytest.raises(pytest.fail.Exception, match="ends with status 3"):
-        test_fenced_blocks(chapter, tmp_path)
-    assert LINK.findall("[a](b.md#c) [d](#e)") == ["b.md", ""]

@@ -10,8 +10,6 @@ import json
 import re
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[2]
 
 CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
@@ -115,27 +113,3 @@ def test_every_clause_has_a_proof(house):
         "A clause is tested: by a vector, or by a test that names it or its code. Write one, or name the "
         "clause in the docstring of the test that holds it.",
     )
-
-
-@pytest.mark.parametrize(
-    ("names", "vectors", "words", "missing"),
-    [
-        ({"pcg4d"}, {}, set(), ["RNG-2"]),
-        ({"pcg4d"}, {"RNG-2": ["a/0"]}, set(), []),
-        ({"pcg4d"}, {}, {"pcg4d"}, []),
-        ({"Model.check"}, {}, {"check"}, []),
-        ({"pcg4d"}, {}, {"RNG-2"}, []),
-    ],
-)
-def test_the_rule_knows_a_proof(names, vectors, words, missing):
-    assert without_proof({"RNG-2": names}, vectors, words) == missing
-
-
-def test_the_rule_knows_named_vectors(tmp_path):
-    (tmp_path / "x.md").write_text(
-        "**RNG-3** (`refimpl/rng.py: a`; vectors: `random.block`, `random.more`).\n**RNG-4** (`b.py: c`)\n"
-    )
-    cases = [{"id": "random.block/0", "clause": "RNG-3"}, {"id": "random.block/1", "clause": "RNG-4"}]
-    (tmp_path / "random.block.json").write_text(json.dumps({"cases": cases}))
-    assert said_by_clauses(tmp_path) == {("RNG-3", "random.block"), ("RNG-3", "random.more")}
-    assert said_by_vectors(tmp_path) == {("RNG-3", "random.block"), ("RNG-4", "random.block")}

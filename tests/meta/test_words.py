@@ -20,8 +20,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import NamedTuple
 
-import pytest
-
 SUFFIXES = (".md", ".py")
 """The kinds of files that are looked at [`prose`]."""
 
@@ -274,121 +272,9 @@ def test_texts_that_users_meet_have_the_words_of_the_field(house):
     house.refuse(sorted(wrong), "A text that users meet has the words of the field: take the better one.")
 
 
-def test_what_is_kept_is_there_and_wrong(house):
-    sources = {source.path: source.text for source in house.python()}
-    for name, phrases in KEPT.items():
-        for phrase in phrases:
-            assert sources[name].count(phrase) == 1, f"{name}: {phrase}"
-            assert list(wrong_words("x.md", phrase)), f"{name}: {phrase}"
-
-
-PLANTED = {
-    "What is missing is told.": "told",
-    "Matt surfaces": "Matt",
-    "The bug is mended.": "mended",
-    "All frames that there can be.": "that there can be",
-    "Files of strangers.": "strangers",
-    "A whole\nnumber of steps": "whole number",
-}
-"""Sentences with a word that is refused."""
-
-
-@pytest.mark.parametrize("text", PLANTED)
-def test_a_planted_word_is_found(text):
-    found = list(wrong_words("x.md", f"# Title\n\n{text}\n"))
-    assert len(found) == 1, found
-    assert found[0].startswith(f'x.md:3: "{PLANTED[text]}": write ')
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("It takes two seconds a frame.", "seconds a frame"),
-        ("A float in place\nof an integer.", "in place of"),
-        ("Inside of the ranges.", "Inside of"),
-        ("It ends with status 2.", "ends with status"),
-        ("A network of integers.", "network of integers"),
-        ("In a process of its own.", "of its own"),
-    ],
-)
-def test_the_glossary_is_for_texts_that_users_meet(text, word):
-    found = list(wrong_words("x.md", text, GLOSSARY))
-    assert [line.split('"')[1] for line in found] == [word]
-    assert list(wrong_words("x.md", text)) == []
-
-
-def test_messages_are_help_errors_and_docstrings_of_commands():
-    text = (
-        '"""A lamp."""\n\n\ndef go():\n    """Light a lamp."""\n    rule = "no lamp"\n'
-        '    option(help="A lamp")\n    raise InputError("lamp", 1, rule, "x")\n    x = "lamp"\n'
-    )
-    for commands, lines in (((), [6, 7, 8]), (("go",), [5, 6, 7, 8])):
-        assert sorted(messages(text, commands)) == lines
-    source = 'COMMANDS: X = {"a b": ("m.a", "go", "")}\n'
-    assert commands_of(source) == {"cli/commands/m/a.py": ["go"]}
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Two runs cannot be told apart. It stands alone, and goes on besides.",
-        "The option `mended` and [a link](mended/matt.md).",
-        "```text\nmended\n```",
-        "<!-- table: losses -->\n| mended |\n<!-- end -->",
-    ],
-)
-def test_plain_words_and_code_pass(text):
-    assert list(wrong_words("x.md", text)) == []
-
-
-def test_texts_of_python_are_prose_and_its_names_are_not():
-    text = 'mend = 1  # now mend\n\n\ndef f():\n    """Mend it."""\n    return f"{x} matt"\n'
-    assert sorted(line.partition(": ")[0] for line in wrong_words("x.py", text)) == [
-        "x.py:1",
-        "x.py:5",
-        "x.py:6",
-    ]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "kinds = {'matt': 1, \"told\": 2}",
-        "say(f\"{path}: {'; '.join(told)} {{{told}}} {told:.2f}\")",
-        "text = 'the file is none.exr: not found'  # see mended.py",
-        "text = 'training pairs is none: at least one is needed'",
-        "program = 'from cli.files.matt import matt_in'",
-        "text = 'the numbers are None'",
-    ],
-)
-def test_names_and_values_in_texts_of_python_pass(text):
-    assert list(wrong_words("x.py", f"{text}\n")) == []
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("x = f\"{a if b else 'it is mended there'}\"", "mended"),
-        ("x = f'{told} is told'", "told"),
-        ('x = f"""{\na} mended\nthere"""', "mended"),
-        ("x = rf'{a:.2f} matt'", "matt"),
-        ("x = 'refuse what is\\n none'", "is none"),
-        ("x = 'it is no regular file'", "is no regular"),
-        ("x = 1  # what\n# is\n# mended.", "mended"),
-    ],
-)
-def test_words_beside_names_in_texts_of_python_are_found(text, word):
-    assert [line.split('"')[1] for line in wrong_words("x.py", f"{text}\n")] == [word]
-
-
 def test_no_word_of_the_glossary_has_two_meanings(house):
     rows = (house.root / "spec/glossary.md").read_text(encoding="utf-8").splitlines()
     wrong = [
         row for row in rows if row.startswith("|") and re.search(r"[;,] (?:also|or) (?:a|one|the)\b", row)
     ]
     house.refuse(wrong, "A word of the glossary means one thing: rename the other, and give it a row.")
-
-
-def test_every_word_has_a_suggestion_and_a_reason():
-    assert all(word.better and word.reason for word in (*WORDS, *GLOSSARY))
-    assert len({word.pattern for word in (*WORDS, *GLOSSARY)}) == len(WORDS) + len(GLOSSARY)

@@ -1,7 +1,6 @@
 """The web site: it is whole, needs no other host, and says what the spec says; wrong pages are refused."""
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import cells
@@ -10,7 +9,6 @@ import formulas
 import hooks
 import links
 import pytest
-import sources
 from build import main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
@@ -52,11 +50,6 @@ def test_a_page_s_links_to_the_spec_work_in_the_repository_and_on_the_site():
     assert hooks.into_site("[a](../docs/images/a.png)", "spec/x.md") == "[a](../images/a.png)"
 
 
-def test_pages_are_in_the_order_of_their_numbers():
-    pages = ["index.md", "1-c.md", "9-a.md", "10-b.md"]
-    assert hooks.by_number(sorted(pages)) == pages
-
-
 @pytest.mark.parametrize("chapter", chapter_files(), ids=lambda path: path.stem)
 def test_every_clause_has_an_anchor(site, chapter):
     page = links.Page((site / "spec" / f"{chapter.stem}.html").read_text())
@@ -80,41 +73,6 @@ def test_code_that_the_spec_names_is_linked_to_its_line(site):
         .index("def pcg4d(v0: Any, v1: Any, v2: Any, v3: Any) -> Block:")
     )
     assert f'<span id="pcg4d"></span><span id="L{line + 1}"' in source
-
-
-def test_formulas_are_set_and_none_is_left(site):
-    texts = [path.read_text() for path in site.rglob("*.html")]
-    assert sum(text.count("<math") for text in texts) > 0
-    assert not any('class="arithmatex"' in text for text in texts)
-
-
-class Torn(HTMLParser):
-    """The marks of figures that no paragraph, item or cell holds."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.held: list[str] = []
-        self.found: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag in ("p", "li", "td"):
-            self.held.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag in self.held:
-            self.held.remove(tag)
-
-    def handle_comment(self, data: str) -> None:
-        if data.startswith(("=", "/")) and not self.held:
-            self.found.append(data.strip())
-
-
-def test_no_paragraph_is_torn_by_a_mark(site):
-    """A comment at the start of a line ends a paragraph in Markdown."""
-    assert Torn("<p>in</p>\n<!--= a --> 3 <!--/--> of").found == ["= a", "/"]
-    for path in site.rglob("*.html"):
-        assert Torn(path.read_text()).found == [], path
 
 
 MOVED = {
@@ -145,11 +103,6 @@ def test_the_site_and_the_spec_have_named_parts(site, chromium):
         assert names == TABS
         shown = [text.strip() for text in tab.page.locator(".md-nav label .md-ellipsis").all_text_contents()]
         assert set(GROUPS) <= set(shown)
-
-
-def test_captions_appear_once(site):
-    for path in site.rglob("*.html"):
-        assert not re.search(r"</figcaption></figure>\s*<p><em>", path.read_text()), path
 
 
 def outside(asked: list[str]) -> list[str]:
@@ -191,22 +144,6 @@ def test_search_finds_a_page_without_a_server(site, chromium):
     assert outside(tab.asked) == []
 
 
-def test_a_listing_marks_the_partners_of_a_line(site, chromium):
-    with chromium.tab(site / "listing.html", viewport={"width": 1300, "height": 800}) as tab:
-        left = tab.page.locator("#network-opencl-" + line_of("refimpl/network/siren.py", "x = activate("))
-        left.hover()
-        marked = tab.page.locator(".listing .marked").all_text_contents()
-    assert any("activate(" in text for text in marked)
-    assert any("float t4 = sin(t3);" in text for text in marked)
-    assert not any("matmul" in text or "weights[" in text for text in marked)
-
-
-def line_of(path: str, beginning: str) -> str:
-    """Return the number of the first line of a file that begins so, counted from 1."""
-    lines = (ROOT / path).read_text().splitlines()
-    return str(next(n for n, line in enumerate(lines, 1) if line.strip().startswith(beginning)))
-
-
 # ---- what is refused -------------------------------------------------------------------------------------
 
 
@@ -231,35 +168,10 @@ def test_links_are_checked(tmp_path, html, reason):
     assert reason is None or reason in wrong[0]
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "hosts"),
-    [
-        ("a.js", 'fetch("https://example.org/x")', 1),
-        ("a.css", "@import url(//fonts.example.org/x);", 1),
-        ("a.js", 'x.createElementNS("http://www.w3.org/2000/svg", "a") // see example.org', 0),
-    ],
-)
-def test_scripts_and_styles_name_no_host(tmp_path, name, text, hosts):
-    (tmp_path / name).write_text(text)
-    assert len(links.broken(tmp_path)) == hosts
-
-
-def test_a_cell_shows_what_it_gives():
-    text = "```python cell\nx = 2\nprint(x < 3)\n```\n\n```python cell\nshow([[0.0, x / 2]], 'two')\n```\n"
-    found = cells.executed(text, "page.md")
-    assert '<pre tabindex="0">True\n</pre>' in found
-    assert 'alt="two" src="data:image/png;base64,' in found
-
-
 def test_a_cell_that_raises_stops_the_build():
     text = "# Title\n\n```python cell\nx = 1\ny = x / 0\n```\n"
     with pytest.raises(PluginError, match=r"page\.md:4: line 2 of the cell raises ZeroDivisionError"):
         cells.executed(text, "page.md")
-
-
-def test_a_picture_without_words_is_refused():
-    with pytest.raises(PluginError, match="ValueError: show: a picture needs an alternative text"):
-        cells.executed("```python cell\nshow([[0.0]], '')\n```\n", "page.md")
 
 
 @pytest.mark.parametrize(
@@ -288,23 +200,9 @@ def test_links_are_made_outside_of_links_headings_and_listings():
     )
 
 
-def test_definitions_are_those_of_the_file():
-    text = "A = 1\n\n@d\ndef f():\n    pass\n\nclass C:\n    b: int = 2\n    def g(self):\n        pass\n"
-    assert sources.definitions(text) == {"A": 1, "f": 3, "C": 7, "C.b": 8, "C.g": 9}
-
-
 def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch, capsys):
     (tmp_path / "letter.txt").write_text("mine")
     monkeypatch.setattr("sys.argv", ["build.py", str(tmp_path)])
     assert main() == 2
     assert "holds something that is not a site; name another folder" in capsys.readouterr().err
     assert (tmp_path / "letter.txt").read_text() == "mine"
-
-
-def test_an_option_is_not_a_folder(monkeypatch, capsys, tmp_path):
-    """`--help` once became a folder with a site in it."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", ["build.py", "--help"])
-    assert main() == 2
-    assert "usage: " in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

@@ -19,7 +19,7 @@ from wamnet.refimpl.network import adam, dataset, siren, smoothing
 from wamnet.spec.conformance import blocks, case, program, report, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
 from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
-from wamnet.spec.conformance.numbers import from_json, to_json
+from wamnet.spec.conformance.numbers import to_json
 from wamnet.spec.conformance.on_executor import OnExecutor
 
 
@@ -276,57 +276,12 @@ def test_what_a_kind_is_made_of_is_looked_at_first(part, whole):
     assert report.first_blamed(verdicts).kind == part
 
 
-def test_a_biased_render_is_caught(monkeypatch):
-    """A light that is a fifth too bright: far beyond what 64 samples leave open."""
-    true = KINDS["picture.rendered"].answer
-
-    def brighter(kind, inputs, profile):
-        found = true({name: case.given(value) for name, value in inputs.items()})
-        return {**found, "mean": found["mean"] * 1.2}
-
-    found = [v for v in judged("picture.rendered", brighter) if v.clause != "CNF-9"]
-    assert {v.verdict for v in found} == {"fail"}
-    assert all("p-value" in v.text and v.stage.startswith("mean[") for v in found)
-
-
-@pytest.mark.parametrize("factor", [0.995, 1.005])
-def test_half_a_percent_of_brightness_is_refused(factor):
-    """The plate's reference has 256 samples of 256 pixels, an answer 64: 0.5 % are many standard errors."""
-    (kind, cases), plate = case.load(vectors.FOLDER / "picture.rendered.json"), 3
-    true = program.of_reference(kind, cases[plate].inputs, "ieee")
-    for changed, verdict in ((1.0, "pass"), (factor, "fail")):
-        answer = {**true, "mean": np.asarray(true["mean"]) * changed}
-        assert run.judge(kind, cases[plate], {"output": to_json(answer)}).verdict == verdict
-    told = {name: np.asarray(from_json(v, name)) for name, v in cases[plate].expected["mean"].welch.items()}
-    mean = from_json(cases[plate].expected["mean"].value, "mean")
-    errors = np.sqrt(told["variance"] * (1 / told["spp"] + 1 / told["asked"])) / mean
-    # The level of 1e-5 over three channels is at 4.7 standard errors; 3.8 more are one in ten thousand.
-    assert np.all(0.005 / errors >= 4.7 + 3.8)
-
-
 @pytest.mark.parametrize("index", range(4))
 def test_a_large_variance_excuses_nothing(index):
     kind, cases = case.load(vectors.FOLDER / "picture.rendered.json")
     true = program.of_reference(kind, cases[index].inputs, "ieee")
     answer = {**true, "mean": np.asarray(true["mean"]) / 2, "variance": np.asarray(true["variance"]) * 1e6}
     assert run.judge(kind, cases[index], {"output": to_json(answer)}).verdict == "fail"
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"mean": np.zeros((4, 4, 3))}, r"shapes \(4, 4, 3\) and"),
-        ({"variance": None}, "output variance None"),
-        ({"spp": 63}, "63 samples per pixel, 64 asked"),
-        ({"mean": np.full((16, 16, 3), np.nan)}, "p-value 0 of a block"),
-    ],
-)
-def test_renders_that_are_none(changes, text):
-    kind, (first, *_) = case.load(vectors.FOLDER / "picture.rendered.json")
-    answer = {"mean": np.ones((16, 16, 3)), "variance": np.ones((16, 16, 3)), "spp": 64, **changes}
-    found = run.judge(kind, first, {"output": to_json(answer)})
-    assert found.verdict == "fail"
-    assert __import__("re").match(text, found.text)
 
 
 def test_blocks_are_means_of_their_pixels():
@@ -389,13 +344,3 @@ def test_executors_pass(executor):
     for kind in (k for k in SOME if k in answers.kinds):
         wrong = [v for v in judged(kind, answers.answer) if v.verdict != "pass"]
         assert not wrong
-
-
-def test_an_executor_that_is_wrong_is_caught(executor_named):
-    answers = OnExecutor(executor_named("numpy"))
-
-    def off(kind, inputs, profile):
-        return {name: np.asarray(v) * (1 + 1e-3) for name, v in answers.answer(kind, inputs, profile).items()}
-
-    for kind in FUNCTIONS:
-        assert any(v.failed for v in judged(kind, off)), kind

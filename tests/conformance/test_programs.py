@@ -149,13 +149,6 @@ def test_a_program_that_does_not_read(tmp_path):
         session.ask(request)
 
 
-def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
-    """The grandchild holds the program's output open: the session must not wait for it."""
-    script = 'sleep 60 & while read line; do echo \'{"kinds": ["random.block"]}\'; done'
-    found = verdicts(["sh", "-c", script], ["random.block/0"])
-    assert [v.verdict for v in found] == ["garbage"]
-
-
 @pytest.mark.parametrize(
     ("command", "text"),
     [
@@ -225,17 +218,6 @@ def test_the_bound_is_met_or_not():
 def test_what_is_no_number_is_within_no_bound(value):
     assert judged(value, value="0x1p+0", bound="0x1p+9").verdict == "fail"
     assert judged("nan", value=value, bound="inf").verdict == "fail"
-
-
-def test_infinity_is_met_by_infinity_alone():
-    assert judged("inf", value="inf", bound="0x0p+0").verdict == "pass"
-    assert judged(1e300, value="inf", bound="0x0p+0").verdict == "fail"
-
-
-def test_other_answers_that_are_accepted_have_bounds_of_their_own():
-    other = ({"value": "0x1p+10", "bound": "0x1p+0"},)
-    verdicts = [judged(x, value=0.0, bound=0.25, accepted=other).verdict for x in (0.25, 0.5, 1024.5, 1026)]
-    assert verdicts == ["pass", "fail", "pass", "fail"]
 
 
 # ---- what to look at first --------------------------------------------------------------------------------

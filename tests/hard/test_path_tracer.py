@@ -115,7 +115,7 @@ def test_a_long_run_of_roulette(executor):
     """Twenty scatterings in a nearly white room, most of them under roulette, on a few paths."""
     settings = Settings(max_depth=20, roulette_depth=2)
     scene = validate(SCENES["a closed room that is nearly white"])
-    report = compare_paths.compare_paths(executor, scene, settings, View(8, 4, seed=1))
+    report = compare_paths.compare_paths(executor, scene, settings, View(4, 2, seed=1))
     assert report.passed, [str(example) for example in report.examples]
     assert len(report.depths) == 21
     assert report.depths[-1].paths > 0

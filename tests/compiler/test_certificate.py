@@ -208,57 +208,6 @@ def test_a_changed_step_of_spectra_is_refused_by_name(of_spectra, tmp_path, plac
         checker.check(tmp_path / NAME)
 
 
-def test_a_wrong_spectrum_in_the_weights_is_refused(of_spectra, tmp_path):
-    """One number of the table a thousandth off, all digests made to agree: its step is above its bound."""
-    held, manifest = certificate_of(of_spectra), json.loads((of_spectra.parent / "manifest.json").read_text())
-    raw = np.frombuffer((of_spectra.parent / "weights.bin").read_bytes(), "<f4").copy()
-    table = held["spectra"]["table"]
-    part = raw[table["offset"] :][: math.prod(table["shape"])]
-    part[np.abs(part).argmax()] *= np.float32(1.001)
-    manifest["files"] = held["files"] = {**manifest["files"], "weights.bin": sha256(raw.tobytes())}
-    (tmp_path / "weights.bin").write_bytes(raw.tobytes())
-    (tmp_path / "denoise.cl").write_bytes((of_spectra.parent / "denoise.cl").read_bytes())
-    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
-    (tmp_path / NAME).write_text(json.dumps(held))
-    with pytest.raises(checker.Refused, match="spectra: step_bounds"):
-        checker.check(tmp_path / NAME)
-
-
-SPECTRAL_MUTANTS = {
-    "factor": ("[2.8]", "[2.7]"),
-    "eighth": ("[2.3]", "[2.2]"),
-    "sums": ("*factor, 1.0, 1.0]", "*factor, 1.0]"),
-    "unpacking": ("(low + 1) + 1 + centring", "(low + 1) + centring"),
-    "centring": ("1 + centring)", "1)"),
-    "table": ("np.sqrt(2 * ((after", "np.sqrt(1 * ((after"),
-    "rounding of products": ("np.sqrt(2 * (_norms(np.abs(bent))", "np.sqrt(1 * (_norms(np.abs(bent))"),
-    "additions": ("(2 if k else 1)", "1"),
-    "blocks": ("if done else 0.0", "if done and not done else 0.0"),
-    "pairs": ("after[self.both].max(axis=0)", "after[self.both].min(axis=0)"),
-    "combination": ("back = np.sqrt(squares.sum()) + ", "back = "),
-    "columns": ("squares.sum(axis=1)", "squares.sum(axis=1) / 2"),
-    "rows": ("back += low *", "back += low / 2 *"),
-    "mirrored": ("half == 0, 1.0, 2.0)", "half == 0, 1.0, 1.0)"),
-}
-"""A rule of each step made weaker, in the checker's text."""
-
-
-@pytest.mark.parametrize("mutant", SPECTRAL_MUTANTS)
-def test_each_rule_of_spectra_is_needed(of_spectra, monkeypatch, mutant):
-    """A checker with a weaker rule finds a smaller number: what it takes, the real one refuses."""
-    source, (old, new) = inspect.getsource(spectra_checker), SPECTRAL_MUTANTS[mutant]
-    assert source.count(old) == 1, mutant
-    weaker = dict(vars(spectra_checker))
-    exec(compile(source.replace(old, new), "mutant", "exec"), weaker)
-    held, raw = certificate_of(of_spectra), evidence.read(of_spectra)[4]
-    arrays, output = evidence.read(of_spectra)[3], held["outputs"][0]
-    low, high = np.tile(([0.0] * 3 + [-1.0] * 3) * 2, 81), np.ones(972)
-    scales = np.array(output["spectra"]["scalings"]), 2.0 * np.array(output["scalings"][0])
-    given = held["spectra"], arrays["W0"], arrays["b0"], raw, low, high
-    found = [made(*given).steps(*scales) for made in (spectra_checker.Tables, weaker["Tables"])]
-    assert sum(found[1]) < sum(found[0]) * (1 - 2.0**-10)
-
-
 # ---- rectifiers ------------------------------------------------------------------------------------------
 
 
@@ -270,23 +219,6 @@ def test_certificates_of_rectifiers_hold(tmp_path, schedule, omega_0):
     assert "maximum" in held["program"]
     assert "sin " not in held["program"]
     jsonschema.validate(held, json.loads((SPEC / "certificate.schema.json").read_text()))
-
-
-def test_any_smaller_number_of_a_rectifier_s_certificate_is_refused(tmp_path):
-    path = written(tmp_path, activation="relu")
-    for held, place in smaller_numbers(path):
-        path.write_text(json.dumps(held))
-        with pytest.raises(checker.Refused, match=": "):
-            pytest.fail(f"{place}: {checker.check(path)}")
-
-
-def test_another_floor_of_a_rectifier_is_another_program(tmp_path):
-    path = written(tmp_path, activation="relu")
-    text = path.read_text()
-    assert text.count("{value=0.0}") == 1
-    path.write_text(text.replace("{value=0.0}", "{value=-8.0}"))
-    with pytest.raises(checker.Refused, match="digest of the program"):
-        checker.check(path)
 
 
 def clipped(network, window):
@@ -303,13 +235,6 @@ def test_an_activation_that_no_proof_knows_has_a_bound_and_no_certificate():
     kernel = compile_program(program, "opencl")
     assert kernel.certificate is None
     assert all(math.isfinite(error) for error in kernel.manifest["bound"]["output"])
-
-
-def test_a_larger_number_is_no_lie(path, changed):
-    held = certificate_of(path)
-    for place in leaves(held):
-        if "norm_bounds" not in place:
-            checker.check(changed(denoise_certificate_json=put(held, place, lambda x: x * 2)))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, "0.5", True, None, [1.0]])
@@ -372,16 +297,6 @@ def test_places_of_no_weights_are_refused(path, changed, columns, match):
         checker.check(changed(denoise_certificate_json=held))
 
 
-def test_places_may_be_lists(path, changed):
-    """CER-5: what a progression says, number by number; certificates from before have no progressions."""
-    held = certificate_of(path)
-    for place in held["parameters"].values():
-        for side in ("rows", "columns"):
-            place[side] = [place[side]["step"] * i for i in range(place[side]["count"])]
-    jsonschema.validate(held, json.loads((SPEC / "certificate.schema.json").read_text()))
-    checker.check(changed(denoise_certificate_json=held))
-
-
 def shared(path, folder, stated):
     """Copy a kernel, its weights one folder up; the manifest says that they are in the folder `stated`."""
     (folder / "kernel").mkdir()
@@ -404,12 +319,6 @@ def test_weights_may_be_one_folder_up(path, tmp_path):
 @pytest.mark.parametrize("stated", ["../..", "/", "../x", "", [".."], {}, 1, "..\0"])
 def test_weights_elsewhere_are_refused(path, tmp_path, stated):
     with pytest.raises(checker.Refused, match=r"folder of weights.bin is \. or \.\."):
-        checker.check(shared(path, tmp_path, stated))
-
-
-@pytest.mark.parametrize("stated", [None, "."])
-def test_weights_above_are_not_found_unless_the_manifest_says_so(path, tmp_path, stated):
-    with pytest.raises(InputError, match=r"weights\.bin"):
         checker.check(shared(path, tmp_path, stated))
 
 
@@ -497,30 +406,10 @@ def test_a_manifest_without_a_key_is_told(path, changed, key):
         checker.check(changed(manifest_json=manifest))
 
 
-def test_other_weights_of_the_same_form_have_other_numbers(path, tmp_path):
-    """The numbers of another model's proof, with that model's digests left in place."""
-    other = written(tmp_path, omega_0=4.0)
-    held = {
-        **certificate_of(other),
-        **{name: certificate_of(path)[name] for name in ("layers", "outputs", "bound")},
-    }
-    other.write_text(json.dumps(held))
-    with pytest.raises(checker.Refused, match="layer 1"):
-        checker.check(other)
-
-
 @pytest.mark.parametrize("cut", [0, 1, 40, 400, -2])
 def test_a_truncated_file_is_no_certificate(path, changed, cut):
     with pytest.raises(InputError, match="is not acceptable JSON"):
         checker.check(changed(denoise_certificate_json=path.read_bytes()[:cut]))
-
-
-@pytest.mark.parametrize("data", [b"", b"\xff\x00", b"[]", b"{}", b"null", b'{"schema": 1}', b"[" * 100000])
-def test_garbage_is_no_certificate(changed, data):
-    with pytest.raises(
-        (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
-    ):
-        checker.check(changed(denoise_certificate_json=data))
 
 
 def test_any_key_left_out_is_told(path, changed):
@@ -557,11 +446,6 @@ def test_kernels_without_a_proof_have_no_certificate(tmp_path):
         assert kernel.certificate is None
         assert kernel.manifest["certificate"] is None
         assert NAME not in kernel.contents()
-
-
-def test_native_opencl_has_a_certificate(tmp_path):
-    artifact.write(compile_program(lower(model()), "opencl", "native"), tmp_path)
-    assert checker.check(tmp_path / NAME)["sine"]["domain"] is None
 
 
 @pytest.mark.parametrize("seed", range(5))

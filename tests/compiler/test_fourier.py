@@ -15,12 +15,11 @@ from wamnet.compiler.core.enclosure import round_up
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.kernel.kernel import FLOAT, Let, parts
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds, spectra
-from wamnet.compiler.schedules import fft, fourier, schedules
+from wamnet.compiler.schedules import fourier, schedules
 from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
@@ -92,23 +91,6 @@ def test_layers_hold_every_operation_of_the_algorithm(n) -> None:
                 assert 2 + own <= spectra.HALF_TURN * (1 - 2.0**-10)
             else:
                 assert 1 + np.sqrt(1 + abs(np.sin(2 * angle))) + own <= spectra.TURN * (1 - 2.0**-10)
-
-
-def test_a_wrong_twiddle_factor_breaks_the_bound(monkeypatch) -> None:
-    """A factor that is off by 100 u, and a wave of which a quarter passes through it."""
-    turned = fourier._turned
-
-    def wrong(z, k, n):
-        a, b = turned(z, k, n)
-        return (a * (1 + 100 * 2.0**-24), b) if (n, k) == (32, 3) else (a, b)
-
-    wave = np.exp(-2j * np.pi * 3 * np.arange(32) / 32)
-    wanted = exact(wave, 1)
-    found = spectra.layers(32).max(axis=1).sum() * 2.0**-24 * np.linalg.norm(wanted)
-    right = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
-    monkeypatch.setattr(fourier, "_turned", wrong)
-    error = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
-    assert right < found < error
 
 
 def direct(tile, matrix, size):
@@ -335,25 +317,6 @@ def emitted(program):
     return pipeline.run(program, profiles.profile_named("ieee").passes)
 
 
-def test_private_bytes_are_those_of_its_arrays() -> None:
-    """Read the sizes of all arrays in the source; those of sums in registers are not counted."""
-    made = emitted(paper())
-    source = FFT32.renderer(made, True).source([])
-    sizes = dict(re.findall(r"#define ([A-Z_]+) (\d+)", source))
-    sizes |= {"OUT": "21", "STRIDE": "66"}
-    body = source[source.index("__kernel") :]
-    found = re.findall(r"float16 (\w+)\[([^]]+)\](?:\[([^]]+)\])?;", body)
-    kept = [
-        f"({a}) * ({b or 1})"
-        for name, a, b in found
-        if "real" not in name and "imaginary" not in name and name != "sum"
-    ]
-    numbers = [eval(re.sub("[A-Z_]+", lambda word: sizes[word[0]], text), {}) for text in kept]
-    # The pixels of a row, rows, columns, spectra, product, back, sums, and an array between two layers each.
-    assert len(numbers) == 7 + 6
-    assert FFT32.private_bytes(made) == 64 * sum(numbers)
-
-
 def test_golden_spectra(golden) -> None:
     """Tiles of 4 x 4 points, vectors of 4 numbers, blocks of 2 pixels."""
     network = siren.init([12, 5, 2], 3.0, 3.0, seed=1, dtype=np.float32)
@@ -389,16 +352,3 @@ def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) 
             assert np.array_equal(found[..., 0] + 1j * found[..., 1], exactly[n, :, :17, c].T)
     half = exactly[:, :, :17]
     assert np.count_nonzero(stored) == np.count_nonzero(half.real) + np.count_nonzero(half.imag)
-
-
-def test_operations_are_those_of_the_text() -> None:
-    """The count by which a schedule is chosen: 456 sums and products of a transform of 32 numbers."""
-    function = fft.codelet("f", 32, 32, 1, FLOAT.of(16))
-    computed = [let.value for let in function.body if isinstance(let, Let)]
-    operations = ("add", "subtract", "multiply")
-    assert (
-        sum(part.op in operations for value in computed if value.op != "load" for part in parts(value)) == 456
-    )
-    one, spectra = FFT32.operations(emitted(paper()))
-    assert one == 864 * 2
-    assert spectra == (17 * 32 * 3 * 16 * 2 + 456 * (66 + 2 * (32 + 21))) / (2 * 21**2)

@@ -7,13 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, TREES
 from wamnet.compiler.scenes import hierarchy
-from wamnet.compiler.scenes.hierarchy import Walked, holding, plant, walk, walked
+from wamnet.compiler.scenes.hierarchy import Walked, holding, plant, walked
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels.bench.crowd import crowd
@@ -102,22 +100,6 @@ def check(scene, origin, direction, visit=1.0):
             assert np.array_equal(found, dark[some])
 
 
-@pytest.mark.nightly
-@settings(max_examples=60, deadline=None)
-@given(
-    seed=st.integers(0, 2**16),
-    count=st.integers(1, 60),
-    kinds_of=st.lists(st.sampled_from(["sphere", "quad", "turned", "shared", "box"]), min_size=1, max_size=4),
-    room=st.booleans(),
-    visit=st.sampled_from([1.0, 20.0, 60.0]),
-)
-def test_a_tree_finds_what_the_list_finds(seed, count, kinds_of, room, visit):
-    """Bits and ids, for rays that graze, that are parallel to axes, and primitives that coincide."""
-    scene = scene_of(seed, count, kinds_of, room)
-    with np.errstate(all="ignore"):
-        check(scene, *rays(scene, seed), visit)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_rays_from_surfaces(seed):
     """Origins where paths really start: lifted off what was hit, in directions along it and off it."""
@@ -132,14 +114,6 @@ def test_rays_from_surfaces(seed):
     along = away - np.sum(away * surface.normal, axis=1, keepdims=True) * surface.normal
     for towards in (away, along, along + np.float32(1e-4) * surface.normal):
         check(scene, lifted, towards / np.linalg.norm(towards, axis=1, keepdims=True).astype(np.float32))
-
-
-def test_without_widening_something_is_missed(monkeypatch):
-    """The margin does work: boxes that are too small by as much as it lose hits."""
-    monkeypatch.setattr(hierarchy, "WIDENING", -hierarchy.WIDENING)
-    scene = scene_of(1, 60, ["box", "quad"])
-    with pytest.raises(AssertionError), np.errstate(all="ignore"):
-        check(scene, *rays(scene, 1, 4000))
 
 
 def test_a_tree_is_a_loop_of_the_program_and_may_be_walked_one_by_one():
@@ -201,32 +175,6 @@ def test_a_tree_costs_less_than_a_list_where_there_are_many():
     assert large.cost < 60.0 * 2000
 
 
-def test_a_walk_in_plain_numbers():
-    """Two leaves under a root: what no lane enters is not read."""
-    tree = replace(
-        plant(np.zeros((3, 3)), np.ones((3, 3)), np.ones(3), [3]),
-        centers=np.array([0.0, 1.0, 2.0]),
-        halves=np.ones(3),
-        skip=np.array([3, 2, 3], np.int32),
-        first=np.array([[0, 0, 2, 3]], np.int32),
-        orders=(np.array([2, 0, 1]),),
-    )
-    read, entered = [], {0.0, 1.0}
-
-    def step(values, number):
-        read.append(int(number))
-        return (values[0] + number,)
-
-    def enters(values, center, half):
-        return np.array([False, center in entered])
-
-    rows = [(step, [np.array([10, 20, 30])])]
-    assert walk(rows, (np.array([0, 0]),), enters, tree)[0].tolist() == [40, 40]
-    assert read == [30, 10]
-    entered.clear()
-    assert walk(rows, (np.array([1, 2]),), enters, tree)[0].tolist() == [1, 2]
-
-
 # ---- which form -------------------------------------------------------------------------------------------
 
 
@@ -249,17 +197,6 @@ def test_hits_are_within_their_boxes():
         # Of 20,000 hits some are near each side: a cap of a sphere of 1/100 of its size has 1 in 100 of them.
         assert (point.min(axis=0) <= low + 0.1 * size).all()
         assert (point.max(axis=0) >= high - 0.1 * size).all()
-
-
-def test_a_row_costs_its_operations():
-    """Sixteen for a division or root; what boxes share is outside of the row."""
-    cost = {
-        kind: hierarchy.row_cost(intersection.build(scene_of(2, 8, [kind])).groups[0])
-        for kind in ("sphere", "quad", "turned", "shared", "box")
-    }
-    assert cost["box"] == cost["shared"] == 26
-    assert cost["shared"] < cost["quad"] < cost["sphere"] < cost["turned"]
-    assert cost["turned"] > 4 * cost["shared"]
 
 
 def test_cheap_boxes_stay_out_of_the_tree():

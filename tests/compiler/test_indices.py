@@ -95,23 +95,5 @@ def test_no_index_leaves_32_bits(target, schedule):
             assert len(corners) == len({0, height - 1}) * len(columns) * len(set(parts))
 
 
-def test_the_test_reads_what_is_emitted():
-    """Subscripts are found in all languages of buffers, loads and stores."""
-    for target in ("opencl", "c", "cuda", "metal", "wgsl", "glsl-compute", "glsl-vulkan"):
-        source = compile_program(lower(tiny_model()), target, "ieee").source
-        names = {
-            re.split(r"\W+", line.split("[")[0])[-1] for line in source.splitlines() if SUBSCRIPT.search(line)
-        }
-        assert {"image_color", "result"} <= names, target
-
-
-@pytest.mark.parametrize("text", ["(y * width + x) * 3 + c"])
-def test_an_index_that_overflows_is_seen(text):
-    """A picture of 2^31 numbers: the last index is not an int."""
-    assert SUBSCRIPT.findall(f"a[{text}]") == [text]
-    with pytest.raises(AssertionError, match="is not an int"):
-        (Int32(2**14 - 1) * 2**16 + (2**16 - 1)) * 3 + 2
-
-
 def test_texts_say_the_limit():
     assert "fewer than 2^31 numbers" in compile_program(lower(tiny_model()), "c", "ieee").source

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler.core import intervals
@@ -59,6 +59,7 @@ def test_members_give_members(name, data):
 
 
 @pytest.mark.parametrize("name", WITH_IMAGE)
+@settings(max_examples=settings.default.max_examples // 4)
 @given(data=st.data())
 def test_points_give_points(name, data):
     """Of single numbers the image is what the operation computes, except for a sine's own rounding."""

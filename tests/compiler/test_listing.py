@@ -15,7 +15,6 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.refimpl import vectors
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.shapes import quad
 from wamnet.refimpl.light.transport import Settings
@@ -96,20 +95,6 @@ def test_places_change_no_bit_of_a_kernel(profile):
     assert kernels[0].manifest == kernels[1].manifest
 
 
-def test_no_places_are_kept_unless_asked_for():
-    assert not any(node.places for node in lower(MODEL).nodes)
-
-
-def test_of_equal_operations_the_first_one_s_places_stay():
-    def function(x):
-        return vectors.dot(x, x) + vectors.dot(x, x)
-
-    program = trace(function, {"x": ir.Type(shape=(3,))}, keep_places=True)
-    text = [reference(node.places[-1]) for node in program.nodes if node.op == "multiply"]
-    assert len(text) == 3
-    assert all("a[..., 0] * b[..., 0]" in line for line in text)
-
-
 def test_a_listing_as_text():
     lines = [Line("{"), Line("  t1 = x;", "", ("a.py:1", "b.py:2")), Line("  t2 = y;", "", ("b.py:2",))]
     assert as_text(lines, {"b.py:2": " return z"}.__getitem__) == (
@@ -128,9 +113,3 @@ def test_a_line_of_another_block_is_not_taken_for_a_node():
     program = trace(lambda x: np.sin(x) + 1.0, {"x": ir.Type()}, keep_places=False)
     source = "/* other: of no program */\nfloat t1 = 0;\n/* one: a block */\nfloat t2 = t1;"
     assert [line.part for line in lines_of(source, {"one": program})] == ["", "", "one", "one"]
-
-
-def test_places_are_asked_for_by_name():
-    """What moves in a scene was once passed as the argument that requests the places, and taken for a yes."""
-    with pytest.raises(TypeError, match="positional arguments"):
-        lower_scene(canonical("empty"), Settings(), None, None, True)  # type: ignore[misc]

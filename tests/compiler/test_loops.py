@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.core.ir import Gather, Image, Type, text
+from wamnet.compiler.core.ir import Type, text
 from wamnet.compiler.core.loops import bodies, loops
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
@@ -18,7 +17,6 @@ from wamnet.compiler.core.verify import verify
 from wamnet.compiler.core.weights import tables, weights
 from wamnet.refimpl import vectors
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network.dataset import Window
 
 ROWS = 5
 RANDOM = np.random.default_rng(2)
@@ -228,17 +226,3 @@ def test_a_trip_s_value_that_escapes_is_refused():
         CompileError, match="output 'color', %4, is a value of a trip; take the loop's result"
     ):
         verify(traced(function))
-
-
-def test_a_denoiser_s_kernel_has_no_loops():
-    gather = Gather(Window(1, "clamp"), (Image("a", 3, -2.0, 2.0),))
-    program = trace(
-        lambda x: vectors.fold_rows(lambda v, a: (v[0] + a,), (NUMBERS,), (x[..., 0],))[0],
-        {"window": Type(shape=(3,))},
-        gather,
-        most_unrolled=0,
-    )
-    with pytest.raises(
-        CompileError, match="has a loop over the rows of tables, which this skeleton does not"
-    ):
-        compile_program(program, "opencl")

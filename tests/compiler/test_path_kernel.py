@@ -101,6 +101,7 @@ RUN = {"width": 13, "height": 9, "first_row": 2, "rows": 6, "first_sample": 5, "
 """The integers of a launch: a row is not a multiple of any number of lanes but 1."""
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("lanes", [1, 4, 16])
 @pytest.mark.parametrize(
     ("name", "forms"),

@@ -70,18 +70,6 @@ def test_a_kernel_with_inputs_gives_the_bits_of_one_of_constants(name):
     assert np.ptp(expected) > 0 or name == "empty"
 
 
-@pytest.mark.nightly
-def test_another_number_gives_another_picture():
-    """The rotation, the camera and the lights do reach the picture."""
-    inputs, scene = inputs_of("minicubes"), at("minicubes", 0.05)
-    programs, executor = lower_scene(scene, SETTINGS, moving=inputs), NumpyExecutor()
-    values = dict(zip(inputs.names, inputs.values(scene), strict=True))
-    still = executor.trace(compile_path(bind(programs, values), "numpy"), PART)
-    for name, value in values.items():
-        moved = bind(programs, {**values, name: value + 0.25})
-        assert not np.array_equal(executor.trace(compile_path(moved, "numpy"), PART), still), name
-
-
 def test_what_moves_and_what_stays():
     """The mini cubes: six numbers of a rotation, the camera, and the colours; equal numbers are shared."""
     inputs = inputs_of("minicubes")

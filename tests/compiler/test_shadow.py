@@ -72,6 +72,7 @@ def test_a_kernel_that_is_not_asked_has_no_word_of_it(target):
     assert "shadow_number" not in compile_path(dark, target, groups=("color", "direct")).source
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("lanes", [1, 16])
 @pytest.mark.parametrize(("name", "forms"), [("minicubes", TREES), ("cornell", STATEMENTS), ("sky", LISTS)])
 def test_a_kernel_runs_in_numpy_with_the_interpreter_s_bits(name, forms, lanes):

@@ -89,7 +89,7 @@ def test_what_is_not_known_is_not_skipped(plain):
         run_text(*changed(plain, "float v1[6];", "while (x < 0) { x = 0; } float v1[6];"))
 
 
-@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 60), ("c", "tile:8", 12)])
+@pytest.mark.parametrize(("target", "schedule", "count"), [("opencl", "plain", 30), ("c", "tile:8", 6)])
 def test_planted_faults_are_noticed(target, schedule, count, tmp_path, capsys):
     """TXT-8: what holds the reader."""
     assert unnoticed(parts(kernel(tmp_path, target, schedule)), count) == []

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from texts import changed, kernel, parts, unnoticed
+from texts import changed, kernel, parts
 
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
@@ -127,15 +127,6 @@ def test_places_of_an_item_are_told_apart(tmp_path):
     for new in (("(local_invocation_id)", "(workgroup_id)"), ("item_place", "invocation")):
         with pytest.raises(Unread, match="not a frame of"):
             run_text(source.replace(*new), *others)
-
-
-@pytest.mark.nightly(but="opencl-group:1-24")
-@pytest.mark.parametrize(
-    ("target", "schedule", "count"), [("wgsl", "group:4", 16), ("opencl", "group:1", 24)]
-)
-def test_planted_faults_in_groups_are_noticed(target, schedule, count, tmp_path):
-    """TXT-8: what holds the reader."""
-    assert unnoticed(parts(kernel(tmp_path, target, schedule)), count) == []
 
 
 def test_groups_have_every_case_of_a_row():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import spectra_classes
-from texts import NAME, changed, parts, unnoticed
+from texts import NAME, changed, parts
 
 from wamnet.compiler import artifact, targets
 from wamnet.compiler.compile import compile_program
@@ -135,48 +135,6 @@ def test_texts_of_spectra_compute_what_is_certified(target, tiles, kwargs, tmp_p
     assert check_text(path)["sums"] == 3 * 36 * tiles
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
-def test_texts_of_the_schedules_compute_what_is_certified(target, schedule, tmp_path):
-    network = siren.init((81 * 6, 21, 6, 3), 2.0, 3.0, 5)
-    given = Model(network, ("color", "normal"), Window(9, "zero"), Normalization())
-    made = compile_program(lower(given), target, schedule=schedule)
-    assert made.manifest["schedule"]["name"] == schedule
-    artifact.write(made, tmp_path)
-    assert check_text(tmp_path / NAME)["sums"] == 3 * 48 * 24
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ("* 0.707106769f", "* 0.70710683f", "never made"),
-        ("float4 t18 = t0 - t8;", "float4 t18 = t8 - t0;", "never made"),
-        ("* 4] = a + c;", "* 4] = a + d;", "never made"),
-        ("real[t][0] -= w2 * b;", "real[t][0] += w2 * b;", "never made"),
-        ("real[t][0] += w0 * a;", "real[t][0] += w0 * a; real[t][0] += w0 * a;", "never made"),
-        ("real[t][0] += w0 * a;", "real[t][0] += w1 * a;", "never made"),
-        ("block * BLOCK + pair", "pair", "never made"),
-        ("whole_real[t][1] += real[t][1];", "whole_real[t][1] = real[t][1];", "never made"),
-        ("int apart = opposite != k ? 1 : 0;", "int apart = 0;", "read before it is written|never made"),
-        ("k < POINTS / 2 + 1", "k < POINTS / 2", "read before it is written"),
-        (") - 0.5f;", ") - 0.25f;", "never made"),
-        ("clamp(left, 0, width - 1)", "clamp(left, 0, width)", "never made|beyond its ends"),
-        ("int top = tile_y + dy", "int top = tile_y + 1 + dy", "never made"),
-        ("inside ? ", "row == top ? ", "never made"),
-        ("tile_y + line < height", "tile_y + line < height - 1", "without a result"),
-        ("line < OUT && tile_y + line < height", "line < OUT", "not its own|beyond the picture"),
-        ("min(tile_x + TILES * OUT, width)", "tile_x + TILES * OUT", "not its own|beyond the picture"),
-        ("(y * width + x + p)", "(line * width + x + p)", "not its own"),
-        ("(int)get_global_id(1) * OUT", "(int)get_global_id(1) * POINTS", "its work items are of"),
-        ("x + p < last", "x + p <= last", "not its own|beyond the picture"),
-        ("#define STRIDE (2 * (POINTS + 1))", "#define STRIDE (2 * POINTS)", r"has no number|element \d+ of"),
-    ],
-)  # fmt: skip
-def test_faults_of_spectra_are_named(opencl, old, new, why):
-    with pytest.raises((Refused, Unread), match=why):
-        run_text(*changed(opencl, old, new))
-
-
 def test_the_loops_of_a_host_are_read(c):
     for old, new in (
         ("y += OUT", "y += 1"),
@@ -250,16 +208,12 @@ def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
         run_text(source, {**held, "spectra": spectra}, *others)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize(("target", "count"), [("opencl", 12), ("c", 8)])
-def test_planted_faults_in_spectra_are_noticed(target, count, request):
-    """TXT-8: what holds the reader."""
-    assert unnoticed(request.getfixturevalue(target), count) == []
-
-
 # ---- wrong texts -----------------------------------------------------------------------------------------
 
 WRONG = [(w, target, old, new) for w, ts, old, new in spectra_classes.CLASSES for target in ts]
+
+USUAL = [f"{ts[-1]}: {w}" for w, ts, *_ in spectra_classes.CLASSES[::5]]
+"""Classes of each part of a kernel, in one language."""
 
 
 @pytest.fixture(scope="module")
@@ -277,7 +231,7 @@ def test_texts_of_passes_compute_what_is_certified(opengl, tmp_path):
             run_text(*changed(vulkan, old, new))
 
 
-@pytest.mark.nightly(but=[f"opengl: {w}" for w, ts, *_ in spectra_classes.CLASSES[::5] if "opengl" in ts])
+@pytest.mark.nightly(but=USUAL)
 @pytest.mark.parametrize(("what", "target", "old", "new"), WRONG, ids=[f"{t}: {w}" for w, t, *_ in WRONG])
 def test_wrong_texts_of_spectra_are_refused(what, target, old, new, request):
     """TXT-8: a wrong sign, place, part, border, number of turns, or host."""

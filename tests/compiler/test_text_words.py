@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from texts import changed, parts, planned, unnoticed
+from texts import changed, parts, planned
 
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading import field, integers, terms
@@ -90,15 +90,6 @@ def test_weights_in_another_order_are_refused(dot16):
     turned[[0, 1]] = turned[[1, 0]]
     with pytest.raises(Refused, match="never made"):
         run_text(source, held, manifest, turned)
-
-
-@pytest.mark.nightly(but="wgsl-groupdot:4-8")
-@pytest.mark.parametrize(
-    ("target", "schedule", "count"), [("opencl", "dot:16", 8), ("wgsl", "groupdot:4", 8)]
-)
-def test_planted_faults_in_bytes_are_noticed(target, schedule, count, tmp_path):
-    """TXT-8: what holds the reader."""
-    assert unnoticed(parts(planned(tmp_path, target, schedule)), count) == []
 
 
 def number(low, high, kind="int32"):

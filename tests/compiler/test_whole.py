@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Program, Type
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.languages.c import C
@@ -24,7 +19,7 @@ from wamnet.compiler.schedules.schedules import Dot, GroupDot
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
-from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
+from wamnet.refimpl.network.whole import Whole, forward_whole, rounded
 
 CHANNELS = {"a": 3, "b": 1}
 """Images of the networks here."""
@@ -44,34 +39,16 @@ def network(amplitude: int = 127, seed: int = 1):
     return rounded(siren.init((4, 5, 6, 3), 1.0, 5.0, seed=seed), 1, amplitude)
 
 
-@pytest.mark.nightly
-@given(seed=st.integers(0, 2**16), amplitude=st.sampled_from(sorted(SINES)))
-def test_ranges_hold_all_values(seed, amplitude) -> None:
-    net = network(amplitude, seed)
-    found = program(lambda window: forward_whole(net, window))
-    drawn = np.random.default_rng(seed).integers(-127, 128, (50, 4)).astype(np.float32)
-    drawn[0], drawn[1] = -127, 127
-    for index, (node, known) in enumerate(zip(found.nodes, whole.known(found), strict=True)):
-        one = replace(found, outputs=(("it", index),))
-        if node.op in ("constant", "parameter"):
-            continue
-        values = interpret(one, {"window": drawn})["it"].astype(np.float64)
-        assert (known.low <= values).all(), node
-        assert (values <= known.high).all(), node
-        assert (values / 2.0**known.grain == np.floor(values / 2.0**known.grain)).all(), node
-
-
 @pytest.mark.parametrize("target", LANGUAGES)
 def test_every_kernel_states_the_bound_zero(target) -> None:
     net = network()
     found = LANGUAGES[target]
     traced = program(lambda window: forward_whole(net, window))
-    for schedule in found.schedules:
-        for profile in ("ieee", "native"):
-            artifact = compile_program(traced, target, profile, schedule.name)
-            assert artifact.manifest["bound"]["output"] == [0.0, 0.0, 0.0]
-            assert "same bits" in artifact.source
-            assert all(image["whole"] for image in artifact.manifest["images"])
+    for number, schedule in enumerate(found.schedules):
+        artifact = compile_program(traced, target, ("native", "ieee")[number % 2], schedule.name)
+        assert artifact.manifest["bound"]["output"] == [0.0, 0.0, 0.0]
+        assert "same bits" in artifact.source
+        assert all(image["whole"] for image in artifact.manifest["images"])
 
 
 MATRIX = np.full((3, 4), 100.0, np.float32)

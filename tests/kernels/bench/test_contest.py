@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from wamnet.compiler import variants
 from wamnet.compiler.plan import sine_contract
-from wamnet.kernels.bench import accuracy, contenders, contest, rates, workload
-from wamnet.kernels.bench.contenders import FULL, Contender, Opened, Tools, Variant, parameters_of
+from wamnet.kernels.bench import contenders, contest, rates, workload
+from wamnet.kernels.bench.contenders import Contender, Opened, Tools, Variant
 from wamnet.kernels.bench.cost import Stage
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
@@ -93,40 +91,6 @@ def test_counts_are_those_of_the_network(model) -> None:
     assert abs(row["gflops"] * 1e9 - flops) <= 2.0**-48 * flops
 
 
-def test_error_sees_a_wrong_pixel(model) -> None:
-    """A picture that is off by 1/4 in one channel of one pixel: largest 1/4, mean 1/4 over all numbers."""
-
-    def spoilt(tools, model, size):
-        def run(given):
-            picture = denoise(model, given.frame, np.float64)
-            picture[0, 0, 1] += 0.25
-            return picture
-
-        return Opened(run, "here")
-
-    error = rows(run(model, [fake("spoilt", spoilt)]))["spoilt"]["error"]
-    # The reference is the program's, whose weights are the same: sums in another order, in float64.
-    assert abs(error["max"] - 0.25) <= 1e-12
-    assert abs(error["mean"] - 0.25 / (3 * SIZE * SIZE)) <= 1e-12
-
-
-def test_error_that_is_no_number_is_on_no_front(model) -> None:
-    def broken(tools, model, size):
-        return Opened(lambda given: np.full((SIZE, SIZE, 3), np.nan), "here")
-
-    data = run(model, [fake("broken", broken), fake("good", lambda t, m, s: by_reference(m))])
-    assert rows(data)["broken"]["error"] == {"max": None, "mean": None, "ulp": None}
-    assert data["front"]["error"] == ["good"]
-
-
-def test_ulp_has_a_floor() -> None:
-    """At 1 a float32's unit is 2^-23; near black that of 2^-10, which is 2^-33."""
-    reference = np.array([1.0, 0.0])
-    assert accuracy.errors(np.array([1.0 + 2.0**-23, 0.0]), reference)["ulp"] == 1.0
-    assert accuracy.errors(np.array([1.0, 2.0**-33]), reference)["ulp"] == 1.0
-    assert math.isnan(accuracy.errors(reference * np.nan, reference)["max"])
-
-
 @pytest.mark.parametrize(
     ("error", "state"),
     [
@@ -193,14 +157,6 @@ def test_an_interrupt_leaves_what_was_measured(model) -> None:
     assert len(row["ms"]["rounds"]) == 1
 
 
-def test_an_interrupt_at_once_leaves_all_pending(model) -> None:
-    with Tools() as tools:
-        found = contest.Contest(contest.Request(model), [contenders.kernel("numpy", "plain")], tools)
-        data = found.as_data()
-    assert rows(data)["numpy:plain"]["state"] == "pending"
-    assert data["limits"] is None
-
-
 def test_what_is_predicted_to_dawdle_is_left_out_loudly(model) -> None:
     """A kernel of 10^18 products a pixel is not run."""
 
@@ -227,16 +183,6 @@ def test_a_slow_one_has_one_frame(model) -> None:
     assert grown["size_px"] == 40
     assert "by its time at another size, more than --budget 1e-09 s" in grown["contenders"][0]["reason"]
     assert grown["contenders"][0]["ms"] is None
-
-
-def test_sizes_grow(model) -> None:
-    """Predictions grow with the pixels: four times as many at twice the size."""
-    data = run(model, [contenders.kernel("numpy", "plain")], sizes=(2 * SIZE, SIZE, 8))
-    assert [entry["size_px"] for entry in data["sizes"]] == [8, 2 * SIZE]
-    large, main = data["sizes"][1]["contenders"][0], data["contenders"][0]
-    assert large["state"] == "measured"
-    assert len(large["ms"]["rounds"]) == 2
-    assert large["predicted_ms"] == (main["predicted_ms"] and 4 * main["predicted_ms"])
 
 
 def test_quality_is_a_loss_against_the_full_network(model) -> None:
@@ -304,31 +250,6 @@ def test_variants_are_within_their_bound(executor, model, variant) -> None:
     assert row["degree"] == {"sine7": 7, "sine9": 9, "sine5": 5, "native": None}[variant.name]
 
 
-def test_a_trained_form_is_held_to_its_own_network(executor, model) -> None:
-    """A narrower window with other weights: its rounding is small, its error against the full one is not."""
-    small = variants.vary(variants.parse("window3"), model).model
-    form = Variant("window3", "trained", model=small, steps=7)
-    (row,) = run(model, [contenders.kernel(executor.name, "plain", form)])["contenders"]
-    assert row["rounding"]["max"] <= row["rounding"]["bound"] < row["error"]["max"]
-    assert (row["window"], row["rank"], row["trained_steps"]) == (3, None, 7)
-    # 3 x 3 taps of 6 channels to 8 neurons, 8 to 3, and 11 biases.
-    assert row["parameters"] == 3 * 3 * 6 * 8 + 8 * 3 + 11
-
-
-def test_a_form_that_does_not_see_a_feature_is_given_the_others(executor, model) -> None:
-    blind = variants.vary(variants.parse("without-normal"), model).model
-    (row,) = run(model, [contenders.kernel(executor.name, "plain", Variant("blind", "", model=blind))])[
-        "contenders"
-    ]
-    assert row["rounding"]["max"] <= row["rounding"]["bound"]
-
-
-def test_parameters_of_a_rank_are_those_of_its_factors(model) -> None:
-    """Rank 3: for each, 4 x 6 numbers of a row and 4 x 8 of columns; then 8 x 3, and 11 biases."""
-    assert parameters_of(model) == 96 * 8 + 24 + 11
-    assert parameters_of(model, 3) == 3 * (24 + 32) + 24 + 11
-
-
 # ---- the list of contenders --------------------------------------------------------------------------------
 
 
@@ -378,43 +299,7 @@ def test_choice_by_name_and_executor() -> None:
 # ---- what is denoised --------------------------------------------------------------------------------------
 
 
-def test_the_paper_s_network() -> None:
-    assert workload.paper_model().siren.widths == (864, 32, 32, 32, 32, 3)
-    twelve = workload.paper_model(("color", "normal", "albedo", "position"))
-    assert twelve.siren.widths[0] == 1728
-
-
-@pytest.mark.parametrize("size", [1, 7, 300])
-def test_noise_fills_the_picture_within_the_ranges(size) -> None:
-    """It repeats every 256 pixels, and all features can be encoded."""
-    frame = workload.noise(size)
-    assert (frame.height, frame.width) == (size, size)
-    shown = workload.given(workload.paper_model(("color", "normal", "position")), frame)
-    assert shown.pixels == size * size
-    assert (frame["color"][256:, :10] == frame["color"][: max(0, size - 256), :10]).all()
-    assert float(frame["normal"].min()) < 0.0 or size < 7
-
-
 @pytest.mark.parametrize("size", [0, -1, 8193])
 def test_sizes_without_a_picture_are_refused(size) -> None:
     with pytest.raises(InputError, match=r"size of the image -?\d+: must be from 1 to 8192"):
         workload.noise(size)
-
-
-def test_the_crop_is_the_picture_s_corner(monkeypatch, model) -> None:
-    """Its pixels see the border above and to the left, and pixels of the picture on the other sides."""
-    monkeypatch.setattr(accuracy, "CROP_PX", 9)
-    shown = workload.given(model, workload.noise(SIZE))
-    crop = accuracy.Crop(model, shown.images)
-    assert crop.full.shape == (9, 9, 3)
-    whole = denoise(model, shown.frame, np.float64)
-    # The same sums in another order, in float64.
-    assert np.abs(crop.full - crop.cut(whole)).max() <= 1e-12
-
-
-def test_variants_are_data() -> None:
-    """A kernel of a variant is named after it; the whole network is not."""
-    assert contenders.kernel("opencl", "tile:16").name == "opencl:tile:16"
-    variant = contenders.VARIANTS[0]
-    assert contenders.kernel("opencl", "tile:16", variant).name == f"opencl:tile:16:{variant.name}"
-    assert FULL not in contenders.VARIANTS

@@ -98,29 +98,3 @@ def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch)
         assert peer.missing() == text
         with pytest.raises(ExecutorUnavailable, match="not installed: "):
             peer.prepare(Tools())
-
-
-def test_a_peer_that_breaks_when_it_is_opened_is_missing() -> None:
-    from wamnet_peers.common import told_as_missing
-
-    with (
-        pytest.raises(ExecutorUnavailable, match="it cannot run here: no such symbol"),
-        told_as_missing("it"),
-    ):
-        raise OSError("no such symbol\nand more")
-    with pytest.raises(KeyboardInterrupt), told_as_missing("it"):
-        raise KeyboardInterrupt
-
-
-@pytest.mark.nightly
-@pytest.mark.needs("programs")
-def test_first_runs_are_those_of_another_process(monkeypatch) -> None:
-    """The interpreter's has two; one that fails has none."""
-    from wamnet.kernels.bench import fresh
-
-    network = siren.init((2 * 2 * 3, 4, 3), 3.0, 3.0, seed=1, dtype=np.float32)
-    model = Model(network, ("color",), Window(2), Normalization())
-    never, later = fresh.first_runs("numpy:plain", model, 64)
-    assert never is not None
-    assert later is not None
-    assert fresh.first_runs("nobody", model, 64) == (None, None)

@@ -24,12 +24,6 @@ def times(products_s: float, sines_s: float, pixel_s: float) -> dict[str, Times]
     }
 
 
-def test_small_programs_do_what_is_counted() -> None:
-    """Windows of 24 and 216 numbers to 32 and on to 3; 8 sines of 32 numbers one after another."""
-    counts = {name: (products_of(p), sines_of(p)) for name, p in rates.probes().items()}
-    assert counts == {"small": (864, 0), "window": (32 * 216 + 96, 0), "sines": (864, 256)}
-
-
 def test_planted_rates_are_found() -> None:
     """Powers of two: differences and quotients are exact up to a few roundings of float64."""
     found = rates.rates_of(times(2.0**-20, 2.0**-15, 2.0**-8), PIXELS, 7.0)
@@ -56,11 +50,6 @@ def test_limits_of_the_machine() -> None:
     assert found.rates.pixel_s == 0.0
 
 
-def test_halved_lengths_halve_the_count() -> None:
-    found = rates.limits_of({name: Times((1.0,)) for name in ("sgemm", "triad", "sine")}, scale=2)
-    assert (found.flops_per_s, found.bytes_per_s) == (2 * 2048.0**3, 3 * 4 * 2.0**24)
-
-
 def test_machine_is_measured(monkeypatch) -> None:
     """Every measurement runs, on arrays that are not whole blocks per core."""
     monkeypatch.setattr(rates, "MATRIX", 8)
@@ -68,14 +57,6 @@ def test_machine_is_measured(monkeypatch) -> None:
     ways = rates.machine_ways()
     assert list(ways) == ["sgemm", "triad", "sine"]
     assert [way() for way in ways.values()] == [None, None, None]
-
-
-def test_threads_do_every_block_once() -> None:
-    """Also when they do not divide evenly."""
-    done: list[slice] = []
-    blocks = [slice(n, n + 1) for n in range(7)]
-    rates._in_threads(done.append, blocks)
-    assert sorted(done, key=lambda block: block.start) == blocks
 
 
 @pytest.mark.parametrize("schedule", ["plain"])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.bench.rows import Row, clean, front, milliseconds
+from wamnet.kernels.bench.rows import clean, front
 
 NUMBERS = st.one_of(st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.just(math.nan), st.none())
 """Few values, so that ties are common."""
@@ -51,31 +51,3 @@ def test_what_json_does_not_know_is_null() -> None:
     found = clean({"a": math.nan, "b": [math.inf, np.float32(0.5), np.int64(3)], 4: (True, None, "x", 7)})
     assert found == {"a": None, "b": [None, 0.5, 3.0], "4": [True, None, "x", 7]}
     json.dumps(found, allow_nan=False)
-
-
-def test_times_are_told_in_milliseconds() -> None:
-    """Of 1, 2 and 4 s the median is 2,000 ms, and the spread (4 - 1) / 2."""
-    found = milliseconds([1.0, 4.0, 2.0])
-    rounds = [1000.0, 4000.0, 2000.0]
-    assert found == {"median": 2000.0, "min": 1000.0, "max": 4000.0, "spread": 1.5, "rounds": rounds}
-    assert milliseconds([]) is None
-
-
-def test_a_row_that_was_not_reached() -> None:
-    assert Row("a", text="what", kind="peer").as_data() == {
-        "name": "a",
-        "text": "what",
-        "kind": "peer",
-        "state": "pending",
-        "reason": "",
-        "ms": None,
-        "kernel_ms": None,
-    }
-
-
-def test_without_a_time_nothing_was_measured() -> None:
-    """An interrupt between the first frame and the rounds."""
-    assert Row("a", text="what", kind="peer", state="measured").as_data()["state"] == "pending"
-    assert (
-        Row("a", text="what", kind="peer", state="measured", seconds=[1.0]).as_data()["state"] == "measured"
-    )

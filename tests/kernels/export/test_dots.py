@@ -13,8 +13,7 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.kernel.instructions import PORTABLE
 from wamnet.kernels import open_executor
 from wamnet.kernels.export import tools
-from wamnet.kernels.export.host_runner import CUDARunner
-from wamnet.kernels.export.wgpu_runner import WgpuRunner, vulkan_runner
+from wamnet.kernels.export.wgpu_runner import vulkan_runner
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window, all_windows, pad
@@ -126,33 +125,3 @@ def test_cuda_s_product_of_bytes_is_an_instruction(tmp_path):
     except ExecutorUnavailable as error:
         pytest.skip(str(error))
     assert "dp4a.s32.s32" in (tmp_path / "kernel.ptx").read_text()
-
-
-# ---- faults -----------------------------------------------------------------------------------------------
-
-FAULTS = {
-    "no wait": ("cuda", "__syncthreads();", ""),
-    "bytes that carry": ("cuda", "((unsigned int)(int)a & 255u)", "(unsigned int)(int)a"),
-    "another order of bytes": ("cuda", "(int)d << 24", "(int)d << 16"),
-    "a sum of another neuron": ("cuda", "make_int4(x, y, z, w)", "make_int4(y, x, z, w)"),
-    "bytes without a sign": ("wgsl", "dot4I8Packed(words.y, four)", "i32(dot4U8Packed(words.y, four))"),
-    "bytes that are clamped": ("wgsl", "vec4<f32>(a, b, c, d)", "vec4<f32>(a, b, c, max(d, 0.0f))"),
-    "a shift without a sign": ("glsl-vulkan", "(weights >> 24)", "((weights >> 24) & 255)"),
-    "the border's own numbers": ("opencl", "inside ?", "true ?"),
-}
-"""Target, text, and what is in its place."""
-
-OPENED = {
-    "cuda": CUDARunner,
-    "wgsl": WgpuRunner,
-    "glsl-vulkan": vulkan_runner,
-    "opencl": lambda: open_executor("opencl"),
-}
-"""What runs a target here."""
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_are_found(fault):
-    target, before, after = FAULTS[fault]
-    assert not is_right(OPENED[target], changed(kernel(target), before, after))

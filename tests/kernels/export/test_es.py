@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 
-from wamnet import kernels
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.scenes.encode_kernel import compile_encode, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
-from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.export.gl_runner import ESRunner
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network.dataset import Normalization
-
-FEATURES = ("color", "normal")
-"""What a shader of paths adds up here: planes for two buffers of the four that there are."""
 
 
 @pytest.fixture(scope="module")
@@ -52,38 +42,9 @@ def test_the_bound_says_what_it_assumes(case):
     assert "assumes" not in compile_program(case[0], "opengl").source
 
 
-def test_paths_are_those_of_the_reference(runner):
-    """No path of this picture passes an edge within rounding: the sums are the interpreter's to 1e-4."""
-    programs = lower_scene(canonical("minicubes", time=1.0), Settings())
-    part, groups = Part(12, 9, 0, 9, 0, 1, 7), layers_of(FEATURES)
-    found = runner.trace(compile_path(programs, "glsl-es", groups=groups), part)
-    with kernels.open_executor("numpy") as executor:
-        held = executor.trace(compile_path(programs, "numpy", groups=groups), part)
-    assert np.abs(found - held).max() <= 1e-4
-
-
 def test_more_than_four_buffers_are_refused():
     programs = lower_scene(canonical("empty"), Settings())
     with pytest.raises(
         CompileError, match=r"adds up [0-9]+ planes: GLSL ES 3\.00, fragment shader writes at most"
     ):
         compile_path(programs, "glsl-es")
-
-
-@pytest.mark.parametrize("kind", ["plain", "inlined", "packed", "path", "encode"])
-def test_another_compiler_takes_the_source(case, kind, tmp_path):
-    if kind == "path":
-        programs = lower_scene(canonical("minicubes"), Settings())
-        source = compile_path(programs, "glsl-es", groups=layers_of(FEATURES)).source
-    elif kind == "encode":
-        source = compile_encode(FEATURES, Normalization(), "glsl-es").source
-    else:
-        source = compile_program(case[0], "glsl-es", schedule=kind).source
-    assert source.startswith("#version 300 es\n"), "the language allows nothing before its version"
-    if not shutil.which("glslangValidator"):
-        pytest.skip("glslangValidator is not installed")
-    (tmp_path / "x.frag").write_text(source)
-    done = subprocess.run(
-        ["glslangValidator", "x.frag"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout

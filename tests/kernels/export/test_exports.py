@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import shutil
 from dataclasses import replace
@@ -13,12 +12,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from wamnet.compiler.scenes.lower_scene import lower_scene
-from wamnet.compiler.scenes.scene_inputs import tables_of
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.bench.workload import random_model
-from wamnet.kernels.export import check, check_pair, runners, targets, tools
-from wamnet.kernels.export.motion import FORMULAS, KINDS, Motion, drawn
+from wamnet.kernels.export import check, check_pair, targets, tools
+from wamnet.kernels.export.motion import FORMULAS, Motion
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -28,11 +25,6 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import domain, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
-from wamnet.spec.conformance.numbers import to_json
-from wamnet.spec.conformance.on_executor import OnExecutor
-from wamnet.spec.conformance.program import serve
-from wamnet.spec.conformance.run import judge, read_vectors
-from wamnet.spec.conformance.vectors import FOLDER
 
 pytestmark = pytest.mark.apart  # drivers and runtimes of many targets stay in memory
 
@@ -184,30 +176,6 @@ def test_what_moves_is_refused_where_it_cannot():
         moving("godot")
 
 
-@pytest.mark.parametrize("kind", KINDS[1:])
-def test_what_is_drawn_shows_which_numbers_move(kind):
-    """EXP-13: the formulas give the numbers of a scene that was not among those drawn, rounded once."""
-    scene, settings = canonical("minicubes", time=0.3), Settings()
-    motion = Motion((0.3,), (scene,), (kind,))
-    inputs, new = motion.inputs(settings), drawn(scene, (kind,), 99)
-    tables = {path for places in inputs.places for path, _ in places}
-    begins = {"camera": ("camera.",), "lights": ("world.lights.", "world.geometry.emission")}
-    wanted = begins.get(kind, ("world.geometry.groups.", "world.lights.corner"))
-    assert all(path.startswith(wanted) for path in tables)
-    programs = lower_scene(scene, settings, moving=inputs)
-    assert all(each["formula"] for each in motion.facts(programs)["list"])
-    assert inputs.fits(tables_of(scene, settings), tables_of(new, settings))
-    assert not np.array_equal(motion.other(settings), inputs.values(scene))
-
-
-def test_the_rays_of_features_are_stated_without_a_scene():
-    """A host that brings its own features has to know how many rays they are averaged over."""
-    made = export(Request(replace(model(), info={"trained_on_feature_spp": "16"}), "glsl"))
-    told = "The model was trained on features averaged over 16 camera rays per pixel: give it such images"
-    assert told in made.files["README.md"].decode()
-    assert "camera rays" not in export(Request(model(), "glsl")).files["README.md"].decode()
-
-
 def test_the_domain_is_exported():
     """DOM-6: the manifest has what the model states, the README its threshold; without one neither."""
     rng = np.random.default_rng(1)
@@ -284,17 +252,6 @@ def test_a_fault_in_the_weights_is_found(target):
         pytest.skip(verdict.executed)
     assert not verdict.holds
     assert "times the bound" in verdict.wrong
-
-
-def test_a_fault_in_the_paths_is_found():
-    """Red is one percent too bright, in a room that is lit all over."""
-    scene = canonical("cornell")
-    whole = export(Request(model(), "c", scene, settings=Settings(max_depth=1)))
-    source = whole.path.source.replace("sum_color_r += radiance_r", "sum_color_r += radiance_r * 1.01f")
-    assert source != whole.path.source
-    wrong = replace(whole.path, source=source, manifest={**whole.path.manifest, "digest": "1" * 64})
-    verdict = check.check(replace(whole, path=wrong))
-    assert "of the paths' sums agree" in verdict.wrong
 
 
 def test_what_a_tool_refuses_is_a_verdict():
@@ -453,34 +410,6 @@ def test_a_kernel_that_a_tool_refuses(tmp_path):
 
 
 # ---- conformance -------------------------------------------------------------------------------------------
-
-KINDS = {"sine", "random.block", "sampling.cosine_hemisphere", "picture.denoised"}
-"""Kinds that runners are asked here; `wamnet conformance --executor wgsl` asks all."""
-
-
-@pytest.mark.nightly(but=("c99", "wgsl"))
-@pytest.mark.parametrize("name", ["wgsl", "c99", "glsl-es", "metal"])
-def test_runners_answer_the_vectors_of_the_profile(name):
-    cases = {kind: some for kind, some in read_vectors(FOLDER).items() if kind in KINDS}
-    assert set(cases) == KINDS
-    try:
-        runner = runners.RUNNERS[name]()
-    except ExecutorUnavailable as error:
-        pytest.skip(str(error))
-    with runner:
-        answers = OnExecutor(runner)
-        requests = [
-            json.dumps({"id": case.id, "kind": kind, "profile": "ieee", "input": to_json(dict(case.inputs))})
-            for kind, some in cases.items()
-            for case in some
-        ]
-        written = io.StringIO()
-        serve(requests, written, name, answers.kinds, answers.answer)
-    told = map(json.loads, written.getvalue().splitlines())
-    asked = [(kind, case) for kind, some in cases.items() for case in some]
-    verdicts = [judge(kind, case, answer) for (kind, case), answer in zip(asked, told, strict=True)]
-    assert [v for v in verdicts if v.failed] == []
-    assert any(v.verdict == "pass" for v in verdicts)
 
 
 def test_halves_are_beside_the_weights_where_they_are_the_same_numbers():

@@ -20,10 +20,9 @@ import jsonschema
 import numpy as np
 import pytest
 from pages import browse
-from second_hlsl import slang
 
 from wamnet.kernels.bench.workload import random_model
-from wamnet.kernels.export import tint_runner, tools
+from wamnet.kernels.export import tint_runner
 from wamnet.kernels.export.hosts.host import FILES, SHARED
 from wamnet.kernels.export.hosts.table import HOSTS
 from wamnet.kernels.export.package import Request, export
@@ -173,21 +172,6 @@ def test_the_program_in_c_is_right_as_webassembly(tmp_path):
     needs("make", "node", ZIG)
     folder = written(made("c", scene=canonical("lone_light")), tmp_path)
     run(folder, "make", "-s", "wasm", f"ZIG={ZIG}")
-
-
-@pytest.mark.needs("devices")
-@pytest.mark.parametrize("compiler", ["g++", "clang++"])
-def test_the_program_in_cpp_is_right(compiler, tmp_path):
-    needs("make", compiler.replace("++", "") if compiler == "clang++" else compiler)
-    folder = written(made("cpp", scene=canonical("lone_light")), tmp_path)
-    run(
-        folder,
-        "make",
-        "-s",
-        "run",
-        f"CXX={compiler}",
-        "CXXFLAGS=-O2 -Wall -Wextra -Werror -Wno-unused-function",
-    )
 
 
 # ---- Blender --------------------------------------------------------------------------------------
@@ -345,18 +329,6 @@ def test_the_program_on_opencl_is_right(driver, tmp_path):
     error_of(run(folder, "./host", env=opencl_with(driver, tmp_path)))
 
 
-@pytest.mark.needs("devices")
-def test_the_program_on_opencl_says_what_is_missing(tmp_path):
-    """A sentence and a status, where there is no library."""
-    needs("make", "cc")
-    folder = written(made("opencl"), tmp_path)
-    environment = {**os.environ, "HOST_OPENCL": "libNobodyHasIt.so"}
-    options = {"env": environment, "capture_output": True, "text": True}
-    done = subprocess.run(["make", "-s", "run"], cwd=folder, check=False, **options)
-    assert done.returncode != 0
-    assert "libNobodyHasIt.so: cannot be loaded: install OpenCL's loader" in done.stderr
-
-
 @pytest.mark.nightly
 @pytest.mark.needs("devices")
 def test_the_program_on_vulkan_is_right(tmp_path):
@@ -365,24 +337,6 @@ def test_the_program_on_vulkan_is_right(tmp_path):
     if not Path("/usr/include/vulkan/vulkan.h").exists():
         pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
     folder = written(made("vulkan", variant="rank2"), tmp_path)
-    error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
-    assert error <= allowed
-
-
-@pytest.mark.nightly
-@pytest.mark.needs("devices")
-@pytest.mark.parametrize("style", tools.HLSL_STYLES)
-def test_slang_reads_the_same_hlsl(style, tmp_path, monkeypatch):
-    """A second reader of what SPIRV-Cross writes: its SPIR-V in the program for Vulkan, in both kernels."""
-    monkeypatch.setenv("PATH", str(HOSTS_FOLDER / "slang/slangtorch/bin"), prepend=os.pathsep)
-    if shutil.which("slangc") is None:
-        pytest.skip("Slang is missing: make hosts installs it")
-    needs("make", "cc")
-    if not Path("/usr/include/vulkan/vulkan.h").exists():
-        pytest.skip("Vulkan's headers are missing: apt-get install libvulkan-dev")
-    folder = written(made("vulkan", variant="rank2"), tmp_path)
-    for binary in folder.glob("*/*.spv"):
-        binary.write_bytes(slang(tools.hlsl(binary.read_bytes(), style)))
     error, allowed = error_of(run(folder, "make", "-s", "run", f"CFLAGS={STRICT}"))
     assert error <= allowed
 
@@ -490,20 +444,6 @@ def test_the_program_in_python_names_a_missing_package(host):
     bare = [sys.executable, "-I", "-S", "-c", source]  # without installed packages
     done = subprocess.run(bare, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (1, f"numpy is not installed: pip install numpy {host}\n")
-
-
-@pytest.mark.nightly
-@pytest.mark.needs("devices")
-def test_openvino_in_bfloat16_is_found_wrong(tmp_path):
-    """A number of bfloat16 has 8 bits: its rounding is beyond the bound, where the processor has it."""
-    pytest.importorskip("openvino", reason="openvino is missing: pip install openvino")
-    folder = written(made("openvino"), tmp_path)
-    command = [sys.executable, "check.py", "--default"]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=environment)
-    if "bfloat16" not in done.stdout:
-        pytest.skip("OpenVINO's default is not bfloat16 on this processor")
-    assert done.returncode == 1, done.stdout
 
 
 @pytest.mark.nightly

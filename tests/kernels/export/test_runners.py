@@ -5,8 +5,7 @@ A runner whose tools are missing skips its tests and says so; `make test` names 
 
 from __future__ import annotations
 
-import subprocess
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.export import check, runners, tools
+from wamnet.kernels.export import check, runners
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
@@ -147,19 +146,6 @@ def test_bytes_at_the_ends_of_their_range(runner, shape, border):
     assert found.tobytes() == held.tobytes()
 
 
-def test_a_group_that_does_not_wait_is_found(runner, kit):
-    """Without the wait between reading a tile and filling it again, items read another image's numbers."""
-    if runner.name not in ("cuda", "metal"):
-        pytest.skip("its device runs the items of a group in step, whatever the source says")
-    program = kit.denoiser(kit.network([45, 7, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, "clamp")
-    artifact = compile_program(program, runner.name, "ieee", "group:1")
-    wait = {"cuda": "__syncthreads();", "metal": "threadgroup_barrier(mem_flags::mem_threadgroup);"}
-    wrong = kit.with_source(artifact, wait[runner.name], "")
-    random = np.random.default_rng(2)
-    images = {name: random.uniform(-2, 2, (9, 21, n)).astype(np.float32) for name, n in (("a", 4), ("b", 1))}
-    assert kit.excess(runner, program, images, wrong) > 1
-
-
 @pytest.mark.nightly(but=("cuda", "wgsl", "glsl-compute"))
 def test_a_first_layer_in_two_passes(runner, kit, case):
     """The bound of both passes is against the program that was cut."""
@@ -243,92 +229,3 @@ def test_every_exported_language_has_a_runner():
     assert {name for name, row in LANGUAGES.items() if not row.runs and ":" not in name} - {
         "shadertoy"
     } <= held
-
-
-MAIN = """
-#include <stdio.h>
-#include "path.h"
-#include "encode.h"
-
-static float sums[{sums}], color[{color}], normal[{color}];
-
-int main(void)
-{{
-    const wamnet_part part = {{{width}, {height}, {first_row}, {rows}, 0u, 1, 7u}};
-    wamnet_trace(&part, sums);
-    wamnet_encode(sums, color, normal, {width}, {rows}, 1);
-    for (int i = 0; i < {color}; ++i) {{
-        printf("%a\\n", (double)color[i]);
-    }}
-    return 0;
-}}
-"""
-"""A program that has both headers pasted in, with arrays that are just large enough."""
-
-
-@pytest.mark.nightly
-def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
-    programs, part, sums = traced
-    encoder = compile_encode(FEATURES, Normalization(), "c")
-    (tmp_path / "path.h").write_text(compile_path(programs, "c", groups=layers_of(FEATURES)).source)
-    (tmp_path / "encode.h").write_text(encoder.source)
-    sizes = {"sums": sums.size, "color": 3 * part.width * part.rows, **asdict(part)}
-    (tmp_path / "main.c").write_text(MAIN.format(**sizes))
-    try:
-        options = ["-std=c99", "-O1", "-g", *check.WARNINGS[1:-1], *SANITIZERS]
-        tools.run("cc", *options, "-o", "main", "main.c", "-lm", folder=tmp_path)
-    except ExecutorUnavailable as error:
-        pytest.skip(str(error))
-    printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    found = np.array([float.fromhex(line) for line in printed.split()]).reshape(part.rows, part.width, 3)
-    bound = error_at(encoder, dict(zip(encoder.planes, sums, strict=True)), 1)["color"]
-    color = np.moveaxis(sums[:3], 0, -1).astype(np.float64)
-    held = encode_sums({"color": color}, 1.0, ("color",), Normalization())["color"]
-    # The compiler keeps the interpreter's order of operations, without contraction: the sums are its bits.
-    assert (np.abs(found - held) <= bound).all()
-
-
-MOVING = """
-#include <stdio.h>
-#include "path.h"
-
-static const float rows[2][{count}] = {{{rows}}};
-static float sums[{sums}];
-
-int main(void)
-{{
-    const wamnet_part part = {{{width}, {height}, {first_row}, {rows_of_part}, 0u, 1, 7u}};
-    for (int moment = 0; moment < 2; ++moment) {{
-        wamnet_trace(&part, sums, rows[moment]);
-        for (int i = 0; i < {sums}; ++i) {{
-            printf("%a\\n", (double)sums[i]);
-        }}
-    }}
-    return 0;
-}}
-"""
-"""A program that has a scene that moves pasted in, and plays two rows of its table."""
-
-
-@pytest.mark.nightly
-def test_a_host_in_c_plays_two_moments(tmp_path):
-    """PTK-18, EXP-13: nothing is compiled, or read from outside of the arrays, between them."""
-    programs, rows, part, wanted = moments()
-    kernel = compile_path(programs, "c", groups=layers_of(FEATURES))
-    (tmp_path / "path.h").write_text(kernel.source)
-    lines = ", ".join("{" + ", ".join(float(x).hex() + "f" for x in row) + "}" for row in rows)
-    facts = {"count": len(rows[0]), "rows": lines, "sums": wanted[0].size, "rows_of_part": part.rows}
-    (tmp_path / "main.c").write_text(MOVING.format(**{**asdict(part), **facts}))
-    try:
-        options = ["-std=c99", "-O1", "-g", *check.WARNINGS[1:-1], *SANITIZERS]
-        tools.run("cc", *options, "-o", "main", "main.c", "-lm", folder=tmp_path)
-    except ExecutorUnavailable as error:
-        pytest.skip(str(error))
-    printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    found = np.array([float.fromhex(line) for line in printed.split()])
-    # The compiler keeps the interpreter's order of operations, without contraction.
-    assert np.array_equal(found, np.concatenate([sums.ravel() for sums in wanted]))
-
-
-SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-"""Any access outside an array and any undefined operation ends the program."""

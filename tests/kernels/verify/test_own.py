@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wamnet.refimpl.light import camera, intersection, transport
-from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, conductor, dielectric
+from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, dielectric
 from wamnet_verify import judgement, run
 from wamnet_verify.case import RULES
 from wamnet_verify.cases import questions
@@ -99,10 +99,6 @@ def schlick(cosine, cos_far, ratio):
     return np.where((cos_far > 0.0) | (ratio <= 1.0), share, 1.0)
 
 
-def no_masking(site, wi, cos_surface):
-    return site.beta * site.reflectance, conductor.distribution(conductor._half(site, wi)[2], site.parameter)
-
-
 def matte_value(change):
     """Return a matte surface's value, changed."""
     return staticmethod(lambda site, wi, cosine: (site.tinted, change(cosine) / np.pi))
@@ -126,13 +122,6 @@ def double(world, path, hit, surface):
 
 def inverse_index(before):
     return lambda site, cosine, ratio: before(site, cosine, 1.0 / ratio)
-
-
-def mirrored_wrongly(site):
-    from wamnet.refimpl import vectors
-
-    cosine = vectors.dot(site.wo, site.normal)
-    return vectors.scale(site.normal, 1.9 * cosine) - site.wo, cosine
 
 
 def faults():

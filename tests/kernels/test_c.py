@@ -13,12 +13,8 @@ import pytest
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.core.ir import Gather, Image, Type
-from wamnet.compiler.core.trace import trace
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
-from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.whole import forward_whole, rounded
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
 """What a careful project compiles with."""
@@ -160,15 +156,6 @@ def test_rows_are_shared_out_without_gaps(executor_named, kit, size):
     assert np.array_equal(executor_named("c").run(compile_program(program, "c"), {"a": image}), image)
 
 
-def test_building_again_costs_nothing(executor_named, case, monkeypatch):
-    executor, artifact = executor_named("c"), compile_program(case[0], "c")
-    executor.build(artifact)
-    built = executor._built[artifact.digest]
-    monkeypatch.setattr(executor, "_call", None)
-    executor.build(artifact)
-    assert executor._built[artifact.digest] is built
-
-
 @pytest.mark.parametrize(
     ("native", "lanes", "schedule"),
     [
@@ -198,29 +185,7 @@ def test_a_compiler_without_vectors_gets_the_plain_schedule(executor_named, monk
         assert executor.schedule == "plain"
 
 
-def test_a_forgotten_kernel_is_built_again(executor_named, case):
-    executor, artifact = executor_named("c"), compile_program(case[0], "c")
-    first = executor.run(artifact, case[1])
-    built = executor._built[artifact.digest]
-    executor.forget()
-    assert np.array_equal(executor.run(artifact, case[1]), first)
-    assert executor._built[artifact.digest] is not built
-
-
 # ---- refusals ----------------------------------------------------------------------------------------
-
-
-def test_spectra_say_to_other_compilers_what_they_take(executor_named, kit, tmp_path):
-    """FOU-9: without the vectors of GCC and clang the text is one error, before anything else goes wrong."""
-    executor_named("c")
-    program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
-    artifact = compile_program(program, "c", "ieee", "fft:8")
-    assert artifact.manifest["schedule"]["name"] == "fft:8"
-    (tmp_path / "denoise.c").write_text(artifact.source)
-    for options, status in (((), 0), (("-U__GNUC__",), 1)):
-        command = ["cc", "-E", *options, "-o", "out", "denoise.c"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert (done.returncode, "export a schedule of tiles" in done.stderr) == (status, bool(status))
 
 
 @pytest.mark.parametrize(
@@ -278,19 +243,6 @@ def test_compiler_that_relaxes_arithmetic_all_the_same_is_refused(
         kernels.open_executor("c")
 
 
-def test_compiler_that_does_not_know_this_processor(executor_named, kit, tmp_path, monkeypatch):
-    """A compiler that refuses -march=native builds kernels without it."""
-    executor_named("c")
-    wrapper = tmp_path / "cc"
-    wrapper.write_text('#!/bin/sh\ncase "$*" in *-march*) exit 1;; esac\nexec cc "$@"\n')
-    wrapper.chmod(0o755)
-    monkeypatch.setenv("CC", str(wrapper))
-    with kernels.open_executor("c") as executor:
-        image = np.ones((2, 3, 1), np.float32)
-        artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
-        assert np.array_equal(executor.run(artifact, {"a": image}), image / 2)
-
-
 def test_kernel_that_does_not_compile(executor_named, kit):
     artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
     with pytest.raises(CompileError, match=r"(?s)cannot build the kernel: .*error"):
@@ -321,73 +273,6 @@ def test_a_pipeline_is_the_composition_of_its_kernels(executor_named, kit):
 
 
 # ---- integers ----------------------------------------------------------------------------------------------
-
-READ = """
-#include <stdio.h>
-#include <stdlib.h>
-#include "denoise.h"
-int main(void)
-{{
-    static float result[{count}];
-    float *weights = malloc({bytes} + 1);
-    FILE *file = fopen("weights.bin", "rb");
-    if (!weights || !file || fread(weights, 1, {bytes}, file) != {bytes}) {{
-        return 1;
-    }}
-    fclose(file);
-    wamnet_image({images}, weights, result, {width}, {height});
-    for (int i = 0; i < {count}; ++i) {{
-        printf("%a\\n", (double)result[i]);
-    }}
-    free(weights);
-    return 0;
-}}
-"""
-"""A program that reads weights as bytes, as they are exported: some are not floats."""
-
-HOSTILE = ["-Ofast", "-march=native", "-funsafe-math-optimizations"]
-"""Options under which floats promise nothing."""
-
-
-@pytest.mark.product
-@pytest.mark.parametrize("border", ["clamp", "zero"])
-@pytest.mark.parametrize(
-    "options",
-    [
-        [*WARNINGS, *SANITIZERS, "-O1"],
-        [*WARNINGS, *SANITIZERS, "-march=native"],
-        HOSTILE,
-        [*HOSTILE, *WAYS[1]],
-    ],
-    ids=["clean", "clean with vectors", "hostile", "hostile and portable"],
-)
-@pytest.mark.parametrize("schedule", ["plain", "tile:8", "dot:16"])
-def test_integers_are_exact_whatever_the_options(executor_named, tmp_path, schedule, options, border):
-    """Layers fill no vector, pictures no tile, rows of taps no four bytes."""
-    executor_named("c")
-    network = rounded(siren.init([100, 37, 5, 3], 3.0, 5.0, seed=2), 5)
-    images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 3), ("b", 1)))
-    gather = Gather(dataset.Window(5, border), images)
-    traced = trace(lambda x: forward_whole(network, x), {"window": Type(shape=(100,))}, gather)
-    artifact = compile_program(traced, "c", "ieee", schedule)
-    assert artifact.manifest["schedule"]["name"] == schedule
-    random = np.random.default_rng(3)
-    given = {i.name: random.integers(-127, 128, (3, 31, i.channels)).astype(np.float32) for i in images}
-    padded = dataset.pad(np.concatenate(list(given.values()), axis=-1), gather.window)
-    expected = forward_whole(network, dataset.all_windows(padded, gather.window))
-    (tmp_path / artifact.source_name).write_text(artifact.source)
-    (tmp_path / "weights.bin").write_bytes(artifact.weights.tobytes())
-    data = "".join(array(f"in_{name}", x) for name, x in given.items())
-    arguments = ", ".join(f"in_{name}" for name in given)
-    sizes = {"count": expected.size, "bytes": artifact.weights.nbytes, "width": 31, "height": 3}
-    (tmp_path / "main.c").write_text(data + READ.format(images=arguments, **sizes))
-    command = os.environ.get(c_executor.COMPILER_VARIABLE, "cc").split()
-    subprocess.run([*command, "-std=c99", *options, "-o", "main", "main.c", "-lm"], cwd=tmp_path, check=True)
-    lines = subprocess.run(
-        ["./main"], cwd=tmp_path, check=True, capture_output=True, text=True
-    ).stdout.split()
-    found = np.array([float.fromhex(line) for line in lines], np.float32).reshape(expected.shape)
-    assert found.tobytes() == expected.tobytes()
 
 
 @pytest.mark.needs("programs")

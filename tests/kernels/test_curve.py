@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import variants
-from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import cache
 from wamnet.kernels.run import curve, measure_curve
 from wamnet.kernels.run.curve import Curve, Limits, Point, choose
@@ -66,17 +65,6 @@ def test_what_is_rejected_names_its_rules() -> None:
     assert (first, rules) == (FULL, "--max-ms 70 (100)")
     rejected = dict(choose(POINTS, Limits(max_error=0.15, max_loss_db=0.2)).rejected)
     assert rejected == {RANK: "--max-error 0.15 (0.2), --max-loss-db 0.2 (0.3)"}
-
-
-def test_ties_are_decided_by_accuracy_then_by_names() -> None:
-    points = [point("rank12", 10.0, 0.2), point("rank16", 10.0, 0.1), point("window8", 10.0, 0.1)]
-    for order in (points, points[::-1]):
-        assert choose(order, Limits(max_error=1.0)).point.variant == "rank16"
-        assert choose(order, Limits(max_ms=10.0)).point.variant == "rank16"
-    faster = [*points, point("window6", 9.0, 0.1)]
-    assert choose(faster, Limits(max_ms=10.0)).point.variant == "window6"
-    same = [point("full", 1.0, schedule=name) for name in ("tile:8", "tile:16")]
-    assert choose(same, Limits(max_error=1.0)).point.schedule == "tile:16"
 
 
 @pytest.mark.parametrize("number", curve.NUMBERS)
@@ -177,13 +165,6 @@ def test_files_that_are_no_curve_are_refused(tmp_path) -> None:
         curve.read(tmp_path / "half.json")
 
 
-@pytest.mark.parametrize(("name", "value"), [("model", "other"), ("profile", "native")])
-def test_curves_of_something_else_are_refused(name, value) -> None:
-    curve.check_fits(CURVE, CURVE, "x")
-    with pytest.raises(InputError, match=f"x: {name} '.*': this one is for {value}"):
-        curve.check_fits(CURVE, replace(CURVE, **{name: value}), "x")
-
-
 def test_the_cache_gives_only_what_is_wanted(tmp_path, monkeypatch) -> None:
     """Damaged, foreign, or of something else: measured again."""
     monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path))
@@ -237,32 +218,3 @@ def test_a_measurement_has_every_variant(executor_named, model) -> None:
     assert full.error_max <= 1e-5 < narrow.error_max <= narrow.error_bound
     assert all(p.milliseconds > 0 and p.error_mean <= p.error_max for p in found.points)
     assert curve.from_data(json.loads(json.dumps(found.as_data())), "x") == found
-
-
-def test_schedules_that_are_named_are_measured(executor_named, model) -> None:
-    found = measure_curve.measure(
-        executor_named("opencl"), model, (9, 18), "ieee", frames(), ("full", "rank2"), ("plain", "tile:8"), 1
-    )
-    assert [(p.variant, p.schedule) for p in found.points] == [
-        *(("full", "plain"), ("full", "tile:8"), ("rank2", "plain"), ("rank2", "tile:8"))
-    ]
-    assert len(measure_curve.promising(executor_named("opencl"), model, "ieee")) == 2
-
-
-def test_every_target_s_schedules_are_tried(denoiser, model) -> None:
-    """It was a KeyError for C: `compile --target c --max-ms 9 --frames FOLDER`."""
-    found = measure_curve.promising(denoiser, model, "ieee")
-    known = {schedule.name for schedule in DENOISERS[denoiser.name].schedules}
-    assert found
-    assert known.issuperset(found)
-
-
-def test_pictures_that_are_no_numbers_have_no_quality() -> None:
-    one, other = np.full((2, 2, 3), 0.5), np.full((2, 2, 3), 0.25)
-    assert measure_curve.quality([one], [one], [other]) == (0.0, 0.0, 0.0)
-    largest, mean, loss = measure_curve.quality([one, other], [one, one], [other, one])
-    assert (largest, mean) == (0.25, 0.125)
-    assert loss == math.inf, "the full network's second picture is the target"
-    bad = one.copy()
-    bad[0, 0, 0] = np.nan
-    assert all(map(math.isnan, measure_curve.quality([one, bad], [one, one], [other, other])))

@@ -178,58 +178,6 @@ def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> N
         assert (picture == executor.run(pipeline.denoise, images)).all()
 
 
-FAULTS = {
-    "first pass, tap": (0, "int left = x - CENTRE_COLUMN", "int left = x - CENTRE_COLUMN + 1"),
-    "first pass, row": (0, "int top = y - CENTRE_ROW", "int top = y + 1"),
-    "first pass, channel": (0, "PATCH_WIDTH + p) * 3 + i]", "PATCH_WIDTH + p) * 3 + (i ^ 1)]"),
-    "second pass, tap": (1, "int top = y - CENTRE_ROW", "int top = y - CENTRE_ROW + 1"),
-    "second pass, column": (1, "int left = x - CENTRE_COLUMN", "int left = x - 1"),
-    "second pass, pixel": (1, "PATCH_WIDTH + p) * 5 + i]", "PATCH_WIDTH) * 5 + i]"),
-    "second pass, border": (1, "clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
-}
-"""Which kernel, a piece of it, and what makes it wrong; none leaves an array."""
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_wrong_pass_is_caught(executor_named, kit, fault) -> None:
-    """Rank 5 of a 4 x 4 window, in tiles: each fault is far beyond the bound of rounding."""
-    executor, (number, old, new) = executor_named("opencl"), FAULTS[fault]
-    program = kit.denoiser(kit.network([48, 20, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
-    images = images_of({"a": 3}, (9, 34), 8)
-    artifact = compile_program(program, "opencl", "ieee", "tile:8", 5)
-    assert excess(kit, executor, artifact, program, images, False) <= 1
-    wrong = kit.with_source(artifact.kernels[number], old, new)
-    broken = replace(artifact, before=wrong) if number == 0 else replace(wrong, before=artifact.before)
-    assert excess(kit, executor, broken, program, images, False) > 1
-
-
-FRAGMENT_FAULTS = {
-    "first pass, channel": (0, "result_1[1] = v1[5]", "result_1[1] = v1[1]"),
-    "first pass, tap": (0, "x + dx - CENTRE_COLUMN", "x + dx - CENTRE_ROW"),
-    "second pass, image": (
-        1,
-        "float value = texelFetch(image_horizontal_1",
-        "float value = texelFetch(image_horizontal_0",
-    ),
-    "second pass, weight": (1, "tap + 4 + c", "tap + c"),
-    "second pass, tap": (1, "y + dy - CENTRE_ROW", "y + dy"),
-}
-"""The same for fragment shaders."""
-
-
-@pytest.mark.parametrize("fault", FRAGMENT_FAULTS)
-def test_a_wrong_fragment_pass_is_caught(executor_named, kit, fault) -> None:
-    """Rank 6 of a 4 x 4 window: an image of two textures, four channels and two."""
-    executor, (number, old, new) = executor_named("opengl-egl"), FRAGMENT_FAULTS[fault]
-    program = kit.denoiser(kit.network([48, 20, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
-    images = images_of({"a": 3}, (9, 34), 8)
-    artifact = compile_program(program, "opengl", rank=6)
-    assert excess(kit, executor, artifact, program, images, False) <= 1
-    wrong = kit.with_source(artifact.kernels[number], old, new)
-    broken = replace(artifact, before=wrong) if number == 0 else replace(wrong, before=artifact.before)
-    assert excess(kit, executor, broken, program, images, False) > 1
-
-
 @pytest.mark.parametrize("schedule", ["plain", "inlined"])
 @pytest.mark.parametrize("rank", [4, 5, 32])
 def test_executors_draw_into_as_many_textures_as_ranks_fill(executor_named, kit, rank, schedule) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from wamnet.compiler.scenes import history_kernel
 from wamnet.compiler.scenes.history_kernel import MOTION, PAST, compile_history
 from wamnet.kernels.run import before
 from wamnet.kernels.run.follow_on import first_hits_on, follow_on
@@ -188,41 +185,6 @@ def test_wild_pictures_are_those_of_the_definition(monkeypatch, device, seed):
     assert differing(monkeypatch, device, seed) <= (0 if device.name in EXACT else DECIDED_OTHERWISE)
 
 
-CHANGES = {
-    "side": ("SAME_SIDE", 0.9),
-    "share": ("share", lambda fraction, beyond: np.where(beyond, 1.0 - fraction, fraction)),
-    "surface": ("same_surface", lambda same, normal, before, rests: same | rests),
-    "split": ("split", lambda s, of=H.split: of(s + np.float32(0.25))),
-    "moved": ("point_before", lambda row, first: (first.point + row.shift, first.normal)),
-    "mean": ("known_of", lambda sums, of=H.known_of: of(sums._replace(weights=sums.weights + 1.0))),
-    "interval": ("blend", lambda known, color, limit: (known.color, known.count + 1.0)),
-}
-"""Changes of the definition that a picture must show."""
-
-
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_kernel_of_another_definition_is_noticed(monkeypatch, executor_named, change):
-    name, other = CHANGES[change]
-    kernel = compile_history("numpy")
-    with monkeypatch.context() as changed:
-        changed.setattr(H, name, other)
-        changed.setattr(history_kernel.history, name, other)
-        wrong = replace(kernel, programs=history_kernel.lower_history())
-    from wamnet.kernels.run import follow_on as module
-
-    monkeypatch.setattr(module, "compile_history", lambda _: wrong)
-    assert differing(monkeypatch, executor_named("numpy"), 0) > DECIDED_OTHERWISE
-
-
-def test_a_picture_alone_is_its_colour(device):
-    """HIS-5: n = 1; the past that knows nothing leaves no trace, not even in the sign of a zero."""
-    color = color_of(3)
-    color[0, :5] = 0.0
-    found = follow_on(device, None, canonical("minicubes"), job(), color)
-    assert found.color.tobytes() == color.tobytes()
-    assert (found.count == 1).all()
-
-
 # ---- who does it -----------------------------------------------------------------------------------------
 
 
@@ -235,17 +197,6 @@ def test_first_hits_are_the_reference_s(device):
     for one, other in ((found.point, wanted.point), (found.normal, wanted.normal)):
         assert np.abs(one - other)[same].max() <= 40 * 10 / 0.2 * np.finfo(np.float32).eps
     assert np.abs(found.direction - wanted.direction).max() <= 40 * np.finfo(np.float32).eps
-
-
-@pytest.mark.nightly(but="numpy")
-def test_features_of_other_rays_do_not_matter(device):
-    """The history is of the colour's own first sample, also where features have rays of their own."""
-    scene, plain = moment("cornell", 1), job(7)
-    other = replace(plain, feature_spp=4, seen=True, first_sample=0)
-    one, two = (first_hits_on(device, scene, each) for each in (plain, other))
-    assert np.array_equal(one.point, two.point)
-    later = first_hits_on(device, scene, replace(plain, first_sample=3))
-    assert not np.array_equal(one.point, later.point)
 
 
 @pytest.mark.parametrize("name", ["numpy", "opencl", "c", "opengl"])

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from wamnet.compiler import compile as compiling
-from wamnet.compiler.scenes import smooth_kernel
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import cache, denoise_on
 from wamnet.kernels.run.kept import data_of, kernel_of
@@ -35,9 +33,6 @@ def noisy(features=("color", "normal")):
     names = {layer for name in features for layer in dataset.FEATURES[name].layers}
     shapes = {name: (19, 23, frame.LAYERS[name].channels) for name in sorted(names)}
     return frame.Frame({name: random.random(shape, np.float32) for name, shape in shapes.items()})
-
-
-running = sys.modules["wamnet.kernels.run.denoise_on"]
 
 
 def no_compiler(monkeypatch):
@@ -98,17 +93,6 @@ def test_what_is_refused_is_refused_again(executor_named):
     for _ in range(2):
         with pytest.raises(CompileError, match=r"schedule 'tile99': unknown to .* \(did you mean 'tile"):
             denoise_on(executor_named("c"), model(), noisy(), schedule="tile99", keeps=True)
-
-
-def test_the_kernels_of_the_filter_are_kept_too(executor_named, monkeypatch):
-    smoothed = next(name for name, feature in dataset.FEATURES.items() if feature.guides)
-    device, features = executor_named("c"), ("color", smoothed)
-    network, seen = model(features=features), noisy(features)
-    first = denoise_on(device, network, seen, keeps=True)
-    no_compiler(monkeypatch)
-    monkeypatch.setattr(smooth_kernel, "compile_smoothing", None)
-    running._filter.cache_clear()
-    assert denoise_on(device, network, seen, keeps=True).digest == first.digest
 
 
 def test_a_kernel_is_the_same_after_reading(executor_named):

@@ -18,11 +18,6 @@ def test_glibc_takes_both_thresholds():
     assert memory.keep_freed_memory()
 
 
-def test_other_c_libraries_are_left_alone(monkeypatch):
-    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
-    assert not memory.keep_freed_memory()
-
-
 OPENED = """\
 import sys, numpy as np
 from wamnet import kernels

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from wamnet.compiler.kernel.interface import PATH
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels import Pipeline, render_on
 from wamnet.kernels.run.render_on import Frames
-from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
@@ -125,71 +123,6 @@ def test_numbers_that_a_kernel_should_not_take_are_constants(executor, model, mo
         pipeline.set_scene(many[1])
         assert not pipeline.path.programs.inputs
     assert len(built) == 2
-
-
-def test_pictures_of_a_stream_come_in_order(executor, model):
-    """Each while the next one is drawn: what is yielded is not overwritten."""
-    shots = [cubes(time) for time in TIMES]
-    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
-        found = [drawn.picture for drawn in pipeline.stream(shots, range(len(shots)))]
-        for seed, (scene, picture) in enumerate(zip(shots, found, strict=True)):
-            pipeline.set_scene(scene)
-            assert np.array_equal(picture, pipeline.run(seed))
-        assert list(pipeline.stream([], [])) == []
-        with pytest.raises(ValueError, match="shorter"):
-            list(pipeline.stream(shots, [1]))
-
-
-def test_an_image_that_is_read_later_is_of_its_own_picture(executor, model):
-    shots = [cubes(time) for time in TIMES[:2]]
-    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
-        with pytest.raises(InputError, match="pipeline: has rendered no image yet"):
-            pipeline.later()
-        pipeline.draw(1)
-        first, kept = pipeline.later("normal", "color"), pipeline.image("normal")
-        pipeline.set_scene(shots[1])
-        pipeline.draw(2)
-        assert not np.array_equal(pipeline.image("normal"), kept)
-        assert np.array_equal(first().images["normal"], kept)
-        with pytest.raises(InputError, match="feature image 'depth': is not one of color, normal"):
-            pipeline.later("depth")
-
-
-@pytest.mark.nightly
-def test_an_animation_keeps_the_memory_of_its_device(executor_named, model, monkeypatch):
-    """Fifty pictures: as many buffers are alive as after the second one."""
-    executor = executor_named("opencl")
-    module = __import__(type(executor).__module__, fromlist=["cl"])
-    real, alive = module.cl.Buffer, []
-
-    class Counted(real):
-        def __init__(self, *arguments, **options):
-            super().__init__(*arguments, **options)
-            alive.append(1)
-
-        def __del__(self):
-            alive.pop()
-
-    monkeypatch.setattr(module.cl, "Buffer", Counted)
-    shots, counts = [cubes(0.05 + 0.1 * i) for i in range(50)], []
-    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
-        for _ in pipeline.stream(shots, range(50)):
-            gc.collect()
-            counts.append(len(alive))
-    assert counts[0] > 0
-    assert set(counts[1:]) == {counts[1]}
-
-
-@pytest.mark.nightly(but="numpy")
-def test_a_moving_scene_with_features_of_their_own_rays(executor, model, built):
-    """One path kernel for all moments, and each picture is that of the kernel of its constants."""
-    shots, rays = [cubes(time) for time in TIMES[:3]], {"settings": SETTINGS, "feature_spp": 3}
-    with Pipeline(executor, shots[0], model, SIZE, moving=shots, **rays) as pipeline:
-        found = [(pipeline.set_scene(shot), pipeline.run(4), pipeline.path)[1:] for shot in shots]
-    assert len({kernel.digest for _, kernel in found}) == 1
-    for shot, (picture, _) in zip(shots, found, strict=True):
-        with Pipeline(executor, shot, model, SIZE, **rays) as pipeline:
-            assert np.array_equal(picture, pipeline.run(4))
 
 
 @pytest.mark.nightly(but="numpy")

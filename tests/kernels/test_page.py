@@ -10,7 +10,7 @@ import pytest
 
 from wamnet.compiler.plan import Expected
 from wamnet.kernels.run import page as P
-from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
@@ -67,17 +67,6 @@ def test_a_still_scene_has_one_row_without_numbers():
     assert floats(numbers["rows"]).size == 0
 
 
-@pytest.mark.parametrize(
-    ("command", "error", "why"),
-    [([], ExecutorUnavailable, "pip install ziglang"), (["false"], CompileError, "zig: no module; update")],
-)
-def test_without_a_compiler_that_works_there_is_no_module(model_of, monkeypatch, command, error, why):
-    monkeypatch.setattr(P.webassembly, "compiler", lambda: command)
-    networks = P.networks_of(model_of("color"), rank=1, processor=True)[-1:]
-    with pytest.raises(error, match=why):
-        P.page_data(animation("empty", 0.0), networks, SETTINGS)
-
-
 def test_features_are_encoded_in_passes_of_four(model_of):
     """These have 15 channels: as many as four buffers hold, in one kernel of paths."""
     features = ("color", "normal", "albedo", "position", "unshadowed")
@@ -90,16 +79,6 @@ def test_features_are_encoded_in_passes_of_four(model_of):
     vectors = -(-len(data["numbers"]["names"]) // 4)
     assert f"uniform vec4 scene_numbers[{vectors}];" in path["source"]
     assert data["lights"] == [{"color": [1.0, 0.78, 0.5], "power": 14.0, "area": 0.25}]
-
-
-def test_shadow_rays_are_those_of_the_model_s_training(model_of):
-    """PTK-22: by the kernel of paths, as many as the facts of the training say, or one."""
-    model = replace(model_of("color", "direct"), info={"trained_on_shadow_rays": "2, 3"})
-    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
-    (path,) = data["paths"]
-    assert "direct_b" in path["planes"]
-    assert "by 3 shadow rays of each camera ray" in path["source"]
-    assert np.any(floats(data["check"]["images"]["direct"]["values"]) > 0.0)
 
 
 def test_all_features_take_a_second_kernel_that_ends_at_the_first_hit(model_of):
@@ -159,37 +138,6 @@ def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
     for one in (full, fast, texture):
         assert np.array_equal(floats(one["check"]["expected"], "<f8"), one["held"].value.ravel())
         assert 0 < floats(one["check"]["bound"]).max() <= one["bound"]
-
-
-def test_a_network_in_two_schedules_is_checked_with_one_reference(model_of):
-    """Half of a page's numbers, and of the time to make it."""
-    networks = P.networks_of(model_of("color"), rank=1)
-    data = P.page_data(animation("empty", 0.0), networks, SETTINGS)
-    full, fast, texture, _ = data["variants"]
-    assert texture["check"] == "fast"
-    assert fast["check"]["expected"] != full["check"]["expected"]
-    assert texture["rms_to_first"] == fast["rms_to_first"] > 0
-
-
-def test_integers_are_a_variant_of_bytes(model_of):
-    """Weights of 8 bits take a byte, the factors and biases of a row their places; sines only are rounded."""
-    model = model_of("color")
-    networks = P.networks_of(model, rank=1)
-    data = P.page_data(animation("empty", 0.0), networks, SETTINGS)
-    one = data["variants"][3]
-    assert (one["name"], one["levels"], one["rank"], one["bound"]) == ("whole", 127, 0, 0)
-    assert one["check"]["bound"] is None
-    assert len(one["check"]["sha256"]) == 64
-    plan = P.plan_program(P.lower(networks[3].model), P.TARGET, "ieee", P.MANY)
-    (kernel,) = P.compile_plan(plan).kernels
-    weights = one["passes"][0]["weights"]
-    found = floats(weights["bytes"], "i1").astype(np.float32)
-    for place, value in weights["large"]:
-        found[place] = value
-    assert np.array_equal(found, kernel.weights)
-    assert 0 < len(weights["large"]) < len(found) / 4
-    relu = replace(model, siren=replace(model.siren, activation="relu"))
-    assert [network.name for network in P.networks_of(relu, rank=1)] == ["full", "fast", "fast-texture"]
 
 
 def test_ranges_are_those_of_the_scene_that_was_learned(model_of):

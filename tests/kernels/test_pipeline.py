@@ -19,7 +19,6 @@ from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
-from wamnet.kernels.devices import executor as executors
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.passes import Passes
 from wamnet.refimpl.errors import CompileError, InputError
@@ -160,8 +159,8 @@ def test_the_whole_separate_way(executor, model_of, case):
 
 
 @pytest.mark.product
-@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
-@pytest.mark.parametrize("size", [(1, 1), (5, 15), (4, 16), (3, 17), (9, 33)])
+@pytest.mark.parametrize("lanes", [1, 4, 16])
+@pytest.mark.parametrize("size", [(1, 1), (4, 16), (9, 33)])
 def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, lanes, size):
     """PPL-13: within what both are off; C, whose functions are the same in both kernels, to the bit."""
     part, features = Part(size[1], size[0], 0, size[0], 0, 2, 7), ("depth", "color", "normal")
@@ -283,45 +282,6 @@ def test_what_writes_encoded_images_is_refused_elsewhere(executor_named):
         executor_named("opencl").paint(kernel, Part(4, 4, 0, 3, 0, 1, 0))
 
 
-def test_the_definition_is_the_composition(executor_named, model_of):
-    """PPL-7: on the interpreter the picture is what its kernels give one after another, to the bit."""
-    executor, model, size = executor_named("numpy"), model_of(ALL, 4, "clamp"), (11, 23)
-    with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS) as pipeline:
-        found = pipeline.run(5, 2)
-        images = {name: pipeline.image(name) for name in model.features}
-        assert np.array_equal(found, executor.run(pipeline.denoise, images))
-
-
-# ---- faults: each must be seen by the bound -----------------------------------------------------------
-
-
-FAULTS = {
-    "no division by the samples": ("(float)sample_count", "1.0f"),
-    "another exponent": ("0.416666657f", "0.4545f"),
-    "rows that are too long": ("stride = (size_t)row_stride", "stride = (size_t)(row_stride + 1)"),
-    "one plane too far": ("sums[3 * plane", "sums[4 * plane"),
-}
-"""What may go wrong in an encoding kernel: a text of its source and what replaces it."""
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_wrong_encoding_is_caught(executor_named, model_of, fault):
-    executor, (name, features, size, border, shape, samples) = executor_named("opencl"), CASES[list(CASES)[1]]
-    model = model_of(features, size, border)
-    sums, _ = traced(executor, model, name, (shape, samples), 3)
-    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS, sums=True) as pipeline:
-        right = pipeline.run(3, samples)
-        wanted = {n: pipeline.image(n) for n in features}
-        errors = {n: 2 * e for n, e in error_at(pipeline.encode, sums, samples).items()}
-        old, new = FAULTS[fault]
-        assert old in pipeline.encode.source
-        source = pipeline.encode.source.replace(old, new)
-        manifest = {**pipeline.encode.manifest, "digest": ir.sha256(source.encode())}
-        pipeline.passes.encoder = replace(pipeline.encode, source=source, manifest=manifest)
-        wrong = pipeline.run(3, samples)
-    assert np.any(np.abs(wrong - right) > difference_bound(model, executor, wanted, errors))
-
-
 # ---- what stays on the device --------------------------------------------------------------------------
 
 
@@ -434,49 +394,6 @@ def test_seed_samples_and_first_sample(executor, model_of):
         colour = pipeline.image("color")
         pipeline.draw(2, spp=2)
         assert not np.array_equal(pipeline.image("color"), colour)
-
-
-def test_features_that_are_only_shown(executor, model_of):
-    model = model_of(("normal",), 3, "zero")
-    frame = render_on(executor, scene("lone_light"), Job(11, 5, 1, 2, SETTINGS)).frame
-    with Pipeline(executor, scene("lone_light"), model, (5, 11), settings=SETTINGS, show=("color",)) as shown:
-        found = shown.run(2)
-        wanted = dataset.feature_image(frame, ("color",), SCALES)
-        assert np.abs(shown.image("color") - wanted).max() <= 2.0**-18  # 37 u of the power, and some more
-    assert np.array_equal(found, denoise_on(executor, model, frame).image)
-
-
-def test_the_kernel_of_whole_frames(executor, model_of):
-    """The same picture as by a kernel that writes only what is needed, here where nothing is contracted."""
-    model, size = model_of(("depth", "color"), 3, "zero"), (7, 19)
-    kinds = {}
-    for whole in (False, True):
-        with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS, whole=whole) as pipeline:
-            kinds[whole] = pipeline.encode.planes, pipeline.run(3, 2)
-    assert len(kinds[False][0]) == 4
-    assert set(kinds[True][0]) > set(kinds[False][0])
-    same = np.all(np.abs(kinds[True][1] - kinds[False][1]) <= 1e-5, axis=-1)  # 168 u: rounding, not faults
-    assert same.mean() >= 0.9
-
-
-def test_a_kernel_that_fell_out_is_built_again(executor_named, model_of, monkeypatch):
-    executor, model = executor_named("opengl-egl"), model_of(("color",), 2, "clamp")
-    with Pipeline(executor, scene("empty"), model, (4, 4), settings=SETTINGS) as pipeline:
-        before = pipeline.run(1)
-        monkeypatch.setattr(executors, "KEPT_KERNELS", 1)
-        with Pipeline(executor, scene("cornell"), model_of(("normal",), 2, "clamp"), (4, 4)) as other:
-            other.run(1)
-        assert pipeline.encode.digest not in executor._built
-        assert np.array_equal(pipeline.run(1), before)
-
-
-def test_forgotten_kernels_are_built_again(executor, model_of):
-    model = model_of(("color",), 3, "clamp")
-    with Pipeline(executor, scene("lone_light"), model, (5, 4)) as pipeline:
-        first = pipeline.run(seed=3)
-        executor.forget()
-        assert not executor._built
-        assert np.array_equal(pipeline.run(seed=3), first)
 
 
 # ---- refusals ------------------------------------------------------------------------------------------

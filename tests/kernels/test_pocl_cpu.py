@@ -58,24 +58,6 @@ def test_anything_else_is_left_alone(texts):
     assert list(words) == before
 
 
-def test_memory_behind_the_record_is_left_alone(monkeypatch):
-    """The pointer is in the same piece of readable memory, but just beyond what belongs to the record."""
-    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
-    words, _kept = record(b"generic", before=80)
-    monkeypatch.setattr(pocl_cpu, "_allocated", lambda _: 8 * 80)
-    before = list(words)
-    assert not pocl_cpu.name_the_processor(ctypes.addressof(words))
-    assert list(words) == before
-    monkeypatch.setattr(pocl_cpu, "_allocated", lambda _: 8 * 81)
-    assert pocl_cpu.name_the_processor(ctypes.addressof(words))
-
-
-def test_no_record_is_searched_further_than_known(monkeypatch):
-    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
-    words, _kept = record(b"generic", words=256, before=pocl_cpu.RECORD_BYTES // 8)
-    assert not pocl_cpu.name_the_processor(ctypes.addressof(words))
-
-
 def test_size_of_a_record_is_the_c_library_s():
     """glibc rounds up to multiples of 16, and uses 8 bytes of what follows."""
     words, _kept = record(words=100)

@@ -61,20 +61,6 @@ def test_no_opencl_platform(executor_named, monkeypatch):
         kernels.open_executor("opencl")
 
 
-def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
-    device = executor_named("opencl").device
-    from wamnet.kernels.devices import opencl_executor
-
-    class Broken:
-        def get_devices(self):
-            raise opencl_executor.cl.LogicError("clGetDeviceIDs failed")
-
-    real = opencl_executor.cl.get_platforms()
-    monkeypatch.setattr(opencl_executor.cl, "get_platforms", lambda: [Broken(), *real])
-    with kernels.open_executor("opencl") as executor:
-        assert executor.device == device
-
-
 @pytest.mark.parametrize(
     ("profile", "rounding", "message"),
     [
@@ -120,35 +106,6 @@ def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):
         ExecutorUnavailable, match=r"egl: no library; install libegl1.*osmesa: no library; install"
     ):
         kernels.open_executor("opengl")
-
-
-@pytest.mark.parametrize(("newest", "asked"), [(430, [430]), (330, [430, 330])])
-def test_driver_that_gives_the_required_version_is_asked_for_compute_shaders(
-    executor_named, monkeypatch, newest, asked
-):
-    executor_named("opengl-egl")
-    from wamnet.kernels.devices import opengl_executor
-
-    required = []
-
-    def create(require, **options):
-        required.append(require)
-        if require > newest:
-            raise ValueError(f"version {require} is not supported")
-        return SimpleNamespace(version_code=require)
-
-    monkeypatch.setattr(opengl_executor.moderngl, "create_context", create)
-    assert opengl_executor.CONTEXTS["egl"]().version_code == newest
-    assert required == asked
-
-
-def test_osmesa_library_that_is_missing(monkeypatch):
-    from wamnet.kernels.devices import osmesa
-
-    monkeypatch.setattr(osmesa, "LIBRARIES", ("libnowhere.so",))
-    monkeypatch.setattr(osmesa.ctypes.util, "find_library", lambda name: None)
-    with pytest.raises(OSError, match=r"no library libnowhere\.so"):
-        osmesa.OSMesaContext()
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren
 from wamnet.refimpl.network.train import PRESETS
 
-EXAMPLES = max(settings.default.max_examples // 20, 1)
-"""Each example compiles a kernel, up to a second: a twentieth of what other tests draw."""
+EXAMPLES = max(settings.default.max_examples // 33, 1)
+"""Each example compiles a kernel, up to a second; NumPy runs many more of each schedule."""
 
 LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] if not s.bytewise]
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
@@ -122,20 +122,6 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
     executor._built.clear()
 
 
-@pytest.mark.product
-@pytest.mark.parametrize(("target", "schedule"), LADDER)
-@pytest.mark.parametrize("border", ["clamp", "zero"])
-def test_the_paper_s_network(executor_named, kit, target, schedule, border):
-    size = LARGEST.get((target, schedule), (12,))[0]  # the paper's is 12
-    layers = [32] if (target, schedule) in SHADERS else [32, 32, 32, 32]
-    network = kit.network([6 * size * size, *layers, 3], (3.0, 3.0))
-    program = kit.denoiser(network, {"color": 3, "normal": 3}, size, border)
-    random = np.random.default_rng(5)
-    images = {name: random.uniform(-1, 1, (13, 31, 3)).astype(np.float32) for name in ("color", "normal")}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
-
-
 def elementwise(x):
     """Return operations on vectors that a network does not have: each has words of its own."""
     first, second = (np.linspace(-0.5, 0.5, 20 * n, dtype=np.float32).reshape(n, 20) for n in (17, 2))
@@ -157,134 +143,6 @@ def test_every_operation_on_vectors(executor_named, kit, target, schedule):
     assert artifact.manifest["schedule"]["name"] == schedule
     images = {"a": np.random.default_rng(3).uniform(-2, 2, (5, 19, 3)).astype(np.float32)}
     assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
-
-
-FAULTS = {
-    "pixel": ("(dy * PATCH_WIDTH + p) * 3", "(dy * PATCH_WIDTH) * 3"),
-    "columns": ("clamp(left + dx, 0, width - 1)", "clamp(left + dx, 1, width - 1)"),
-    "rows": ("clamp(top + dy, 0, height - 1)", "clamp(top + dy, 1, height - 1)"),
-    "place": ("y * width + x + p)", "y * width + x + (p ^ 1))"),
-    "lanes": ("* LANES + i]", "* LANES + i / 2]"),
-    "block": ("block * 96 + dy", "0 * 96 + dy"),
-    "bias": {
-        "opencl": ("sum[p][1] = w[", "sum[p][1] = w[-1 + "),
-        "c": ("&sum[p][1], weights + (", "&sum[p][1], weights + (-1 + "),
-    },
-}
-"""Pieces of a tiled kernel, and what makes it wrong, in each language where they differ; none leaves an
-array."""
-
-
-@pytest.mark.product
-@pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("schedule", ["tile:16", "tile:4"])
-@pytest.mark.parametrize("target", ["opencl", "c"])
-def test_a_wrong_tile_is_caught(executor_named, kit, target, schedule, fault):
-    executor = executor_named(target)
-    program = kit.denoiser(kit.network([48, 70, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
-    images = {"a": np.random.default_rng(8).uniform(-2, 2, (9, 34, 3)).astype(np.float32)}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert kit.excess(executor, program, images, artifact) <= 1
-    found = FAULTS[fault]
-    old, new = found[target] if isinstance(found, dict) else found
-    assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
-
-
-FOURIER_FAULTS = {
-    "twiddle": ("* 0.382683426f", "* 0.4f"),
-    "border": ("clamp(top, 0, height - 1)", "clamp(top, 1, height - 1)"),
-    "lane": ("(tile * PAIRS + 1)", "(tile * PAIRS + 0)"),
-    "conjugate": ("b - d;", "b + d;"),
-    "opposite": ("product[t * 2 + apart][2 * g] =", "product[t * 2 + apart][2 * f] ="),
-    "product": ("imaginary[t][1] += w1 * b;", "imaginary[t][1] -= w1 * b;"),
-    "middle": ("if (opposite != k)", "if (opposite > k + 2)"),
-    "rows": ("(tile * OUT + line) * STRIDE", "(tile * OUT + (line ^ 1)) * STRIDE"),
-    "mirror": ("columns[apart]", "columns[0]"),
-    "block": ("int x = tile_x + b * PIXELS;", "int x = tile_x + (b ^ 1) * PIXELS;"),
-    "weights": {
-        "opencl": (" * 8 + 3];", " * 8 + 2];"),
-        "c": (" * 8 + 3) * LANES", " * 8 + 2) * LANES"),
-    },
-}
-"""Pieces of a kernel of spectra, and what makes it wrong; none leaves an array."""
-
-
-@pytest.mark.product
-@pytest.mark.parametrize("fault", FOURIER_FAULTS)
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
-def test_a_wrong_spectrum_is_caught(executor_named, kit, target, schedule, fault):
-    executor = executor_named(target)
-    program = kit.denoiser(kit.network([150, 20, 3], (3.0, 3.0)), {"a": 6}, 5, "clamp")
-    images = {"a": np.random.default_rng(8).uniform(-2, 2, (37, 75, 6)).astype(np.float32)}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert kit.excess(executor, program, images, artifact) <= 1
-    found = FOURIER_FAULTS[fault]
-    old, new = found[target] if isinstance(found, dict) else found
-    assert kit.excess(executor, program, images, kit.with_source(artifact, old, new)) > 1
-
-
-@pytest.mark.product
-@pytest.mark.parametrize("border", dataset.BORDERS)
-@pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
-@pytest.mark.parametrize("target", ["opencl", "c"])
-@pytest.mark.parametrize("schedule", SPECTRA)
-def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, target, schedule, border, shape):
-    """Tiles of 21 x 21 pixels, two side by side; 12 channels, of which one image has an odd number."""
-    program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, border)
-    random = np.random.default_rng(2)
-    images = {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 5), ("b", 7))}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert artifact.manifest["schedule"]["name"] == schedule
-    assert kit.excess(executor_named(target), program, images, artifact) <= 1
-
-
-INLINED_FAULTS = {
-    "tap": ("clamp(x - 2, 0, width - 1)", "clamp(x - 1, 0, width - 1)"),
-    "border": ("clamp(y - 2, 0, height - 1)", "clamp(y - 2, 1, height - 1)"),
-    "vector": ("v1_1 += part1_1", "v1_0 += part1_1"),
-    "omega": ("= 3.0f * v1", "= 2.0f * v1"),
-    "components": ("_1.x;", "_0.x;"),
-}
-"""Pieces of an inlined kernel, and what makes it wrong."""
-
-
-@pytest.mark.parametrize("fault", INLINED_FAULTS)
-def test_a_wrong_inlined_kernel_is_caught(executor_named, kit, fault):
-    """KER-13: the right one is within its bound, each fault is not."""
-    executor = executor_named("opengl-egl")
-    program = kit.denoiser(kit.network([48, 5, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
-    images = {"a": np.random.default_rng(8).uniform(-2, 2, (6, 7, 3)).astype(np.float32)}
-    artifact = compile_program(program, "opengl", "ieee", "inlined")
-    assert kit.excess(executor, program, images, artifact) <= 1
-    assert kit.excess(executor, program, images, kit.with_source(artifact, *INLINED_FAULTS[fault])) > 1
-
-
-GROUP_FAULTS = {
-    "rows": ("clamp(tile_row, 0, height - 1)", "clamp(tile_row, 1, height - 1)"),
-    "columns": ("clamp(tile_column, 0, width - 1)", "clamp(tile_column, 1, width - 1)"),
-    "apron": ("left + i % TILE_WIDTH", "left + min(i, PLANE - 2) % TILE_WIDTH"),
-    "tap": ("local_x + dx;", "local_x + (dx ^ 1);"),
-    "plane": ("x1_0 = tile[PLANE", "x1_0 = tile[0 * PLANE"),
-    "weight": ("m = w[first + 4]", "m = w[first + 3]"),
-    "pixel": ("+ GROUP_WIDTH];", "+ 0 * GROUP_WIDTH];"),
-    "layer": ("v52_1_0 += m * v51_1_1.y", "v52_1_0 += m * v51_1_1.x"),
-}
-"""Pieces of a grouped kernel of four pixels, and what makes it wrong.
-
-None leaves an array, and none leaves an element unwritten: local memory may still hold what the right
-kernel wrote there before, and then the wrong one is right.
-"""
-
-
-@pytest.mark.parametrize("fault", GROUP_FAULTS)
-@pytest.mark.parametrize(("target", "schedule"), [("opencl", "group:4"), ("opengl", "group:4")])
-def test_a_wrong_group_is_caught(executor_named, kit, target, schedule, fault):
-    executor = executor_of(executor_named, target)
-    program = kit.denoiser(kit.network([48, 9, 3], (3.0, 3.0)), {"a": 3}, 4, "clamp")
-    images = {"a": np.random.default_rng(8).uniform(-2, 2, (9, 69, 3)).astype(np.float32)}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert kit.excess(executor, program, images, artifact) <= 1
-    assert kit.excess(executor, program, images, kit.with_source(artifact, *GROUP_FAULTS[fault])) > 1
 
 
 def test_no_barrier_is_a_race_that_groups_do_not_have(kit):

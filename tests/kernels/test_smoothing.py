@@ -83,48 +83,6 @@ def test_a_frame_of_misses_is_within_the_bound(device):
     assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
 
 
-def changed(part, monkeypatch):
-    """Take one part out of the reference; return the scales of what is left."""
-    if part == "clip":
-        monkeypatch.setattr(smoothing, "WHITES", 1e6)
-    elif part == "level":
-        monkeypatch.setattr(smoothing, "LEVELS", 2)
-    elif part in smoothing.GUIDES:
-        others = {name: 1e6 if name == part else sigma for name, sigma in smoothing.GUIDES.items()}
-        monkeypatch.setattr(smoothing, "GUIDES", others)
-    elif part == "depth":
-        monkeypatch.setattr(smoothing, "LEAST_DEPTH", 4.0)
-    elif part == "spline":
-        monkeypatch.setattr(smoothing, "SPLINE", (0.2,) * 5)
-    elif part == "border":
-        monkeypatch.setattr(smoothing, "taps", wrapped)
-    elif part == "gap":
-        taps = smoothing.taps
-        monkeypatch.setattr(smoothing, "taps", lambda height, width, gap: taps(height, width, min(gap, 2)))
-    return Normalization(0.0) if part == "exposure" else SCALES
-
-
-def wrapped(height, width, gap):
-    """Yield the taps of a picture whose borders meet."""
-    for dy, vertical in enumerate(smoothing.SPLINE, -2):
-        for dx, horizontal in enumerate(smoothing.SPLINE, -2):
-            rows, columns = (np.arange(height) + gap * dy) % height, (np.arange(width) + gap * dx) % width
-            yield vertical * horizontal, rows, columns
-
-
-PARTS = ["clip", "level", *smoothing.GUIDES, "depth", "spline", "border", "gap", "exposure"]
-
-
-@pytest.mark.parametrize("part", PARTS)
-def test_each_part_is_seen(device, part, monkeypatch):
-    """What a device computes is far from a filter that lacks one part."""
-    kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
-    layers = rough_layers(19, 35)
-    found, _ = smoothed(device, kernels, layers), bound_of(kernels, layers)
-    scales = changed(part, monkeypatch)
-    assert excess(kernels, found, layers, scales) > 10
-
-
 # ---- where it is used ---------------------------------------------------------------------------------
 
 

@@ -254,14 +254,3 @@ def test_of_coincident_faces_the_first_listed_wins(executor, first):
     seen = {tuple(color) for color in albedo[np.any(albedo != walls, axis=-1)].tolist()}
     listed = (scene.boxes[0], scene.spheres[0], scene.quads[0])
     assert seen - {(0.0, 0.0, 0.0)} == {tuple(np.float32(p.reflectance).tolist()) for p in listed}
-
-
-def test_a_wrong_loop_is_caught(executor_named):
-    """The tests above can fail: a loop that leaves out its last row loses a primitive."""
-    executor = executor_named("opencl")
-    kernel = compile_path(lower_scene(SINGLES["sphere"], SETTINGS, LISTS), "opencl", lanes=executor.lanes)
-    part = Part(24, 16, 0, 16, 0, 2, 3)
-    source = LOOP.sub("for (int i = 0; i < 4; ++i) {", kernel.source, count=1)
-    assert source != kernel.source
-    wrong = replace(kernel, source=source, manifest={**kernel.manifest, "digest": "wrong"})
-    assert not np.array_equal(executor.trace(kernel, part), executor.trace(wrong, part))

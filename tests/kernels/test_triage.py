@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,13 +12,12 @@ from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
-from wamnet.kernels.judge import apart, triage
+from wamnet.kernels.judge import triage
 from wamnet.kernels.judge.apart import Apart, Outcome, attempt
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
-from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
+from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.whole import round_image, rounded
 
 SHAPE = (7, 9)
 """Height and width of the picture."""
@@ -117,16 +115,6 @@ def test_picked_schedules_run(executor_named, model, images):
     assert not triage.odd_ones(found)
 
 
-@pytest.mark.nightly
-def test_all_agree(executor_named, model, images):
-    """Every executor, every schedule: a kernel for each one that is not replaced by another."""
-    found = verdicts_of(runners(executor_named, *WAYS), model, images, which=triage.EVERY)
-    assert {v.kernel.runner.way for v in found} == set(WAYS)
-    assert {v.kernel.schedule for v in found if v.kernel.runner.way == "opencl"} > {"plain", "tile:4"}
-    assert [v.state for v in found] == ["within"] * len(found)
-    assert triage.conclusion(found) == f"{len(found)} kernels within their bounds"
-
-
 @pytest.mark.parametrize("way", WAYS)
 def test_executor_stage_and_neuron_are_named(executor_named, model, images, way):
     """A wrong weight of layer 1 in one executor, also in numpy: beside it opencl, or numpy."""
@@ -179,14 +167,6 @@ def test_what_is_no_number_deviates(executor_named, kit, model, images, way, pro
     assert odd.ratio == odd.error == np.inf
 
 
-def test_numpy_s_nan_deviates(executor_named, model, images, monkeypatch):
-    ways = runners(executor_named, "opencl")
-    picture = np.full((*SHAPE, 3), np.nan, np.float32)
-    monkeypatch.setattr(ways[0], "run", lambda artifact, images: Outcome(picture))
-    found = verdicts_of(ways, model, images)
-    assert [v.kernel.runner.way for v in triage.odd_ones(found)] == ["numpy"]
-
-
 def test_without_a_bound_finite_numbers_pass(executor_named, model, images):
     found = verdicts_of(runners(executor_named, "opencl"), model, images, "native")
     assert [v.state for v in found] == ["no bound", "within"]
@@ -208,22 +188,6 @@ def test_if_all_deviate_the_bound_is_suspect(executor_named, model, images):
     assert triage.conclusion(found[:1]) == text
 
 
-def test_names_of_odd_ones():
-    """An executor is named whole where all its schedules deviate; refusals are not deviations."""
-
-    def verdict(way, schedule, ratio, refusal=""):
-        kernel = triage.Kernel(SimpleNamespace(way=way), schedule, None)
-        return triage.Verdict(kernel, ratio=ratio, refusal=refusal)
-
-    every = [verdict("a", "plain", 0.5), verdict("b", "plain", 2), verdict("b", "tile", np.inf)]
-    assert triage.conclusion(every) == "b (all schedules) is the odd one out: 1 other within its bound"
-    every += [verdict("a", "tile", np.nan), verdict("c", "plain", 0, "too large")]
-    text = "b (all schedules) and a tile are the odd ones out: 1 other within its bound"
-    assert triage.conclusion(every) == text
-    assert triage.conclusion(every[-1:]) == "nothing ran: every kernel was refused"
-    assert every[-1].state == "refused: too large"
-
-
 # ---- crashes ---------------------------------------------------------------------------------------------
 
 
@@ -239,19 +203,6 @@ def test_a_crash_is_a_verdict(executor_named, model, images, monkeypatch, way):
         small = reduced(found, model, "ieee", images)
     assert (small.box.height, small.box.width) == (1, 1)
     assert "layer 0, sums" in small.stages[0].text
-
-
-def test_a_refusal_is_no_deviation(executor_named, model, images):
-    def compiled(plan):
-        if plan.target.name == "opencl":
-            raise CompileError("not today")
-        return compile_plan(plan)
-
-    found = verdicts_of(runners(executor_named, "opencl"), model, images, compiled=compiled)
-    assert [v.state for v in found] == ["within", "refused: not today"]
-    assert not triage.odd_ones(found)
-    found = verdicts_of(runners(executor_named, "opencl"), model, images, which="spiral")
-    assert "schedule 'spiral': unknown to this target (choose one of plain)" in found[0].state
 
 
 SEGMENTATION_FAULT = {
@@ -281,21 +232,6 @@ def test_a_kernel_that_never_ends(executor_named, kit, model, images):
         runner.limit_s = 0.5
         (found,) = verdicts_of([runner], model, images, compiled=compiled)
         assert found.state == "FAILED: no answer in 0.5 s"
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_apart_is_as_inside(executor_named, model, images, way):
-    """Device, schedule and bits."""
-    inside = Inside(way, executor_named(way))
-    artifact = compile_program(lower(model), inside.target)
-    with Apart(way) as runner:
-        assert (runner.target, runner.device) == (inside.target, inside.device)
-        for size in (SHAPE, (2000, 2000)):
-            assert runner.picked(size) == inside.picked(size)
-        assert np.array_equal(runner.run(artifact, images).image, inside.run(artifact, images).image)
-        refused = runner.run(artifact, {"color": images["color"]})
-        assert "images for the kernel 'color': must be color, normal" in refused.refusal
-    runner.close()  # again costs nothing
 
 
 @pytest.mark.needs("devices")
@@ -338,35 +274,6 @@ def test_shrinking_keeps_what_fails(rows, columns, at):
     assert len(runs) <= 80
 
 
-def test_shrinking_ends():
-    """After so many runs, whatever they say; and where nothing smaller fails, the whole is kept."""
-    runs = []
-    whole = Box(0, 0, 1000, 1000)
-    shrink(whole, lambda box: runs.append(box) or len(runs) % 3 == 0, most=20)
-    assert len(runs) == 20
-    assert shrink(whole, lambda box: False) == whole
-    assert shrink(whole, lambda box: True, at=(999, 999)) == Box(999, 999, 1, 1)
-
-
-def test_a_failure_that_comes_once_is_told(executor_named, model, images):
-    """The whole picture is kept, with what it showed."""
-    (runner,) = runners(executor_named, "numpy")
-    picture = runner.run(compile_program(lower(model), "numpy"), images).image
-    answers = iter([Outcome(picture + np.float32(0.25))])
-    once = SimpleNamespace(
-        way="numpy",
-        target="numpy",
-        device="fake",
-        picked=runner.picked,
-        run=lambda artifact, images: next(answers, None) or runner.run(artifact, images),
-    )
-    found = verdicts_of([once], model, images)
-    small = reduced(found, model, "ieee", images)
-    assert not small.repeats
-    assert small.box == Box(0, 0, *SHAPE)
-    assert list(small.verdicts) == found
-
-
 def test_stages_are_the_network(kit, model, images):
     """Each neuron's sum and sine once, in order; their programs compute them."""
     found = list(stages(model.siren, 4))
@@ -392,37 +299,3 @@ def test_stages_are_the_network(kit, model, images):
 def test_no_stage_deviates_in_a_right_kernel(executor, model, images):
     runner = Inside(executor.name, executor)
     assert first_stage(runner, "plain", model, "ieee", images) is None
-
-
-def test_lines_have_no_line_ends():
-    """A driver's log has many: a verdict is one line."""
-    executor = SimpleNamespace(run=lambda *_: (_ for _ in ()).throw(RuntimeError("a\n  b")))
-    assert apart.attempt(executor, None, {}).failure == "RuntimeError: a b"
-
-
-# ---- integers ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.nightly
-def test_integers_are_within_a_bound_of_0_and_a_wrong_weight_is_named(executor_named, model, images):
-    """No error is within it, any error is not; stages are those of the network of integers."""
-    whole = replace(model, siren=rounded(model.siren, 3))
-    given = {name: round_image(image) for name, image in images.items()}
-    ways = runners(executor_named, "opencl")
-    found = verdicts_of(ways, whole, given, which=triage.EVERY)
-    assert [v.state for v in found] == ["within"] * len(found)
-
-    def compiled(plan):
-        program = plan.analysed
-        if plan.target.name != "opencl" or "W1" not in program.parameters:
-            return compile_plan(plan)
-        weight = program.parameters["W1"].copy()
-        weight[3, 0] += 9.0
-        changed = replace(program, parameters={**program.parameters, "W1": weight})
-        return replace(compile_plan(replace(plan, analysed=changed)), plan=plan)
-
-    found = verdicts_of(ways, whole, given, compiled=compiled)
-    (odd,) = triage.odd_ones(found)
-    assert odd.ratio == np.inf
-    stage, _ = first_stage(odd.kernel.runner, "plain", whole, "ieee", given, compiled)
-    assert (stage.layer, stage.sines, stage.first) == (1, False, 0)

@@ -65,19 +65,6 @@ def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     assert reason.startswith(f"tuned on this device on {table.day}: {best.ms:.3g} ms at 20x12, ")
 
 
-@pytest.mark.nightly(but="opengl-egl")
-@pytest.mark.parametrize("name", ["opencl", "opengl-egl"])
-def test_a_rank_is_tuned_by_itself(executor_named, name):
-    """A compute shader's first pass is a fragment shader where it writes more than four channels."""
-    executor = executor_named(name)
-    rank = {"opencl": 2, "opengl-egl": 6}[name]
-    plan = planned(executor, variant=f"rank{rank}")
-    table = tune.tune(executor, plan, SIZE, repeats=1)
-    assert not [r for r in table.rows if "wrong" in r.note]
-    assert choose(executor, plan, SIZE)[1].startswith("tuned on")
-    assert choose(executor, planned(executor), SIZE)[1].startswith("built-in choice for ")
-
-
 @pytest.mark.parametrize("fault", [lambda image: image + 0.01, lambda image: image * np.nan])
 def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch, fault):
     executor = executor_named("opencl")
@@ -101,16 +88,6 @@ def test_what_does_not_hold_the_program_says_why(executor_named, monkeypatch):
     notes = {r.schedule: r.note for r in table.rows}
     assert notes["group:4"].startswith("two layers of 4 pixels are 64 numbers, of at most 30")
     assert "numbers" not in notes["group:1"]
-
-
-def test_weights_in_the_source_are_compiled_for_each_model(executor_named):
-    executor = executor_named("opengl-egl")
-    table = tune.tune(executor, planned(executor, model((), 1)), SIZE, repeats=1)
-    (inlined,) = [r for r in table.rows if r.schedule == "inlined"]
-    assert inlined.again_s == inlined.first_s
-    named = {"plain", "inlined", "fftpasses:32", "group:1", "group:2", "group:4"}
-    assert {r.schedule for r in table.rows} == named
-    assert not [r for r in table.rows if "wrong" in r.note]
 
 
 def test_compilation_counts_for_few_pictures():
@@ -203,14 +180,3 @@ def test_pictures_are_made_with_the_schedule_of_the_table(executor_named):
     for pictures, name in ((1, "tile:4"), (1000, "vector:16")):
         with Pipeline(executor, canonical("lone_light"), model(), SIZE, pictures=pictures) as pipeline:
             assert pipeline.denoise.manifest["schedule"]["name"] == name
-
-
-def test_the_first_compilation_is_remembered(executor_named, monkeypatch):
-    executor = executor_named("numpy")
-    assert tune.first_time(executor, "a", 2.5) == 2.5
-    assert tune.first_time(executor, "a", 0.5) == 2.5
-    monkeypatch.setattr(tune, "FIRSTS", 2)
-    assert [tune.first_time(executor, name, 1.0) for name in "bc"] == [1.0, 1.0]
-    assert tune.first_time(executor, "a", 0.25) == 0.25, "the oldest was forgotten"
-    monkeypatch.setattr(executor, "driver", "another")
-    assert tune.first_time(executor, "c", 4.0) == 4.0

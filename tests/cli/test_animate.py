@@ -14,7 +14,6 @@ from PIL import Image
 from wamnet.cli.commands import animate
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
-from wamnet.kernels.run.render_frame import render_frame
 from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
@@ -77,26 +76,6 @@ def test_one_device_draws_by_one_pipeline(
         assert (levels > 0).mean() <= 0.01  # values within 1e-5 of a rounding limit: 255 x 2e-5 of all
 
 
-@pytest.mark.nightly(but=("seen_smoothed-opencl", "smoothed-numpy"))
-@pytest.mark.parametrize("name", ["numpy", "opencl"])
-@pytest.mark.parametrize("feature", ["smoothed", "seen_smoothed"])
-def test_a_network_that_sees_smoothed_colour_is_drawn_apart(
-    wamnet, tmp_path, monkeypatch, executor_named, name, feature
-) -> None:
-    """No pipeline makes that feature. A device that does both parts draws such a model in two steps."""
-    executor_named(name)
-    window, scales = Window(2), Normalization()
-    network = siren.init((n_inputs((feature,), window), 4, 3), 1.0, 1.0, 0)
-    save_model(tmp_path / "s.safetensors", Model(network, (feature,), window, scales))
-    monkeypatch.setattr(animate, "draw_frames", None)
-    one = ("--seconds", 0.2, "--fps", 5, "--size", 13, "--executor", name, "--renderer", name)
-    assert wamnet("animate", "s.safetensors", *one, "-o", "a").status == 0
-    noisy = render(canonical("minicubes"), Job(13, 13, seen=True)).frame
-    got = read_png(tmp_path / "a" / "00000.png")[LABEL_PX:-1, 13:26]
-    # Half a level of 8 bits; weights below 1 leave an error of the images (SMO-5) far below the other half.
-    assert np.abs(got - denoise(load_model(tmp_path / "s.safetensors"), noisy)).max() <= 1.0 / 255
-
-
 @pytest.mark.nightly(but="numpy")
 @pytest.mark.parametrize("name", ["numpy", "opencl"])
 def test_a_network_that_sees_the_history_gets_that_of_the_film(
@@ -130,44 +109,6 @@ def test_a_network_that_sees_the_history_gets_that_of_the_film(
         "3 frames, 1 of them rendered now\n"
     )
     assert last.read_bytes() == before
-
-
-def test_a_network_that_sees_the_sun_gets_it(wamnet, tmp_path, monkeypatch, executor_named) -> None:
-    """Rendered and denoised apart, although one device could do both: its path kernel knows no sun."""
-    executor_named("opencl")
-    features, window = ("color", "sun"), Window(2)
-    network = siren.init((n_inputs(features, window), 4, 3), 1.0, 1.0, 0)
-    save_model(tmp_path / "sun.safetensors", Model(network, features, window, Normalization()))
-    monkeypatch.setattr(animate, "draw_frames", None)
-    film = ("--scene", "daylight", "--seconds", 0.1, "--fps", 10, "--size", 13)
-    by = ("--executor", "opencl", "--renderer", "opencl")
-    assert wamnet("animate", "sun.safetensors", *film, *by, "-o", "day").status == 0
-    scene = canonical("daylight")
-    whole = render_frame("opencl", scene, Job(13, 13)).frame
-    got = read_png(tmp_path / "day" / "00000.png")[LABEL_PX:-1, 13:26]
-    # As for the history above.
-    assert np.abs(got - denoise(load_model(tmp_path / "sun.safetensors"), whole)).max() <= 1.0 / 255
-    text = "features 'sun': a path kernel knows what a pixel's paths meet, not where the sun is"
-    assert text in wamnet("view", "sun.safetensors", "--scene", "daylight", "-o", "page.html").err
-
-
-def test_a_scene_file_is_static(wamnet, tmp_path) -> None:
-    """Every image shows it from the view that is named; a model of another file is warned of."""
-    assert wamnet("scene", "cornell", "-o", "mine.json").status == 0
-    network = load_model(tmp_path / "m.safetensors")
-    facts = {"trained_on_scene": "cornell", "trained_on_scene_sha256": "0" * 64}
-    save_model(tmp_path / "f.safetensors", replace(network, info=facts))
-    two = ("--scene", "mine.json", "--yaw", 9, "--seconds", 0.2, "--fps", 10, "--size", 13)
-    outcome = wamnet("animate", "f.safetensors", *two, "-o", "still")
-    assert "2 of 2 frames differ from the training frames: cornell is another scene file" in outcome.out
-    shown = varied(canonical("cornell"), Variation(9.0))
-    for index in (0, 1):
-        noisy = encoding.to_display(render(shown, Job(13, 13, seed=2 * index)).frame["color"], 0.0)
-        got = read_png(tmp_path / "still" / f"0000{index}.png")[LABEL_PX:-1, :13]
-        # Half a step of 8 bits, and a rounding to float32 of either value.
-        assert np.abs(got - noisy).max() <= 0.5 / 255 + 2.0**-23
-    (tmp_path / "mine.json").write_text((tmp_path / "mine.json").read_text().replace("0.73", "0.74"))
-    assert "holds something else: 00000.png" in wamnet("animate", "f.safetensors", *two, "-o", "still").err
 
 
 def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
@@ -275,18 +216,6 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
         "2 frames, 1 of them rendered now\n"
     )
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
-
-
-def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
-    """The unfinished picture and the lock; another hidden file stays, as does a link of such a name."""
-    (tmp_path / "a").mkdir()
-    for name in (".wamnet-0123456789abcdef.png", ".kept", ".lock"):
-        (tmp_path / "a" / name).write_text("")
-    link = ".wamnet-fedcba9876543210.png"
-    (tmp_path / "a" / link).symlink_to("00000.png")
-    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
-    found = sorted(path.name for path in (tmp_path / "a").iterdir())
-    assert found == [".kept", link, "00000.png", "00001.png"]
 
 
 def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.cli.commands import bench, bench_forms, bench_frames, train
+from wamnet.cli.commands import bench, bench_forms, bench_frames
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
 from wamnet.cli.reports import bench_report, plots, report
@@ -141,19 +141,6 @@ def test_an_interrupt_leaves_what_was_measured(wamnet, here, monkeypatch) -> Non
     assert "interrupted: this is what was measured until then" in (here / "speed/bench.md").read_text()
 
 
-def test_absent_peers_are_named(wamnet, here, monkeypatch) -> None:
-    """In the result, in its text, and on the terminal, with the command that installs them."""
-    monkeypatch.setattr("wamnet.kernels.bench.contenders.find_spec", lambda name: None)
-    only = "numpy:plain,torch*,oidn*,onnx*,tinygrad"
-    outcome = wamnet("bench", "model.safetensors", "--only", only, "--size", 8, "--repeats", 1, "-o", "s")
-    assert outcome.status == 0
-    lines = outcome.out.splitlines()
-    for name, package in (("torch", "torch"), ("oidn:fast", "pyoidn"), ("tinygrad", "tinygrad, pyopencl")):
-        line = f"{name}: missing, not installed: {package}; pip install {package.replace(',', '')}"
-        assert line in lines
-        assert f"* {line}" in (here / "s/bench.md").read_text().splitlines()
-
-
 def test_quality_comes_from_a_data_set(wamnet, here) -> None:
     """The kernel that is the network loses less than rounding can: 1e-4 dB."""
     made = wamnet("dataset", "cornell", "--frames", 1, "--test", 1, "--size", 16, "--spp", 4, "-o", "set")
@@ -221,20 +208,6 @@ def test_frames_of_the_model_s_scene_are_rendered_once(wamnet, here, monkeypatch
     assert re.search(r"6 images .*, 0 of them rendered now", measured(wamnet, "--only", "numpy:plain")[1])
 
 
-def test_a_time_of_training_is_named(wamnet, here, monkeypatch) -> None:
-    small_scene(monkeypatch)
-    of_cubes(here / "model.safetensors")
-    model = load_model(here / "model.safetensors")
-    request = bench_frames.request_for(model, "numpy", frames=1, test_frames=1, seed=bench_frames.TEST_SEED)
-    time = frame_draws(request)[1][1].time_s
-    info = {**model.info, "trained_on_time": f"0.0, {time}", "trained_on_ranges": '{"time_s": [0.0, 8.0]}'}
-    save_model(here / "model.safetensors", replace(model, info=info))
-    data, _ = measured(wamnet, "--only", "numpy:plain", "--frames", 1)
-    assert [draw["time_s"] for draw in data["frames"]["draws"]] == [time]
-    assert data["frames"]["draws"][0]["time_in_training"] is True
-    assert "a test frame is at a time that training had" in bench_report.notes(data)
-
-
 def test_frames_are_drawn_from_the_ranges_that_a_model_has_learned(samples) -> None:
     """Time, camera and lamps; without ranges the camera is at rest."""
     model = load_model(samples / "model.safetensors")
@@ -295,24 +268,6 @@ def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatc
     for a, b in zip(whole.model.siren.weights, resumed.model.siren.weights, strict=True):
         assert (a == b).all()
     assert resumed.model.normalization == model.normalization
-
-
-def test_a_form_is_trained_once(samples, tmp_path, monkeypatch) -> None:
-    """What is finished is read; another number of steps is another training, from the start."""
-    model = load_model(samples / "model.safetensors")
-    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
-    begun, fit = [], train.fit
-
-    def noting(recipe, pairs, path, state, **more):
-        begun.append((recipe.steps, state.step))
-        return fit(recipe, pairs, path, state, **more)
-
-    monkeypatch.setattr(train, "fit", noting)
-    for steps in (3, 3, 4):
-        forms = bench_forms.planned(model, ("full",), steps)
-        (form,) = bench_forms.trained(model, forms, pairs, tmp_path / "forms", "numpy")
-        assert (form.name, form.steps) == ("further", steps)
-    assert begun == [(3, 0), (4, 0)]
 
 
 @pytest.mark.parametrize("named", [["--synthetic"], ["paper"]])
@@ -379,21 +334,6 @@ def test_rows_are_sorted_and_have_dashes() -> None:
     assert [cells[0] for cells in rows] == ["fast *", "zero", "slow *"]
     assert rows[1][-1] == "–"
     assert rows[2][1] == "5,000"
-
-
-@pytest.mark.nightly(but="theme2")
-@pytest.mark.parametrize("theme", [plots.LIGHT, plots.DARK, plots.PAPER])
-def test_plots_of_any_data(theme) -> None:
-    """Also of one point, of losses below 0, and of nothing."""
-    assert set(bench_report.draw(planted(), theme)) == {"error", "sizes"}
-    assert bench_report.draw(planted(contenders=[], sizes=[]), theme) == {}
-    quality = planted(
-        contenders=[row("a", **TRADED, quality={"psnr_loss_db": -0.25})],
-        front={"error": [], "quality": ["a"]},
-        sizes=[],
-    )
-    assert set(bench_report.draw({**quality, "unseen_frames": 1}, theme)) == {"trade-off"}
-    assert bench_report.draw(quality, theme) == {}
 
 
 def test_every_executor_of_the_benchmark_has_a_marker() -> None:
@@ -465,26 +405,6 @@ def test_the_picture_is_a_function_of_the_data(tmp_path) -> None:
     assert not (tmp_path / "c.png").exists()
 
 
-def test_names_in_the_picture_do_not_overlap(monkeypatch) -> None:
-    """Of forty rows in the same place and beside it: names without a free place are left out."""
-    from matplotlib.figure import Figure
-    from matplotlib.text import Annotation, Text
-
-    found = []
-    monkeypatch.setattr(plots, "_png", lambda figure: found.append(figure) or b"")
-    marks = [
-        plots.Mark(f"form {k}", (1.0 + k % 2, 1.0, 9.0), 1e-5, "opencl", "rank", k == 0) for k in range(40)
-    ]
-    plots.trade_off([plots.Panel("bound", marks, is_loss=False)], plots.PAPER)
-    (figure,) = found
-    assert isinstance(figure, Figure)
-    names = [text for text in figure.axes[0].texts if isinstance(text, Annotation)]
-    boxes = [Text.get_window_extent(name) for name in names]
-    assert names[0].get_text() == "form 0"
-    assert 5 <= len(names) < 40
-    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
-
-
 def page(**facts) -> str:
     """Return the demo's report of as little as it takes."""
     picture = dict.fromkeys(report.PICTURES, "data:,")
@@ -526,21 +446,3 @@ def test_the_report_has_a_section_when_it_is_given_a_result() -> None:
     assert "none: missing, not here" in text
     assert text.count("data:image/png;base64,") == 4
     assert "Speed against error" not in page()
-
-
-def test_the_report_writes_the_result_into_its_data(monkeypatch, tmp_path) -> None:
-    """`report.write(..., bench=...)` puts it into both files."""
-    given = {}
-    monkeypatch.setattr(report, "facts", lambda *_: {"schema": "x"})
-    monkeypatch.setattr(report, "draw", lambda results: {})
-    monkeypatch.setattr(report, "page", lambda data, *_: given.update(data) or "page")
-    results = type("Results", (), {"unseen": ()})()
-    report.write(tmp_path, None, results, "wamnet demo", bench=planted())
-    assert json.loads((tmp_path / "report.json").read_text())["bench"]["size_px"] == 256
-    assert given["bench"]["size_px"] == 256
-
-
-def test_a_reduced_run_is_reduced() -> None:
-    """Smaller, fewer rounds, and a budget for each: what it takes by default."""
-    assert bench.QUICK.keys() == bench.USUAL.keys()
-    assert all(bench.QUICK[key] < bench.USUAL[key] for key in bench.QUICK)

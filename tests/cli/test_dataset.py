@@ -1,12 +1,8 @@
 """Tests of `wamnet dataset`: the same bytes from any number of processes, resumed, and checked."""
 
-import contextlib
 import json
 import os
 import signal
-import subprocess
-import sys
-import time
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,16 +11,15 @@ import pytest
 
 from wamnet import kernels
 from wamnet.cli.common import cluster
-from wamnet.cli.files import dataset_files, exr
+from wamnet.cli.files import exr
 from wamnet.kernels.run import render_frame
 from wamnet.models.data import draws, frame_plan
 from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
+from wamnet.refimpl.frame import SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import from_json, scene_digest
 from wamnet.refimpl.light.scenes import canonical
-from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges, Variation, ranges_from_json, varied
 from wamnet.refimpl.network.denoise import learned_shadow_rays
 
@@ -75,31 +70,6 @@ def test_a_kernel_makes_the_pictures(wamnet, executor_named, tmp_path) -> None:
         near = np.abs(got["color"] - want["color"]) <= 1e-5 * (want["color"] + want["color"].mean())
         assert near.all(axis=-1).mean() >= 0.97
     assert wamnet("dataset", "--check", "-o", "a").status == 0
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("executor", ["opencl", "opengl", "c"])
-def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
-    """A worker opens a device of its own, in a thread that is not its first one."""
-    executor_named({"opengl": "opengl-egl"}.get(executor, executor))
-    for folder, workers in (("a", 1), ("b", 2)):
-        arguments = ("--executor", executor, "--workers", workers, "-o", folder)
-        assert wamnet("dataset", *TINY, *arguments).status == 0
-    assert content(tmp_path / "a") == content(tmp_path / "b")
-
-
-def test_the_sampler_is_the_request_s(wamnet, tmp_path) -> None:
-    """It is in the manifest, and draws the pictures; another one is another data set."""
-    assert wamnet("dataset", *TINY, "--sampler", "sobol", "-o", "a").status == 0
-    manifest = json.loads((tmp_path / "a/manifest.json").read_text())
-    assert manifest["request"]["sampler"] == "sobol"
-    job = Job(12, 12, 4, manifest["frames"][0]["target"]["seed"], Settings(sampler="sobol"))
-    time = manifest["frames"][0]["time_s"]
-    want = render(canonical("minicubes", time=time), job).frame["color"]
-    assert (exr.read_frame(tmp_path / "a/train/00000-target.exr")["color"] == want).all()
-    outcome = wamnet("dataset", *TINY, "-o", "a")
-    assert outcome.status == 2
-    assert "sampler sobol (now pcg4d)" in outcome.err
 
 
 def test_shadow_rays_are_the_request_s(wamnet, tmp_path) -> None:
@@ -192,46 +162,6 @@ def test_bands_on_a_cluster_with_a_worker_killed(wamnet, tmp_path, monkeypatch) 
     assert content(tmp_path / "two") == content(tmp_path / "one")
 
 
-def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
-    """The same bytes through an address."""
-    assert wamnet("dataset", *TINY, "-o", "one").status == 0
-    with cluster.open_client(1, None) as client:
-        address = client.scheduler.address
-        assert wamnet("dataset", *TINY, "--scheduler", address, "-o", "two").status == 0
-    assert content(tmp_path / "two") == content(tmp_path / "one")
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
-def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
-    """The whole group is interrupted, or only the process killed; nothing that was done is redone."""
-    arguments = [str(a) for a in (*TINY[:-3], 36, "--spp", 64, "-o", "a")]
-    command = [sys.executable, "-m", "wamnet.cli", "dataset", *arguments, "--workers", str(workers)]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:
-        try:
-            journal = tmp_path / "a" / dataset_files.UNFINISHED / dataset_files.JOURNAL
-            for _ in range(600):
-                if journal.exists() and journal.read_text().count("\n") >= 2:
-                    break
-                time.sleep(0.05)
-            assert process.poll() is None
-            (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
-            _, errors = process.communicate(timeout=60)
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    if sent == signal.SIGINT:
-        hint = b"wamnet: a: the same command resumes\n"
-        assert (process.returncode, errors) == (130, hint + b"wamnet: interrupted\n")
-    done = list((tmp_path / "a").rglob("0*.exr"))
-    times = {path: path.stat().st_mtime_ns for path in done}
-    assert len(done) >= 2
-    assert wamnet("dataset", *arguments).status == 0
-    assert {path: path.stat().st_mtime_ns for path in done} == times
-    assert wamnet("dataset", *arguments[:-1], "b").status == 0
-    assert content(tmp_path / "a") == content(tmp_path / "b")
-
-
 def test_ranges_and_parameters_are_passed_on(wamnet, tmp_path) -> None:
     """Start, length, a parameter of the scene, depth, arc, camera, lamps."""
     options = ("--start", 1, "--seconds", 2, "--set", "warm=1,0.5,0.5", "--max-depth", 1)
@@ -292,16 +222,6 @@ def test_test_frames_that_were_seen_are_refused(refused, tmp_path) -> None:
 def test_refusals(refused, arguments, text) -> None:
     """Before any work, and without a folder."""
     assert text in refused("dataset", *arguments)
-
-
-def test_noisy_pictures_have_the_history_of_those_before(wamnet, tmp_path) -> None:
-    """By the reference here; targets have none."""
-    assert wamnet("dataset", *TINY, "--before", 2, "-o", "film").status == 0
-    noisy, target = (
-        exr.read_frame(tmp_path / f"film/train/00000-{kind}.exr") for kind in ("noisy", "target")
-    )
-    assert [(name in noisy, name in target) for name in HISTORY] == [(True, False)] * len(HISTORY)
-    assert 0.5 < noisy["history_weight"].max() <= 2 / 3  # of three samples: 1 - 1/3
 
 
 def test_a_missing_device_leaves_no_folder(refused, monkeypatch) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from wamnet.cli.files import dataset_files, exr
 from wamnet.models.blender import session
-from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.errors import ExecutorUnavailable
 
 ROOT = Path(__file__).resolve().parents[2]
 """The project's folder."""
@@ -143,26 +143,6 @@ def test_blender_renders_what_is_requested(wamnet, hall, tmp_path):
     error = np.abs(np.minimum(noisy["color"], 1.0) - np.minimum(target["color"], 1.0)).mean()
     assert 0.0 < error < 0.5
     assert 0.0 < noisy["depth"].max() < 100.0
-
-
-def test_view_layers_and_engines_are_asked_for(hall, tmp_path):
-    """Two view layers want a name; a file for another engine is refused."""
-    two, eevee = tmp_path / "two.blend", tmp_path / "eevee.blend"
-    code = (
-        "import bpy, sys\n"
-        "bpy.ops.wm.open_mainfile(filepath=sys.argv[1])\n"
-        "bpy.context.scene.view_layers.new('front')\n"
-        "bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2], copy=True)\n"
-        "bpy.context.scene.render.engine = 'BLENDER_EEVEE'\n"
-        "bpy.ops.wm.save_as_mainfile(filepath=sys.argv[3], copy=True)\n"
-    )
-    subprocess.run([sys.executable, "-c", code, hall, two, eevee], check=True, capture_output=True)
-    with pytest.raises(InputError, match="2 view layers that are rendered, of ViewLayer, front: name one"):
-        session.Blender(two)
-    with session.Blender(two, "front") as film:
-        assert film.animation.view_layer == "front"
-    with pytest.raises(InputError, match="its render engine is BLENDER_EEVEE"):
-        session.Blender(eevee, "front")
 
 
 def test_a_frame_of_blender_is_denoised_for_its_compositor(wamnet, hall, tmp_path):

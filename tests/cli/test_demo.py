@@ -13,8 +13,7 @@ from wamnet.cli.commands import bench, bench_forms, demo
 from wamnet.cli.files import dataset_files, exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
-from wamnet.cli.reports import machine, runs
-from wamnet.compiler.variants import plan_model
+from wamnet.cli.reports import runs
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.network import train
@@ -176,28 +175,6 @@ def test_a_second_run_reuses_everything(finished, tmp_path, monkeypatch) -> None
     assert results.seconds_per_step > 0
 
 
-def test_a_damaged_frame_is_rendered_again(finished, tmp_path) -> None:
-    """To the same bytes."""
-    folder = tmp_path / "out"
-    shutil.copytree(finished, folder)
-    path = folder / "frames/train/00000-noisy.exr"
-    before = path.read_bytes()
-    path.write_text("damaged")
-    demo.render_frames(demo.for_this_machine(demo.QUICK), folder)
-    assert path.read_bytes() == before
-
-
-def test_another_recipe_is_trained_anew(finished, tmp_path) -> None:
-    """The checkpoint of another seed is not resumed."""
-    folder = tmp_path / "out"
-    shutil.copytree(finished, folder)
-    pairs = [pair for _, pair in demo._pairs(folder, "train")]
-    plan = demo.replace(demo.QUICK, seed=7, steps=3)
-    _, state, _ = demo.train_network(plan, pairs, folder)
-    assert state.step == 3
-    assert state.recipe.seed == 7
-
-
 def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
     """And both are reported to the user."""
     from wamnet.refimpl.errors import ExecutorUnavailable
@@ -240,12 +217,6 @@ def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
     assert found[1] == runs.Run("opencl", missing="opencl: nothing there")
 
 
-def test_a_target_that_promises_nothing_has_no_bound(finished) -> None:
-    """OpenGL's own sine."""
-    plan = plan_model(load_model(finished / "model.safetensors"), "opengl", "native")
-    assert runs.frame_bound(plan, first_noisy(finished)) is None
-
-
 def test_a_scene_file_is_shown_from_views(wamnet, tmp_path) -> None:
     """Its data set, its preset and its plan: the SHA-256 makes a changed file another plan."""
     assert wamnet("scene", "glossy", "-o", "mine.json").status == 0
@@ -268,15 +239,6 @@ def test_refusals(refused, tmp_path) -> None:
     (tmp_path / "a").write_text("hello")
     assert "output folder 'a': is a file (choose another with -o" in refused("demo", "-o", "a")
     assert "width 0: must be an integer" in refused("demo", "--size", 0)
-
-
-def test_the_machine_is_described() -> None:
-    """Where the system says nothing, the report says unknown."""
-    facts = machine.describe()
-    assert set(facts) == {"processor", "cores", "memory", "system", "Python"}
-    assert int(facts["cores"]) >= 1
-    assert "numpy" in machine.versions()
-    assert machine._first_value("/no/such/file", "x") == ""
 
 
 def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
@@ -306,25 +268,6 @@ def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -
     hint = f"{command.split()[-1]}: the same command resumes (wamnet demo {command})"
     assert outcome.err == f"wamnet: {hint}\nwamnet: interrupted\n"
     assert outcome.status == 130
-
-
-@pytest.mark.parametrize("content", [None, b"", b"fast", b"\xff", b"nan", b"-1"])
-def test_an_unknown_time_is_no_error(finished, report, tmp_path, content) -> None:
-    """The report has a dash, and the curve no second axis."""
-    from wamnet.cli.reports import plots
-    from wamnet.cli.reports.report import page
-
-    path = tmp_path / "seconds.txt"
-    if content is not None:
-        path.write_bytes(content)
-    assert demo._seconds(path) is None
-    assert plots.training_curve([(1, 0.5), (2, 0.25)], None, plots.LIGHT).startswith(b"\x89PNG")
-    plan = {**report["plan"], "trainer": "numpy"}
-    data = {**report, "plan": plan, "training": {**report["training"], "seconds_per_step": None}}
-    pictures = [dict.fromkeys(("noisy", "denoised", "reference", "normal"), "")] * 2
-    plot = {"light": "", "dark": ""}
-    drawn = {"errors": [{"input": plot, "denoised": plot}] * 2, "training": plot}
-    assert f"<dd>– <small>{demo.QUICK.steps} steps</small>" in page(data, pictures, drawn)
 
 
 def test_the_report_tells_whose_picture_it_is(finished, report) -> None:

@@ -1,7 +1,6 @@
 """Tests of `wamnet compile`, `wamnet denoise` and `wamnet executors`."""
 
 import json
-import os
 import re
 import shutil
 
@@ -13,7 +12,6 @@ from wamnet.cli.commands import denoise
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.kernels import denoise_on, open_executor
-from wamnet.kernels.devices.registry import CONTEXT_VARIABLE
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import ExecutorUnavailable
@@ -70,30 +68,6 @@ def test_pixels_that_are_no_numbers_are_named_and_read_by_the_rule(wamnet, here,
     assert np.isfinite(expected).all()
     assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
     assert wamnet("compare", "bad.exr", "noisy.exr").status == 2
-
-
-@pytest.mark.parametrize("kind", ["egl", "osmesa"])
-def test_the_kind_of_context_is_an_option(wamnet, here, executor_named, kind) -> None:
-    """The device's line names it, and the environment is as before."""
-    executor_named(f"opengl-{kind}")
-    before = os.environ.get(CONTEXT_VARIABLE)
-    devices = ("--executor", "opengl", "--context", kind)
-    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", *devices)
-    assert outcome.status == 0
-    assert f" through {kind})" in outcome.out
-    assert os.environ.get(CONTEXT_VARIABLE) == before
-    assert wamnet("denoise", "model.safetensors", "noisy.exr", "--context", "x11").status == 2
-
-
-def test_a_rank_cuts_the_first_layer(wamnet, here) -> None:
-    """The picture is that of denoise_on with this rank, and the output says what the cut costs."""
-    outcome = wamnet("denoise", "model.safetensors", "noisy.exr", "--rank", 2)
-    assert outcome.status == 0
-    assert "variant rank2: " in outcome.out
-    with open_executor("numpy") as executor:
-        model, noisy = load_model(here / "model.safetensors"), exr.read_frame(here / "noisy.exr")
-        expected = denoise_on(executor, model, noisy, variant="rank2").image
-    assert (encoding.to_8bit(read_png(here / "denoised.png")) == encoding.to_8bit(expected)).all()
 
 
 @pytest.mark.parametrize(
@@ -189,15 +163,6 @@ def test_a_schedule_by_name(wamnet, refused, here) -> None:
     assert "schedule 'tile:8': unknown to this target (choose one of plain" in line
     line = refused("compile", "cornell", *opencl, "--schedule", "tile:8")
     assert "--schedule 'tile:8': cornell is a scene, whose kernels have one schedule" in line
-
-
-def test_a_schedule_that_does_not_hold_the_model(wamnet, here, monkeypatch) -> None:
-    """The plain kernel is written, and the reason is said."""
-    monkeypatch.setattr("wamnet.compiler.schedules.schedules.LARGEST_PRIVATE", 100)
-    outcome = wamnet("compile", "model.safetensors", "--target", "opencl", "--schedule", "tile:8")
-    assert outcome.status == 0
-    assert "schedule plain, not tile:8: its arrays take" in outcome.out
-    assert json.loads((here / "opencl/manifest.json").read_text())["schedule"]["name"] == "plain"
 
 
 def test_refusals_of_compile(refused, here) -> None:

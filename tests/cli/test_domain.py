@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.cli.commands import animate
 from wamnet.cli.common.domain import Watch
 from wamnet.cli.files import exr
 from wamnet.kernels.run.trainer import facts_of, with_domain
@@ -53,16 +52,6 @@ def here(stating, tmp_path):
     return tmp_path
 
 
-def test_a_frame_inside_is_no_matter(wamnet, here) -> None:
-    """Nothing is said; of another program's frame, which layers are read."""
-    assert BEYOND not in wamnet("denoise", "m.safetensors", "own.exr").out
-    outcome = wamnet("denoise", "m.safetensors", "foreign.exr")
-    assert outcome.status == 0
-    read = "of which the model, trained on minicubes, reads color, normal"
-    assert f"foreign.exr: another program's frame, {read}\n" in outcome.out
-    assert BEYOND not in outcome.out
-
-
 def test_one_sentence_says_all(wamnet, here) -> None:
     """Another scene of our own: its distance, the channel, and what is known by name; it is denoised."""
     outcome = wamnet("denoise", "m.safetensors", "cornell.exr")
@@ -95,35 +84,6 @@ def test_a_domain_that_cannot_be_read(refused, here, text) -> None:
     model = load_model(here / "m.safetensors")
     save_model(here / "m.safetensors", replace(model, info={domain.DOMAIN: text}))
     assert "domain" in refused("denoise", "m.safetensors", "own.exr")
-
-
-def test_an_animation_counts_its_pictures(wamnet, here) -> None:
-    """All pictures of another scene are outside, none of the one that was learned."""
-    short = ("--seconds", 0.4, "--fps", 5, "--size", 13, "--feature-spp", 0)
-    assert "outside" not in wamnet("animate", "m.safetensors", *short, "--start", 3, "-o", "own").out
-    outcome = wamnet("animate", "m.safetensors", *short, "--scene", "cornell", "-o", "other")
-    assert "other: 2 of 2 frames are outside the model's domain; the farthest is 0000" in outcome.out
-    assert "png: distance " in outcome.out
-
-
-@pytest.mark.nightly(but="opengl")
-@pytest.mark.parametrize("name", ["opencl", "opengl"])
-def test_a_pipeline_measures_the_same_pictures(here, monkeypatch, executor_named, wamnet, name) -> None:
-    """Its images are those of the separate way within rounding: distances differ by little.
-
-    Encodings are at most 1e-5 apart, and paths that differ by rounding may go another way in few pixels; both
-    move a mean by less than 1e-3, which is a quarter of the least scale.
-    """
-    executor_named({"opengl": "opengl-egl"}.get(name, name))
-    seen: list[Watch] = []
-    monkeypatch.setattr(Watch, "report", lambda watch, _output: seen.append(watch))
-    devices = ("--executor", name, "--renderer", name, "--seconds", 0.4, "--fps", 5, "--size", 13)
-    for folder in ("one", "apart"):
-        assert wamnet("animate", "m.safetensors", *devices, "--scene", "cornell", "-o", folder).status == 0
-        monkeypatch.setattr(animate, "draw_frames", animate.draw_apart)
-    one, apart = ([found for _, found in watch.pictures] for watch in seen)
-    assert len(one) == len(apart) == 2
-    assert all(abs(a.distance - b.distance) <= 0.3 for a, b in zip(one, apart, strict=True))
 
 
 def test_a_model_without_a_domain_watches_nothing(samples, tmp_path) -> None:

@@ -1,13 +1,12 @@
 """Tests of what is said before large work: when, how much, in which words; small work says nothing."""
 
-import json
 from dataclasses import replace
 
 import pytest
 
 from wamnet.cli.common import effort
 from wamnet.kernels.run import before, render_frame
-from wamnet.refimpl.light.scene import Box, to_json
+from wamnet.refimpl.light.scene import Box
 from wamnet.refimpl.light.scenes import canonical
 
 
@@ -50,58 +49,11 @@ def test_data_sets_say_it_too(started):
     assert line.startswith("30 primitives and 4,096,004,096 samples: by a rule of thumb about ")
 
 
-def test_animations_say_it_too(started, samples):
-    """Noisy and reference pictures together, 5 of each."""
-    few = ("animate", samples / "model.safetensors", "--scene", "minicubes", "--seconds", 1, "--fps", 5)
-    assert started(*few, "--size", 8, "-o", "few") == ""
-    line = started(*few, "--size", 100, "--reference-spp", 20_000, "-o", "many")
-    assert line.startswith("30 primitives and 1,000,050,000 samples: by a rule of thumb about ")
-
-
-def test_demonstrations_say_what_learning_takes(wamnet, capsys, monkeypatch):
-    def stop(*_args):
-        raise StoppedError("the work begins")
-
-    monkeypatch.setattr("wamnet.cli.commands.demo.render_frames", stop)
-    with pytest.raises(StoppedError, match="the work begins"):
-        wamnet("demo", "--size", 2048, "-o", "large")
-    assert "to learn from: by a rule of thumb " in capsys.readouterr().out
-
-
-def test_benchmarks_say_it_too(wamnet, capsys, monkeypatch):
-    def stop(*_args, **_options):
-        raise StoppedError("the work begins")
-
-    monkeypatch.setattr("wamnet.kernels.bench.contest.Contest.run", stop)
-    paper = ("bench", "paper", "--synthetic", "--only", "numpy:plain", "--repeats", 1)
-    for numbers, text in [
-        (("--size", 8), ""),
-        (
-            ("--size", 8, "--sizes", "16,32", "--budget", 1000),
-            "1 program and images of up to 1,024 pixels: by a rule of thumb about 50 minutes and 1 MiB "
-            "of memory at most, compilation left out; Ctrl-C stops it\n",
-        ),
-    ]:
-        with pytest.raises(StoppedError, match="the work begins"):
-            wamnet(*paper, *numbers, "-o", "speed")
-        assert capsys.readouterr().out == text
-
-
 def test_many_primitives_are_said_before_they_start(started, monkeypatch):
     monkeypatch.setattr(effort, "MANY_PRIMITIVES", 30)
     assert started("render", "minicubes").startswith("30 primitives and 65,536 samples: by a rule of thumb")
     line = started("compile", "minicubes", "--target", "opencl")
     assert line.startswith("30 primitives: by a rule of thumb")
-
-
-@pytest.mark.nightly
-def test_a_file_of_a_hundred_thousand_boxes_is_read_and_said(started, tmp_path):
-    """It was refused by the reader: 103 values too many."""
-    data = json.loads(to_json(canonical("minicubes", time=1.0)))
-    data["boxes"] = (data["boxes"] * 4000)[:100_000]
-    (tmp_path / "many.json").write_text(json.dumps(data))
-    line = started("render", tmp_path / "many.json", "--width", 4, "--height", 4)
-    assert line.startswith("100,003 primitives and 16 samples: by a rule of thumb about ")
 
 
 def test_many_boxes_are_grouped_in_one_look():
@@ -117,17 +69,6 @@ def test_many_boxes_are_grouped_in_one_look():
     boxes = tuple(replace(box, rotation=Rotation(box.rotation)) for box in scene.boxes * 10)
     Box.parts(replace(scene, boxes=boxes))
     assert len(looks) == len(boxes)
-
-
-def test_kernels_take_less_and_more_processes_too():
-    numbers = (1000, 10**6, 10**4)
-    alone = effort.seconds_of(*numbers, "numpy", 1)
-    assert effort.seconds_of(*numbers, "numpy", 4) == pytest.approx(
-        alone / 4, rel=1e-15
-    )  # a rounding or two of 2**-53
-    assert effort.seconds_of(*numbers, "opencl", 1) == pytest.approx(
-        10.0, rel=1e-15
-    )  # a rounding or two of 2**-53
 
 
 @pytest.mark.parametrize(

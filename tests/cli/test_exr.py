@@ -100,24 +100,6 @@ def test_a_frame_that_does_not_fit_the_memory_is_refused_before_its_pixels(
     assert exr.read_frame(path).width == 5
 
 
-def test_float64_is_rounded_to_float32(tmp_path: Path) -> None:
-    """EXR has no wider float; rounding is NumPy's, to nearest."""
-    frame = Frame({"color": np.random.default_rng(1).random((4, 5, 3))})
-    exr.write_frame(tmp_path / "a.exr", frame)
-    assert (exr.read_frame(tmp_path / "a.exr")["color"] == frame["color"].astype(np.float32)).all()
-
-
-def test_what_others_see(tmp_path: Path) -> None:
-    """The channel names of the specification, float32, lossless, text attributes."""
-    exr.write_frame(tmp_path / "a.exr", random_frame(3, 2))
-    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
-        names = sorted(file.channels())
-        header = dict(file.header())
-    assert names == sorted(name for group in exr.CHANNELS.values() for name in group)
-    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
-    assert header["wamnet.scene"] == "minicubes"
-
-
 @pytest.mark.parametrize(
     ("layer", "channels"),
     [
@@ -140,12 +122,6 @@ def test_names_of_other_programs(tmp_path: Path, layer: str, channels: dict[str,
     frame = exr.read_frame(write(tmp_path / "a.exr", channels | extra))
     assert list(frame.layers) == [layer]
     assert (frame[layer] == np.arange(1.0, 1.0 + LAYERS[layer].channels)).all()
-
-
-def test_the_best_alias_wins(tmp_path: Path) -> None:
-    """Plain R, G, B before a layer called beauty."""
-    path = write(tmp_path / "a.exr", rgb(4, 5, 6, prefix="beauty.") | rgb(1, 2, 3))
-    assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
 
 
 def test_of_a_denoised_and_a_noisy_image_the_noisy_one_is_read(tmp_path: Path) -> None:
@@ -194,18 +170,6 @@ def test_tiles_and_windows(tmp_path: Path) -> None:
     assert (frame.height, frame.width) == (2, 3)
 
 
-def test_several_parts(tmp_path: Path) -> None:
-    """Layers may lie in parts of their own."""
-    parts = [
-        OpenEXR.Part({"name": "a", "type": OpenEXR.scanlineimage}, rgb(1, 2, 3)),
-        OpenEXR.Part({"name": "b", "type": OpenEXR.scanlineimage}, rgb(4, 5, 6, prefix="albedo.")),
-    ]
-    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
-    frame = exr.read_frame(tmp_path / "a.exr")
-    assert (frame["color"] == [1, 2, 3]).all()
-    assert (frame["albedo"] == [4, 5, 6]).all()
-
-
 def test_parts_that_do_not_coincide_are_refused(tmp_path: Path) -> None:
     """Two parts of one size at different places would be shifted silently."""
     shifted = {"dataWindow": (np.array([1, 0], np.int32), np.array([3, 1], np.int32))}
@@ -252,21 +216,6 @@ def test_no_known_layer(tmp_path: Path) -> None:
         exr.read_frame(path)
 
 
-def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
-    """Left and right eye: no guess."""
-    channels = rgb(1, 2, 3, prefix="left.albedo.") | rgb(1, 2, 3, prefix="right.albedo.")
-    told = r"layers 'left\.albedo, right\.albedo': each of them could be albedo \(export one of them alone"
-    with pytest.raises(InputError, match=told):
-        exr.read_frame(write(tmp_path / "a.exr", channels))
-
-
-def test_integer_pixels(tmp_path: Path) -> None:
-    """Object identifiers are not colour."""
-    path = write(tmp_path / "a.exr", {name: plane(1, np.uint32) for name in "RGB"})
-    with pytest.raises(InputError, match="pixels of color 'uint32': must be half or float"):
-        exr.read_frame(path)
-
-
 def test_pixels_that_are_not_finite(tmp_path: Path) -> None:
     """The file, the layer, the place and the number are reported."""
     channels = rgb(1, 2, 3)
@@ -283,31 +232,6 @@ def test_an_invalid_frame_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="layer 'color' at x=0, y=0"):
         exr.write_frame(tmp_path / "a.exr", Frame({"color": np.full((1, 1, 3), np.nan)}))
     assert not list(tmp_path.iterdir())
-
-
-def test_ctrl_c_while_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The writer dies in the middle of the file: the old file is as it was, and nothing else is there."""
-    out = tmp_path / "a.exr"
-    exr.write_frame(out, random_frame(2, 2))
-    before = out.read_bytes()
-
-    class Interrupted:
-        ZIP_COMPRESSION = scanlineimage = None
-
-        def Part(self, *_: object) -> None:
-            pass
-
-        def File(self, *_: object) -> "Interrupted":
-            return self
-
-        def write(self, name: str) -> None:
-            Path(name).write_bytes(b"half")
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(exr, "need", lambda *_: Interrupted())
-    with pytest.raises(KeyboardInterrupt):
-        exr.write_frame(out, random_frame(3, 3))
-    assert [p.read_bytes() for p in tmp_path.iterdir()] == [before]
 
 
 @pytest.mark.parametrize(

@@ -65,16 +65,6 @@ def test_table_has_a_row_for_each_scene_and_way(printed) -> None:
     assert "8x8, 2 spp, 6 edges" in text
 
 
-def test_one_turn_has_no_error_to_compare_with(printed) -> None:
-    assert "mean colour" not in printed("--scenes", "empty", "--by", "opencl,numpy", "--repeats", 1)
-
-
-def test_depth_counts_edges(printed) -> None:
-    """A furnace of albedo a and emission 1 shows 1 + a + .. + a^(depth - 1): 1.75 for a = 1/2 and depth 3."""
-    text = printed("--scenes", "furnace", "--by", "opencl,numpy", "--repeats", 2, "--depth", 3)
-    assert "opencl's 1.750000" in text
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -129,15 +119,6 @@ def test_each_help_has_examples(wamnet, name) -> None:
     assert outcome.status == 0
     assert f"wamnet bench {name}" in outcome.out.split("Examples")[1]
     assert "default:" in outcome.out
-
-
-def test_the_help_of_bench_has_its_options_and_the_commands(wamnet) -> None:
-    outcome = wamnet("bench", "--help")
-    assert outcome.status == 0
-    usage, commands = outcome.out.split("Commands", 1)
-    assert "wamnet bench [OPTIONS] [MODEL] | COMMAND [OPTIONS]" in usage
-    assert "--train-variants" in usage
-    assert [line.split()[1] for line in commands.splitlines()[1:6]] == list(COMMANDS)
 
 
 def test_other_first_arguments_are_models(refused) -> None:

@@ -32,14 +32,6 @@ def test_the_frame_is_the_references(wamnet, tmp_path) -> None:
     assert got.info["spp"] == "2"
 
 
-def test_the_sampler_is_passed_on(wamnet, tmp_path) -> None:
-    assert wamnet("render", "furnace", "--width", 2, "--height", 2, "--sampler", "sobol").status == 0
-    want = render(canonical("furnace"), Job(2, 2, 1, 0, Settings(sampler="sobol"))).frame
-    got = exr.read_frame(tmp_path / "furnace.exr")
-    assert all((got[name] == values).all() for name, values in want.layers.items())
-    assert got.info["sampler"] == "sobol"
-
-
 def test_double_precision_and_parameters(wamnet, tmp_path) -> None:
     """A furnace is uniform: float64 in the file is float64 rounded to float32."""
     arguments = [
@@ -69,15 +61,6 @@ def test_three_numbers(wamnet, tmp_path) -> None:
     )
     want = scene_digest(canonical("minicubes", warm=(1.0, 0.0, 0.0)))
     assert exr.read_frame(tmp_path / "a.exr").info["scene_digest"] == want
-
-
-def test_features_of_more_rays(wamnet, tmp_path) -> None:
-    """The file has them, and says of how many rays they are means."""
-    size = ("--width", 4, "--height", 3)
-    assert wamnet("render", "cornell", *size, "--feature-spp", 6, "-o", "a.exr").status == 0
-    found, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(4, 3, feature_spp=6))
-    assert all((found[name] == values).all() for name, values in want.frame.layers.items())
-    assert found.info["feature_spp"] == "6"
 
 
 def test_what_is_seen_past_mirrors(wamnet, tmp_path) -> None:
@@ -209,13 +192,6 @@ def test_a_kernel_s_work_is_not_shared_by_processes(wamnet) -> None:
     outcome = wamnet("render", "cornell", "--executor", "opencl", "--workers", 2)
     assert outcome.status == 2
     assert "workers 2: opencl shares the work by itself (leave it out" in outcome.err
-
-
-def test_a_kernel_computes_in_float32(wamnet, executor_named) -> None:
-    executor_named("opencl")
-    outcome = wamnet("render", "cornell", "--executor", "opencl", "--dtype", "float64")
-    assert outcome.status == 2
-    assert "dtype 'float64': kernels compute in float32" in outcome.err
 
 
 @pytest.mark.parametrize("command", ["render", "scene"])

@@ -61,19 +61,6 @@ def test_resuming_gives_the_same_bits(wamnet, pair, tmp_path) -> None:
     assert (tmp_path / "parts.safetensors").read_bytes() == (tmp_path / "whole.safetensors").read_bytes()
 
 
-def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
-    """When the interval is over, the next log line keeps a checkpoint, before the last step."""
-    kept = []
-    monkeypatch.setattr(train, "CHECKPOINT_INTERVAL_S", -1.0)
-    monkeypatch.setattr(
-        "wamnet.models.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
-    )
-    frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
-    recipe = train.choose_recipe("best", None, {"features": ("color",), "steps": 4})
-    train.fit(train.replace(recipe, log_every=2), frames, tmp_path / "m.safetensors")
-    assert kept == [2, 4, 4]
-
-
 @pytest.mark.parametrize(
     ("options", "text"),
     [
@@ -145,18 +132,6 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
     assert "steps 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
 
 
-def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
-    """It resumes, or is replaced, only on request."""
-    assert wamnet("train", *pair, "--steps", 2).status == 0
-    line = refused("train", *pair, "--steps", 3)
-    assert "checkpoint 'model.checkpoint.safetensors': belongs to an earlier run" in line
-    assert "--resume" in line
-    assert "--restart" in line
-    assert wamnet("train", *pair, "--steps", 3, "--restart").status == 0
-    assert load_checkpoint(tmp_path / "model.checkpoint.safetensors").step == 3
-    assert "choose one of them" in refused("train", *pair, "--resume", "--restart")
-
-
 def test_resuming_has_its_own_recipe(wamnet, refused, pair) -> None:
     """A preset is refused; another number of steps is told to give another model."""
     assert wamnet("train", *pair, "--steps", 2).status == 0
@@ -202,24 +177,6 @@ def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
     assert "widths, omegas and activation of the first network (" in refused("train", *others)
 
 
-@pytest.mark.nightly
-def test_another_activation(wamnet, refused, pair, tmp_path, executor_named) -> None:
-    """Trained by the compiled trainer, resumed by the reference, and run within its bound."""
-    executor_named("opencl")
-    options = ("--activation", "relu", "--steps", 4, "--executor", "opencl", "-o", "m.safetensors")
-    assert wamnet("train", *pair, *options).status == 0
-    assert wamnet("train", *pair[:4], "--resume", "--steps", 6, "-o", "m.safetensors").status == 0
-    assert load_model(tmp_path / "m.safetensors").siren.activation == "relu"
-    assert wamnet("compile", "m.safetensors", "--target", "opencl", "-o", "kernel").status == 0
-    assert wamnet("certify", "kernel/denoise.certificate.json").status == 0
-    assert wamnet("denoise", "m.safetensors", "noisy.exr", "-o", "p.png", "--executor", "opencl").status == 0
-    text = "activation 'tanh': unknown (choose one of sine, relu"
-    assert text in refused("train", *pair, "--activation", "tanh", "-o", "x.safetensors")
-    text = "--variant 'rank4': it chooses what --activation does (leave out --activation"
-    more = ("--from", "m.safetensors", "--variant", "rank4", "--activation", "sine", "-o", "x.safetensors")
-    assert text in refused("train", *pair[:4], *more)
-
-
 def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -> None:
     """The model is train_on's, to the bit; a checkpoint of one executor is resumed by the other."""
     device = executor_named("opencl")
@@ -235,22 +192,6 @@ def test_training_on_a_device(wamnet, refused, pair, tmp_path, executor_named) -
     assert resumed.status == 0
     assert load_checkpoint(tmp_path / "m.checkpoint.safetensors").step == 8
     assert "Invalid value for '--executor'" in refused("train", *pair, "--executor", "opengl", "--restart")
-
-
-def test_factors_are_trained_on_a_device(wamnet, pair, tmp_path, executor_named) -> None:
-    """From a model in full: train_on's model, to the bit; NumPy continues from its checkpoint."""
-    device = executor_named("opencl")
-    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
-    more = ("--from", "full.safetensors", "--rank", 4, "--steps", 3, "-o", "cut.safetensors")
-    assert wamnet("train", *pair, *more, "--executor", "opencl").status == 0
-    recipe = train.choose_recipe("best", None, {"features": ("color", "normal"), "steps": 3, "rank": 4})
-    frames = exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr")
-    want = train_on(device, recipe, [frames], network=load_model(tmp_path / "full.safetensors").siren)
-    got = load_checkpoint(tmp_path / "cut.checkpoint.safetensors")
-    assert all((a == b).all() for a, b in zip(got.parameters, want.parameters, strict=True))
-    resumed = wamnet("train", *pair[:4], "--resume", "--steps", 5, "-o", "cut.safetensors")
-    assert resumed.status == 0
-    assert load_checkpoint(tmp_path / "cut.checkpoint.safetensors").step == 5
 
 
 def test_a_model_is_rounded_on_frames(wamnet, refused, pair, tmp_path) -> None:
@@ -308,19 +249,6 @@ def _stopped_after(count: int, step):
         return step(*arguments)
 
     return stopped
-
-
-def test_a_narrower_network_is_trained_and_rounded(wamnet, pair, tmp_path, executor_named) -> None:
-    """window8+whole8: the window is cut, the compiled trainer moves floats, the end is of integers."""
-    executor_named("opencl")
-    assert wamnet("train", *pair, "--steps", 2, "-o", "full.safetensors").status == 0
-    more = ("--from", "full.safetensors", "--variant", "window8+whole8", "--steps", 3)
-    options = (*pair[:4], *more, "--executor", "opencl", "-o", "w.safetensors")
-    assert wamnet("train", *options).status == 0
-    found = load_model(tmp_path / "w.safetensors")
-    assert found.is_whole
-    assert found.window.size == 8
-    assert load_checkpoint(tmp_path / "w.checkpoint.safetensors").siren.widths == found.siren.widths
 
 
 @pytest.mark.parametrize(

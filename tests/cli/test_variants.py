@@ -12,7 +12,6 @@ from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
 from wamnet.kernels import cache, denoise_on, open_executor
-from wamnet.kernels.run import measure_curve
 from wamnet.kernels.run.curve import Curve, Point
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
@@ -34,19 +33,6 @@ def here(samples, tmp_path, monkeypatch):
     data = Curve(digest, "somewhere", (64, 64), "ieee", tuple(points)).as_data()
     (tmp_path / "curve.json").write_text(json.dumps(data))
     return tmp_path
-
-
-def test_a_variant_is_compiled(wamnet, here) -> None:
-    outcome = wamnet(
-        *("compile", "model.safetensors", "--target", "opencl", "--variant", "window3+rank2", "-o", "k")
-    )
-    assert outcome.status == 0
-    manifest = json.loads((here / "k" / "manifest.json").read_text())
-    assert manifest["variant"]["name"] == "window3+rank2"
-    assert (here / "k" / "horizontal.denoise.cl").exists()
-    assert sorted(path.name for path in (here / "k").iterdir()) == sorted(
-        [*manifest["files"], "manifest.json"]
-    )
 
 
 def test_a_variant_denoises(wamnet, here) -> None:
@@ -97,27 +83,6 @@ def test_a_curve_is_chosen_from(wamnet, here) -> None:
     assert "not window3, schedule tile:8: --max-error 0.01 (0.1)" in outcome.out
     outcome = wamnet(*COMPILE, "--max-error", 0.2, "--schedule", "plain", "--curve", "curve.json")
     assert "chosen: full, schedule plain" in outcome.out
-
-
-@pytest.mark.nightly
-def test_a_curve_is_measured_once_and_kept(wamnet, here, monkeypatch) -> None:
-    """Then read from the cache; measured again where that is damaged, or the model is another."""
-    made = wamnet(
-        *("dataset", "minicubes", "--frames", 1, "--test", 1, "--size", 12, "--spp", 1, "-o", "set")
-    )
-    assert made.status == 0, made.err
-    monkeypatch.setattr(measure_curve, "NAMES", ("full", "rank2"))
-    monkeypatch.setattr(measure_curve.names_for, "__defaults__", (("full", "rank2"),))
-    command = (*COMPILE, "--max-error", 1.0, "--frames", "set", "--size", 17)
-    first = wamnet(*command)
-    assert first.status == 0, first.err
-    # Two variants under two schedules.
-    assert first.out.startswith("curve: 4 points, measured now, cached in ")
-    (entry,) = (here / "cache").glob("curve-*.json")
-    again = wamnet(*command)
-    assert again.out.startswith("curve: 4 points, measured before, cached in ")
-    entry.write_text(entry.read_text().replace("tile", "file"))
-    assert wamnet(*command).out.startswith("curve: 4 points, measured now, cached in ")
 
 
 REFUSED = {

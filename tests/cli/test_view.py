@@ -112,16 +112,6 @@ def test_the_page_is_served_to_this_machine(wamnet, here, monkeypatch):
     assert found["page"] == "<!DOCTYPE html>"
 
 
-def test_no_browser_where_none_is_wanted(wamnet, here, monkeypatch):
-    def stop(server):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(view.webbrowser, "open", lambda address: pytest.fail("a browser was opened"))
-    monkeypatch.setattr(view.PageServer, "serve_forever", stop)
-    monkeypatch.setattr(view, "page_of", lambda *_: "")
-    assert wamnet("view", "model.safetensors", "--no-browser").status == 0
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -199,6 +189,7 @@ def test_who_names_this_machine_gets_the_page(served, name):
     assert body == PAGE
 
 
+@pytest.mark.product
 @pytest.mark.parametrize(
     "host",
     [
@@ -214,16 +205,6 @@ def test_who_names_another_machine_gets_nothing(served, method, host):
     found = answer_to(port, f"{method} / HTTP/1.1\r\n{host.format(port=port)}\r\n")
     assert found.startswith(b"HTTP/1.0 421 ")
     assert PAGE not in found
-
-
-def test_a_head_is_answered_without_the_page(served):
-    port = served()
-    found = answer_to(port, f"HEAD / HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n")
-    assert found.startswith(b"HTTP/1.0 200 ")
-    assert f"Content-Length: {len(PAGE)}".encode() in found
-    assert found.endswith(b"\r\n\r\n")
-    missing = answer_to(port, f"HEAD /../../etc/passwd HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n")
-    assert missing.startswith(b"HTTP/1.0 404 ")
 
 
 def test_connections_are_few_and_make_room(served):

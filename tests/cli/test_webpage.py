@@ -6,7 +6,6 @@ A small network and few bounces: SwiftShader traces and denoises 40 x 40 pixels 
 import json
 import shutil
 import subprocess
-from base64 import b64decode
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -308,78 +307,6 @@ def test_rays_are_those_of_the_model(model, data):
     many = replace(model, info={**model.info, "trained_on_feature_spp": "16, 4"})
     animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
     assert P.page_data(animation, P.networks_of(many, rank=4)[:1], SETTINGS)["variants"][0]["rays"] == 4
-
-
-def test_ready_is_what_has_drawn(chromium, path):
-    """On a slow device seconds pass between the check and the first picture: nothing is claimed meanwhile."""
-    script = """
-      window.heard = [];
-      addEventListener("DOMContentLoaded", () => {
-        const status = document.getElementById("status");
-        const listen = () => heard.push([status.textContent, Boolean(window.wamnet?.page.times.length)]);
-        new MutationObserver(listen).observe(status, { childList: true, characterData: true, subtree: true });
-      });
-    """
-    with chromium.tab(path, script, **NO_MOTION) as tab:
-        tab.page.evaluate("wamnet.ready")
-        tab.until("document.getElementById('status').textContent.startsWith('Ready')")
-        heard = tab.page.evaluate("heard")
-        assert [drawn for text, drawn in heard if text.startswith("Ready")] == [True]
-        said = [text for text, _ in heard]
-        assert said.index("Checking the network on this device.") < said.index("Drawing the first picture.")
-
-
-POSTER = """(() => {
-  const canvas = document.getElementById("poster-picture");
-  const { width, height } = canvas;
-  const box = document.getElementById("poster").getBoundingClientRect();
-  const view = document.getElementById("picture").getBoundingClientRect();
-  const pixels = [...canvas.getContext("2d").getImageData(0, 0, width, height).data];
-  return { width, pixels, apart: Math.abs(box.top - view.top) + Math.abs(box.bottom - view.bottom) };
-})()"""
-"""The poster's pixels, and how far it is from the place of the picture."""
-
-
-HOLD = """
-const later = window.requestAnimationFrame.bind(window);
-const waiting = [];
-window.requestAnimationFrame = (action) => waiting.push(action);
-window.release = () => {
-  window.requestAnimationFrame = later;
-  waiting.forEach(later);
-};
-"""
-"""No frame comes before the test releases them: nothing is drawn, and nothing finishes compiling."""
-
-
-def test_a_poster_shows_what_happens_until_a_picture_is_drawn(chromium, path, data):
-    """The reference's picture of the page's check, on the canvas, and the status with its progress."""
-    with chromium.tab(path, HOLD, **NO_MOTION) as tab:
-        found = tab.page.evaluate(POSTER)
-        assert (found["width"], found["apart"]) == (P.CHECK_PX, 0)
-        expected = np.frombuffer(b64decode(data["variants"][0]["check"]["expected"]), "<f8")
-        shown = np.reshape(found["pixels"], (-1, 4))[:, :3].ravel()
-        assert np.max(np.abs(shown - np.clip(255 * expected, 0, 255))) <= 0.5  # rounded to 8 bits
-        assert tab.text("poster-text") == tab.text("status") != ""
-        for name in ("#poster", "#poster-progress"):
-            assert tab.page.locator(name).is_visible()
-        tab.page.evaluate("release()")
-        tab.page.evaluate("wamnet.ready")
-        assert not tab.page.locator("#poster").is_visible()
-        assert tab.said == []
-
-
-@pytest.mark.nightly
-def test_it_plays_where_motion_is_welcome(chromium, path):
-    with chromium.tab(path) as tab:
-        tab.page.evaluate("wamnet.page.change({ size: 64 })")
-        tab.page.evaluate("wamnet.ready")
-        assert tab.text("status").startswith("Ready. The animation is playing.")
-        tab.until("wamnet.page.state.seed > 2 && wamnet.page.frame() > 0")
-        tab.page.locator("#play").press("Enter")  # a click would wait for the picture to stand still
-        assert tab.text("play") == "Play"
-        assert tab.text("status") == "The animation is paused."
-        assert tab.said == []
 
 
 def test_it_stands_still_where_motion_is_not(still):

@@ -134,6 +134,7 @@ def test_camera_and_lights_move_inside_of_what_was_learned(still):
     assert still.state("colors") == [list(scenes.WARM), list(scenes.COOL)]
 
 
+@pytest.mark.product
 @pytest.mark.parametrize("times", [(0.0, 8.0), (1.0, 3.0), (7.0, 9.0)], ids=str)
 @pytest.mark.parametrize("saturation", [None, (0.0, 0.5)], ids=str)
 @pytest.mark.parametrize("power", [None, (0.5, 2.0)], ids=str)

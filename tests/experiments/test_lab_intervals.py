@@ -73,21 +73,7 @@ def test_what_methods_share_cancels_in_their_difference():
     assert interval(mine).low - poses.mean() < found.low
 
 
-def test_a_lone_value_has_no_interval():
-    assert interval([[31.25]]).text(1) == "31.2"
-    assert interval([[1.0, 1.0]]).text() == "1.00 [1.00, 1.00]"
-
-
 @pytest.mark.parametrize("values", [[], [[]], [[1.0], [1.0, 2.0]], [math.nan], [[[1.0]]]])
 def test_what_has_no_interval_is_refused(values):
     with pytest.raises(InputError, match="must be finite numbers, seeds by poses"):
         interval(values)
-
-
-def test_other_poses_and_levels_are_refused():
-    with pytest.raises(InputError, match="must have the same seeds and poses"):
-        paired([[1.0, 2.0]], [[1.0]])
-    with pytest.raises(InputError, match="must have the same seeds and poses"):
-        paired([[1.0], [2.0]], [[1.0], [2.0], [3.0]])
-    with pytest.raises(InputError, match="must lie between 0 and 1"):
-        interval([1.0], 1.0)

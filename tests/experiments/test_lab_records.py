@@ -8,7 +8,7 @@ import math
 import publish
 import pytest
 from lab import printed, texts
-from lab.records import Records, bench_of, checked, flat, nested, of_bench, of_demo
+from lab.records import Records, bench_of, checked, flat, nested, of_bench
 from lab.results import Results
 from results_of import data_of
 
@@ -120,21 +120,3 @@ def test_a_record_of_a_benchmark_shows_what_the_benchmark_showed(tmp_path):
     again = bench_of(Records(tmp_path)["bench-x"])
     assert bench_report.table(again) == bench_report.table(data)
     assert bench_report.panels(again) == bench_report.panels(data)
-
-
-def test_a_demonstration_becomes_a_record():
-    scores = {"metrics": {"PSNR": 30.0}, "notes": {}}
-    found = of_demo(
-        {
-            "command": "wamnet demo",
-            "plan": {"size": 8},
-            "unseen": [{"time_s": 0.08, "input": scores, "denoised": scores}],
-            "runs": [{"executor": "numpy", "seconds_run": 0.5}, {"executor": "opengl", "seconds_run": None}],
-            "seconds": {"rendering": 2.0, "training": 3.0},
-            "machine": {},
-            "versions": {},
-        }
-    )
-    names = [record["configuration"] for record in checked(found)["records"]]
-    assert names == ["input, 0.08 s", "denoised, 0.08 s", "numpy", "seconds"]
-    assert found["records"][-1]["values"]["all"] == 5.0

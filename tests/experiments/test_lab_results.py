@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from lab import command
 from lab.results import Results, fill
-from lab.tables import Column, markdown, table
+from lab.tables import Column, table
 
 from wamnet.refimpl.errors import InputError, TrainingError
 
@@ -44,27 +44,6 @@ def test_another_experiment_s_file_is_refused(results):
         Results.open(results.path, "test", {"size": 8})
 
 
-def test_a_file_says_which_commands_made_it(results, tmp_path):
-    made = [
-        command.line(
-            ["experiments/quality.py", "--seeds", "0", "-o", "somewhere", "--cache=x", "--rows", "a b"]
-        ),
-        command.line(["/somewhere/experiments/x.py"]),
-        command.line(["pytest", "-x"]),
-    ]
-    assert made == [
-        "python experiments/quality.py --seeds 0 --rows 'a b'",
-        "python experiments/x.py",
-        "",
-    ]
-    for number, text in enumerate([*made, made[0]]):
-        Results(results.path, "test", {"size": 8}, text).put("a", number, {"psnr": 30.0})
-    assert results.data()["commands"] == made[:2]
-    lines = results.path.read_text().splitlines()
-    assert '  {"configuration": "a", "seed": 1, "values": {"psnr": 30.0}},' in lines
-    assert Results.read(results.path).records() == results.records()
-
-
 def test_numbers_of_each_pose_have_an_interval(results):
     for seed, poses in enumerate(([30.0, 34.0], [31.0, 35.0])):
         results.put("a", seed, {"psnr": sum(poses) / 2, "ms": 2.0, "per_frame": {"psnr": poses}})
@@ -75,15 +54,6 @@ def test_numbers_of_each_pose_have_an_interval(results):
     assert results.interval("a", "ssim") is None
     columns = [Column("psnr", "PSNR, dB", 1, interval=True), Column("ms", "us", 0, 1000.0, interval=True)]
     assert table(results, columns).splitlines()[-1] == "| a | 32.5 [30.0, 35.0] | 2000 [2000, 2000] |"
-
-
-def test_tables_have_empty_cells_for_what_was_not_measured(results):
-    results.put("a", 0, {"psnr": 30.0, "ms": 0.5})
-    results.put("b", 0, {"psnr": 20.0})
-    columns = [Column("psnr", "PSNR, dB", 1), Column("ms", "us", 0, scale=1000.0)]
-    assert table(results, columns, {"b": "B", "a": "A"}, "method") == markdown(
-        ["method", "PSNR, dB", "us"], [["B", "20.0", ""], ["A", "30.0", "500"]]
-    )
 
 
 def test_errors_end_with_one_line_and_a_status(capsys):

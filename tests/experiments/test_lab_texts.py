@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from lab import plots, records, texts
-from lab.records import Missing, Records
+from lab import plots, texts
+from lab.records import Records
 from lab.results import written
 from results_of import data_of
 
@@ -78,12 +78,6 @@ def test_no_line_begins_with_a_mark(kept, text, made):
     assert filler(kept).text(made) == made
 
 
-@pytest.mark.parametrize("start", ["", "> ", "* ", "1. ", "  "])
-def test_a_paragraph_that_begins_with_a_mark_is_refused(kept, start):
-    with pytest.raises(InputError, match=r"ends its paragraph \(begin with a word\)"):
-        filler(kept).text(f"Text.\n\n{start}<!--= seeds -->3<!--/--> seeds.\n")
-
-
 @pytest.mark.parametrize(
     ("text", "match"),
     [
@@ -135,15 +129,3 @@ def test_plots_are_the_same_bytes_and_say_what_they_show(kept, tmp_path):
     record["records"][0]["values"]["psnr"] = 29.0
     (kept.folder / "study.json").write_text(written(record))
     assert list(plots.stale(kept, {"one": plot}, tmp_path))
-
-
-def test_a_plot_without_a_record_must_wait_for_one(tmp_path):
-    (tmp_path / "pending.txt").write_text("study | python experiments/study.py | a minute\n")
-    plot = plots.Plot(lambda found: None, ("study",))
-    assert not plots.ready(plot, Records(tmp_path), tmp_path)
-    (tmp_path / "pending.txt").write_text("# nothing\n")
-    with pytest.raises(Missing, match="record 'study': not found"):
-        plots.ready(plot, Records(tmp_path), tmp_path)
-    (tmp_path / "pending.txt").write_text("study, no command\n")
-    with pytest.raises(InputError, match="an entry has 3 parts"):
-        records.pending(tmp_path)

@@ -25,9 +25,15 @@ OTHERS = ("web-page", "front")
 """Beginnings of the names of pictures without a record: of the web page, and on the first page."""
 
 
-def test_texts_are_what_the_records_give():
-    filler = texts.Filler(Records(), shown.TABLES, shown.FIGURES)
-    stale = [path.relative_to(records.ROOT).as_posix() for path, _ in texts.stale(filler)]
+@pytest.fixture(scope="module")
+def filled():
+    """Give all texts as the records fill them: what filled them, and the texts that differ."""
+    filler = texts.Filler(Counting(Records().folder), shown.TABLES, shown.FIGURES)
+    return filler, [path.relative_to(records.ROOT).as_posix() for path, _ in texts.stale(filler)]
+
+
+def test_texts_are_what_the_records_give(filled):
+    filler, stale = filled
     assert not stale, f"{stale}: run python experiments/rewrite.py, and read the difference"
     unused = sorted((set(shown.TABLES) | set(shown.FIGURES)) - filler.shown)
     assert not unused, f"lab/shown.py: no text shows {unused}"
@@ -56,24 +62,19 @@ def test_code_of_records_is_here_or_in_the_commit_that_they_name():
             assert "code" not in data, f"{name}: its code is here"
 
 
-def test_what_is_pending_is_not_there_and_is_waited_for():
+def test_what_is_pending_is_not_there_and_is_waited_for(filled):
     """An entry goes when its record comes, and when no text waits for it any more."""
     kept, waiting = Records(), records.pending()
     there = sorted(name for name in waiting if name in kept)
     assert not there, f"pending.txt: {there} are there; remove the lines"
-    filler = texts.Filler(kept, shown.TABLES, shown.FIGURES)
-    assert not list(texts.stale(filler))
     drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
-    idle = sorted(set(waiting) - filler.missing - drawn)
+    idle = sorted(set(waiting) - filled[0].missing - drawn)
     assert not idle, f"pending.txt: no text waits for {idle}; remove the lines"
 
 
-def test_every_record_is_shown():
-    kept = Records()
-    filler = texts.Filler(Counting(kept.folder), shown.TABLES, shown.FIGURES)
-    list(texts.stale(filler))
+def test_every_record_is_shown(filled):
     drawn = {name for plot in gallery.PLOTS.values() for name in plot.records}
-    idle = sorted(set(kept.names()) - Counting.asked - drawn)
+    idle = sorted(set(Records().names()) - filled[0].records.asked - drawn)
     assert not idle, f"no text shows the records {idle}: show them or remove them"
 
 

@@ -11,7 +11,7 @@ import pytest
 from wamnet.cli.commands import bench, bench_forms, bench_frames
 from wamnet.cli.common import inputs
 from wamnet.cli.files import exr
-from wamnet.cli.reports import bench_report, plots, report
+from wamnet.cli.reports import bench_report, plots
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels.bench import contest, rates
 from wamnet.models.data.frame_plan import frame_draws
@@ -403,46 +403,3 @@ def test_the_picture_is_a_function_of_the_data(tmp_path) -> None:
     with pytest.raises(InputError, match="no row has a time and a loss or a bound"):
         bench_report.picture(planted(), tmp_path / "c.png")
     assert not (tmp_path / "c.png").exists()
-
-
-def page(**facts) -> str:
-    """Return the demo's report of as little as it takes."""
-    picture = dict.fromkeys(report.PICTURES, "data:,")
-    scores = {"metrics": {"PSNR": 1.0, "SSIM": 1.0}, "notes": {}}
-    data = {
-        "schema": "",
-        "command": "wamnet demo",
-        "plan": {
-            "scene": "cornell",
-            "scene_sha256": "",
-            "renderer": "numpy",
-            "trainer": "numpy",
-            "size_px": 8,
-            "reference_spp": 4,
-            "feature_spp": 1,
-            "train_spp": 4,
-        },
-        "model": {"features": ["color"], "window": {"size": 2}, "parameters": 7, "widths": [4, 3]},
-        "unseen": [{"time_s": 0.5, "label": "time 0.50 s", "input": scores, "denoised": scores}],
-        "train_times_s": [0.0],
-        "denoised_by": "numpy",
-        "runs": [],
-        "training": {"steps": 1, "seconds_per_step": None, "history": [], "recipe": {}},
-        "seconds": {"rendering": 1.0},
-        "machine": {},
-        "versions": {},
-        **facts,
-    }
-    maps = {name: {"light": "data:,", "dark": "data:,"} for name in ("input", "denoised")}
-    drawn = {"errors": [maps], "training": {"light": "data:,", "dark": "data:,"}}
-    return report.page(data, [picture], drawn)
-
-
-def test_the_report_has_a_section_when_it_is_given_a_result() -> None:
-    """With plots inside the file, names as they are, and nothing without a result."""
-    text = page(bench=planted())
-    assert "<h2>Speed against error</h2>" in text
-    assert "<th>fast *</th>" in text
-    assert "none: missing, not here" in text
-    assert text.count("data:image/png;base64,") == 4
-    assert "Speed against error" not in page()

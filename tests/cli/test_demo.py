@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands import bench, bench_forms, demo
-from wamnet.cli.files import dataset_files, exr
+from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
-from wamnet.cli.reports import runs
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding, metrics
 from wamnet.refimpl.network import train
@@ -45,11 +44,6 @@ def finished(tmp_path_factory, small):
 def report(finished):
     """Return the demonstration's facts."""
     return json.loads((finished / "report.json").read_text())
-
-
-def first_noisy(folder):
-    """Return the noisy frame of the first test time."""
-    return exr.read_frame(folder / "frames/test/00000-noisy.exr")
 
 
 def test_all_files_are_there(finished) -> None:
@@ -197,41 +191,6 @@ def test_where_no_kernel_runs_numpy_renders_less(monkeypatch, capsys) -> None:
     assert "rendered with NumPy, which is slow: 12 training times, references have 32 paths per pixel" in told
 
 
-def test_an_executor_that_is_missing_is_told(finished, monkeypatch) -> None:
-    """The report leaves it out and says why."""
-    from wamnet.compiler.compile import compile_program
-    from wamnet.compiler.core.lower import lower
-    from wamnet.kernels import open_executor
-    from wamnet.refimpl.errors import ExecutorUnavailable
-
-    def only_numpy(name: str):
-        if name != "numpy":
-            raise ExecutorUnavailable(f"{name}: nothing there")
-        return open_executor(name)
-
-    monkeypatch.setattr("wamnet.kernels.open_executor", only_numpy)
-    model = load_model(finished / "model.safetensors")
-    kernels = {name: compile_program(lower(model), name) for name in ("numpy", "opencl")}
-    images, found = runs.run_all(model, first_noisy(finished), kernels, lambda _: None)
-    assert set(images) == {"numpy"}
-    assert found[1] == runs.Run("opencl", missing="opencl: nothing there")
-
-
-def test_a_scene_file_is_shown_from_views(wamnet, tmp_path) -> None:
-    """Its data set, its preset and its plan: the SHA-256 makes a changed file another plan."""
-    assert wamnet("scene", "glossy", "-o", "mine.json").status == 0
-    plan = demo.replace(demo.of_scene(demo.QUICK, "mine.json"), renderer="numpy", size_px=8)
-    demo.render_frames(plan, tmp_path / "out")
-    request = dataset_files.read_manifest(tmp_path / "out/frames")["request"]
-    assert request["scene_sha256"] == plan.scene_sha256 != ""
-    assert (plan.preset, request["seen"], request["yaw_deg"]) == ("mirrors", True, [-24.0, 24.0])
-    (time, (noisy, _)), _ = demo._pairs(tmp_path / "out", "test")
-    assert demo._label(plan, time, noisy).startswith(f"view, yaw {float(noisy.info['yaw_deg']):.1f}°, pitch")
-    (tmp_path / "mine.json").write_bytes((tmp_path / "mine.json").read_bytes() + b"\n")
-    assert demo.of_scene(demo.QUICK, "mine.json") != demo.of_scene(demo.QUICK, "glossy")
-    assert demo.of_scene(demo.QUICK, "mine.json").scene_sha256 != plan.scene_sha256
-
-
 def test_refusals(refused, tmp_path) -> None:
     """A file in the folder's place; an invalid size; a scene that is not there."""
     assert "did you mean 'cornell'?" in refused("demo", "--scene", "cornel")
@@ -253,21 +212,6 @@ def test_a_folder_holds_one_plan(refused, tmp_path, finished) -> None:
     text = "output folder 'mine': holds files that are not the demo's"
     assert text in refused("demo", "--quick", "-o", "mine")
     assert "--size 16: cannot be combined with --quick" in refused("demo", "--quick", "--size", 16)
-
-
-@pytest.mark.parametrize("quick", [True, False])
-def test_an_interrupt_tells_how_to_go_on(wamnet, tmp_path, monkeypatch, quick) -> None:
-    """With the whole command; quick results have a folder of their own."""
-
-    def interrupt(*_arguments: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(demo, "carry_out", interrupt)
-    outcome = wamnet("demo", *(["--quick"] if quick else []))
-    command = "--quick -o out/demo-quick" if quick else "--size 256 -o out/demo"
-    hint = f"{command.split()[-1]}: the same command resumes (wamnet demo {command})"
-    assert outcome.err == f"wamnet: {hint}\nwamnet: interrupted\n"
-    assert outcome.status == 130
 
 
 def test_the_report_tells_whose_picture_it_is(finished, report) -> None:

@@ -1,7 +1,5 @@
 """The commands below `wamnet bench`: their tables, refusals and helps. What they measure here is nothing."""
 
-import re
-
 import pytest
 
 from wamnet.cli.commands import measure
@@ -40,29 +38,6 @@ def test_a_command_prints_its_table(wamnet, name) -> None:
     assert len(rows) >= 3, "a head, its rule, and a row"
     assert set(rows[1]) == {"|", "-"}
     assert all(row.count("|") == rows[0].count("|") for row in rows)
-
-
-@pytest.fixture
-def printed(wamnet, opencl):
-    """Give a function that runs the benchmark of renderers on tiny frames and returns what it prints."""
-
-    def run(*arguments):
-        outcome = wamnet("bench", "render", "--size", 8, "--spp", 2, "--workers", 1, *arguments)
-        assert outcome.status == 0, outcome.err
-        return outcome.out
-
-    return run
-
-
-def test_table_has_a_row_for_each_scene_and_way(printed) -> None:
-    text = printed("--scenes", "furnace,empty", "--by", "opencl,numpy", "--repeats", 2)
-    rows = re.findall(
-        r"^\| (\w+) \| ([\w ,]+?) \|(?: [\d.,]+ \|){2} [\d.]+ - [\d.]+ \|(?: [\d.,]+ \|){2}$", text, re.M
-    )
-    ways = ["opencl", "numpy, 1 process"]
-    assert rows == [(scene, way) for scene in ("furnace", "empty") for way in ways]
-    assert text.count("numpy, 1 process: mean colour 0.250000, opencl's 0.250000: ") == 1
-    assert "8x8, 2 spp, 6 edges" in text
 
 
 @pytest.mark.parametrize(

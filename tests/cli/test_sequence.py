@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands import denoise
-from wamnet.cli.common import sequence
 from wamnet.cli.common.sequence import frames_of, outputs_of, overlapped
 from wamnet.cli.files import exr, images
 from wamnet.refimpl.errors import InputError, WamnetError
@@ -125,20 +124,6 @@ def test_work_is_in_order_in_this_thread_and_failures_are_left_out():
     assert "/dev/null/frame" in str(dict(failed)[1]), "what the system refuses fails too"
     assert done == [1] * 9
     assert threads == {threading.current_thread()}
-
-
-def test_no_more_is_in_memory_than_is_said():
-    lock, alive, most = threading.Lock(), 0, 0
-
-    def count(step):
-        nonlocal alive, most
-        with lock:
-            alive += step
-            most = max(most, alive)
-
-    overlapped(range(40), lambda _: count(1), lambda _: None, lambda *_: count(-1), lambda _: None)
-    assert alive == 0
-    assert most <= 2 * sequence.AHEAD + 2, "read ahead, worked on, waiting and being written"
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])

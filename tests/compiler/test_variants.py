@@ -13,7 +13,7 @@ from wamnet.compiler import variants
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import sine
 from wamnet.compiler.targets import TARGETS
-from wamnet.compiler.variants import parse, plan_model, vary
+from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -298,3 +298,10 @@ def test_integers_of_what_rounds_are_refused(text) -> None:
     model = Model(small, ("color", "normal"), Window(2), Normalization())
     with pytest.raises(InputError, match="variant"):
         variants.vary(variants.parse(text), model)
+
+
+def test_a_rank_is_short_for_a_variant() -> None:
+    found = [with_rank("full", 0), with_rank("full", 2), with_rank("window3", 0)]
+    assert found == ["full", "rank2", "window3"]
+    with pytest.raises(InputError, match=r"rank 2: the variant is window3 \(name it in the variant"):
+        with_rank("window3", 2)

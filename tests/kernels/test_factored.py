@@ -155,15 +155,6 @@ def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
     assert denoise_on(executor_named("numpy"), model, noisy).variant == ""
 
 
-def test_a_second_picture_of_another_size(executor_named, kit) -> None:
-    """The image between both passes is kept from run to run, and made again for another size or rank."""
-    executor, program = executor_named("opencl"), paper_s(kit)
-    for rank, shape in ((3, (5, 9)), (3, (9, 5)), (2, (9, 5)), (3, (5, 9)), (3, (6, 20))):
-        artifact = compile_program(program, "opencl", "ieee", "tile:16", rank)
-        images = images_of({"color": 3, "normal": 3}, shape)
-        assert excess(kit, executor, artifact, program, images, False) <= 1
-
-
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl-egl", "opengl-osmesa"])
 def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> None:
     """Between a path kernel and a picture that stay on the device: the bits of `run` on the same images."""

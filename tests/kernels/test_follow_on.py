@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.scenes.history_kernel import MOTION, PAST, compile_history
-from wamnet.kernels.run import before
 from wamnet.kernels.run.follow_on import first_hits_on, follow_on
 from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import history as H
 from wamnet.refimpl.light.camera import Camera, camera_basis
 from wamnet.refimpl.light.history import First, History, Limits, Motion
@@ -197,28 +195,6 @@ def test_first_hits_are_the_reference_s(device):
     for one, other in ((found.point, wanted.point), (found.normal, wanted.normal)):
         assert np.abs(one - other)[same].max() <= 40 * 10 / 0.2 * np.finfo(np.float32).eps
     assert np.abs(found.direction - wanted.direction).max() <= 40 * np.finfo(np.float32).eps
-
-
-@pytest.mark.parametrize("name", ["numpy", "opencl", "c", "opengl"])
-def test_a_film_is_followed_by_whom_it_names(monkeypatch, executor_named, name):
-    if name != "numpy":
-        executor_named(name)
-    asked = []
-
-    def heard(device, *given, **named):
-        asked.append(device.name)
-        return follow_on(device, *given, **named)
-
-    monkeypatch.setattr(before, "follow_on", heard)
-    scenes = [moment("cornell", k) for k in range(2)]
-    film, past = before.Film(name, scenes), None
-    for k, scene in enumerate(scenes):
-        frame = film.add(scene, job(k), Frame({"color": color_of(k)}))
-        past = by_definition(past, scene, job(k), color_of(k))
-    wanted = H.layers_of(past)
-    near = np.abs(frame["history"] - wanted["history"]).max(axis=-1) <= 2 * H.error_bound(H.LIMITS.rest, 3.0)
-    assert np.mean(~near) <= DECIDED_OTHERWISE
-    assert asked == ([name] * 2 if name != "numpy" else [])
 
 
 @pytest.mark.product

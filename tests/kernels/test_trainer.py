@@ -20,7 +20,7 @@ from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.core.profiles import EMITTED_SINE, UNIT_ROUNDOFF
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
-from wamnet.compiler.training import step, step_kernel
+from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.kernels.run import trainer
 from wamnet.kernels.run.trainer import train_on
@@ -160,12 +160,6 @@ def test_first_derivatives_are_within_the_bound(opencl: Any, changes: Any, rank:
     assert gradient_excess(opencl, replace(recipe, rank=min(rank, most))) <= 1
 
 
-def test_the_bound_is_no_wild_guess(opencl: Any) -> None:
-    """An omega_0 that is 0.1 % too large is found."""
-    lowered = step.lower_step(SMALL.layer_widths, 1.0, 5.0 * 1.001, SMALL.batch)
-    assert gradient_excess(opencl, SMALL, step_kernel.compile_lowered(lowered, 5)) > 1
-
-
 # ---- Adam ------------------------------------------------------------------------------------------------
 
 
@@ -227,6 +221,7 @@ def test_twenty_steps_of_adam_are_within_the_bound(opencl: Any) -> None:
     assert adam_excess(opencl) <= 1
 
 
+@pytest.mark.nightly("0")
 @pytest.mark.parametrize("rank", [0, 4])
 def test_a_step_has_the_bits_of_its_kernel_in_numpy(opencl: Any, rank: int) -> None:
     """NumPy fuses no product with a sum; where OpenCL may not either, every number is the same."""
@@ -261,7 +256,7 @@ def numbers_in(buffer: Any) -> Any:
 # ---- runs ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{}, {"n_windows": 50, "schedule": "constant"}, {"rank": 4}, {"rank": 1}])
+@pytest.mark.parametrize("changes", [{"n_windows": 50, "schedule": "constant"}, {"rank": 4}])
 def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
     """The float32 reference and the device round differently, and Adam makes much of little differences.
 
@@ -289,9 +284,7 @@ def test_twenty_steps_are_the_references(opencl: Any, changes: Any) -> None:
         )  # float32 adds 300 numbers of one sign: gamma(300) = 2e-5 / 2
 
 
-@pytest.mark.parametrize(
-    "changes", [{}, {"n_windows": 50, "schedule": "constant", "batch": 700}, {"rank": 4}]
-)
+@pytest.mark.parametrize("changes", [{"n_windows": 50, "schedule": "constant", "batch": 700}, {"rank": 4}])
 def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> None:
     recipe = replace(SMALL, **changes)
     whole, again = (train_on(opencl, recipe, PAIRS) for _ in range(2))
@@ -304,6 +297,7 @@ def test_runs_repeat_and_resume_to_the_same_bits(opencl: Any, changes: Any) -> N
     train.check_state(whole)
 
 
+@pytest.mark.nightly("0")
 @pytest.mark.parametrize("rank", [0, 4])
 def test_a_run_may_change_its_trainer(opencl: Any, rank: int) -> None:
     """Either continues from the other's state; both end near the run that did not change."""
@@ -399,7 +393,7 @@ def test_an_interrupt_while_the_device_works(opencl: Any, monkeypatch: Any) -> N
     assert tensors(train_on(opencl, SMALL, PAIRS, state=kept[0])) == tensors(train_on(opencl, SMALL, PAIRS))
 
 
-@pytest.mark.parametrize("changes", [{"log_every": 1}, {}, {"rank": 4}])
+@pytest.mark.parametrize("changes", [{"log_every": 1}, {"rank": 4}])
 def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_state(opencl: Any, changes: Any) -> None:
     """As the reference's: the state kept is the one before the one whose loss is not finite."""
     recipe = replace(SMALL, **changes)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import compile_plan, compile_program
+from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
@@ -101,18 +101,6 @@ def planted(kit, target, text):
 
 
 # ---- naming ----------------------------------------------------------------------------------------------
-
-
-def test_picked_schedules_run(executor_named, model, images):
-    """Those that denoise_on would take; one that is replaced is reported by the name of the other."""
-    ways = runners(executor_named, *WAYS)
-    found = verdicts_of(ways, model, images, which=triage.PICKED)
-    wanted = [
-        compile_program(lower(model), way.target, "ieee", way.picked(SHAPE)).manifest["schedule"]["name"]
-        for way in ways
-    ]
-    assert [v.kernel.schedule for v in found] == wanted
-    assert not triage.odd_ones(found)
 
 
 @pytest.mark.parametrize("way", WAYS)

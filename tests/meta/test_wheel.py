@@ -2,7 +2,6 @@
 
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -151,23 +150,6 @@ def test_description_does_not_depend_on_files(metadata):
     assert len(targets) > 10
     assert all("".join(target).startswith("https://") for target in targets), targets
     assert "<!--" not in description
-
-
-@pytest.mark.parametrize(
-    ("readme", "description"),
-    [
-        ("[a](docs/b.md#c)", "[a](https://x/y/blob/HEAD/docs/b.md#c)"),
-        ("![a](docs/b.png)", "![a](https://x/y/raw/HEAD/docs/b.png)"),
-        ("[![`a`](./b.SVG)](docs)", "[![`a`](https://x/y/raw/HEAD/b.SVG)](https://x/y/blob/HEAD/docs)"),
-        ('<img width="9" src="b.webp">', '<img width="9" src="https://x/y/raw/HEAD/b.webp">'),
-        ("[a]: b.md\n[a](#c)", "[a]: https://x/y/blob/HEAD/b.md\n[a](https://x/y#c)"),
-        ("[a](http://b) [c](mailto:d@e) <a href='//f'>", "[a](http://b) [c](mailto:d@e) <a href='//f'>"),
-        ("`[a](b)`\n```\n[a](b) <!-- c -->\n```\n", "`[a](b)`\n```\n[a](b) <!-- c -->\n```\n"),
-        ("It takes <!--= ms -->5<!--/--> ms.<!-- a\nb -->", "It takes 5 ms."),
-    ],
-)
-def test_links_of_the_description(house, readme, description):
-    assert runpy.run_path(str(house.root / "setup.py"))["described"](readme, "https://x/y") == description
 
 
 @pytest.mark.nightly

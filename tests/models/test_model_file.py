@@ -304,19 +304,6 @@ def pairs() -> list[tuple[Frame, Frame]]:
     return [(noisy, reference)]
 
 
-def test_training_through_a_file_gives_the_same_bits(tmp_path: Path) -> None:
-    path = tmp_path / "run.checkpoint"
-    train.train(
-        RECIPE, pairs(), until=10, on_checkpoint=lambda state: model_file.save_checkpoint(path, state)
-    )
-    resumed = train.train(RECIPE, pairs(), state=model_file.load_checkpoint(path))
-    whole = train.train(RECIPE, pairs())
-    for name, state in (("resumed", resumed), ("whole", whole)):
-        model_file.save_checkpoint(tmp_path / name, state)
-    assert (tmp_path / "resumed").read_bytes() == (tmp_path / "whole").read_bytes()
-    assert resumed.history == whole.history
-
-
 CHECKPOINT_DAMAGE = {
     "no moments": (without("adam.v3"), "list of entries '.*': 'adam.v3' must be among them"),
     "no step": (without("step"), "list of entries '.*': 'step' must be among them"),

@@ -123,40 +123,6 @@ def test_one_that_fails_is_named_and_others_go_on(model, error, state, late) -> 
     assert len(rows(data)["good"]["ms"]["rounds"]) == 2
 
 
-def test_a_bug_of_a_kernel_s_is_no_row(model) -> None:
-    """What is not one of this package's errors is a bug there, and ends the run."""
-
-    def failing(tools, model, size):
-        raise RuntimeError("a bug")
-
-    with pytest.raises(RuntimeError, match="a bug"):
-        run(model, [fake("kernel", failing, executor="numpy")])
-
-
-def test_an_interrupt_leaves_what_was_measured(model) -> None:
-    """In the second round: the first one's times stay, and who was not reached is pending."""
-    frames = iter(range(100))
-
-    def opened(tools, model, size):
-        reference = by_reference(model)
-
-        def run(given):
-            if next(frames) == 3:
-                raise KeyboardInterrupt
-            return reference.run(given)
-
-        return Opened(run, "here")
-
-    with Tools() as tools:
-        request = contest.Request(model, SIZE, repeats=3, pause_s=0.0, sizes=(8,))
-        found = contest.Contest(request, [fake("a", opened)], tools)
-        with pytest.raises(KeyboardInterrupt):
-            found.run()
-        row = rows(found.as_data())["a"]
-    assert row["state"] == "measured"
-    assert len(row["ms"]["rounds"]) == 1
-
-
 def test_what_is_predicted_to_dawdle_is_left_out_loudly(model) -> None:
     """A kernel of 10^18 products a pixel is not run."""
 
@@ -171,18 +137,6 @@ def test_what_is_predicted_to_dawdle_is_left_out_loudly(model) -> None:
     assert row["state"] == "skipped"
     assert row["reason"].startswith("left out: a frame would take ")
     assert row["reason"].endswith("s by the cost model, more than --budget 30 s")
-
-
-def test_a_slow_one_has_one_frame(model) -> None:
-    """With a budget that no frame meets; other sizes are left out, with the reason."""
-    data = run(model, [fake("slow", lambda t, m, s: by_reference(m))], budget_s=1e-9, sizes=(40,))
-    row = rows(data)["slow"]
-    assert len(row["ms"]["rounds"]) == 1
-    assert row["reason"].startswith("only one frame: it took ")
-    (grown,) = data["sizes"]
-    assert grown["size_px"] == 40
-    assert "by its time at another size, more than --budget 1e-09 s" in grown["contenders"][0]["reason"]
-    assert grown["contenders"][0]["ms"] is None
 
 
 def test_quality_is_a_loss_against_the_full_network(model) -> None:

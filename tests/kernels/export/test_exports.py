@@ -210,18 +210,6 @@ def test_the_manifest_is_of_the_schema_and_names_every_file(exported):
     assert "{" not in readme.partition("## Integration")[2].partition("```")[0]
 
 
-def test_entry_points_and_names_stand_in_the_source(exported):
-    if exported.denoiser is None:
-        pytest.skip("a graph has no text")
-    for kernel in exported.manifest["kernels"]:
-        texts = [exported.files[n].decode() for n in kernel["files"] if not n.endswith(".spv")]
-        for text in texts:
-            assert kernel["entry_point"] in text
-        if exported.target in ("opencl", "glsl", "glsl-es", "metal", "cuda", "c", "wgsl", "glsl-vulkan"):
-            names = [b["name"] for b in kernel["bindings"] if b["name"].startswith("image_")]
-            assert all(name in texts[0] for name in names)
-
-
 def test_the_pair_s_files_are_as_they_say(exported):
     """EXP-9: shapes, and bounds that are not zero."""
     told = json.loads(exported.files["check/check.json"])

@@ -63,12 +63,3 @@ def test_rough_metal_has_a_closed_form():
     """For alpha = 1 at normal incidence the integral is 1 - ln 2; its midpoint rule is off by less than a
     tenth of the cases' slack."""
     assert abs(answers.rough_metal(0.0, 1.0) - (1.0 - np.log(2.0))) <= 0.1 * SLACK
-
-
-def test_nearly_smooth_metal_is_a_mirror():
-    """What a lobe of slope alpha loses is at most about alpha^2."""
-    assert abs(answers.rough_metal(30.0, 1e-3) - 1.0) <= 1e-5
-
-
-def test_product_masking_is_darker():
-    assert answers.rough_metal(70.0, 0.5, correlated=False) < answers.rough_metal(70.0, 0.5)

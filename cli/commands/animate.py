@@ -28,7 +28,7 @@ from ..common import options
 from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
-from ..common.inputs import load_model, model_path, trained_scene, unlike_training
+from ..common.inputs import learned_scene, load_model, model_path, unlike_training
 from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import movie
@@ -115,7 +115,7 @@ def animate(
     network = load_model(model)
     by = chosen(executor), chosen(renderer, work="renderer")
     facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
-    named = scene or scene_of(network), _parameters(parameters), view
+    named = scene or learned_scene(network), _parameters(parameters), view
     shots = plan_shots(folder, named, wanted, network, facts)
     if is_film:
         check_real_folder(folder)
@@ -214,16 +214,6 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
         say(f"{output}: {len(unlike)} of {len(shots)} frames differ from the training frames: {sentence}")
-
-
-def scene_of(model: Model) -> str:
-    """Return the canonical scene that a model was trained on, or minicubes; reject that of a file."""
-    from ...models.data.scene_source import SCENE_FILE
-
-    if f"trained_on_{SCENE_FILE}" in model.info:
-        name, rule = model.info.get("trained_on_scene", ""), "is that of a scene file"
-        raise InputError("scene that the model was trained on", name, rule, "name the file with --scene")
-    return trained_scene(model) or "minicubes"
 
 
 def cut_facts(network: Model, rank: int) -> list[str]:

@@ -79,6 +79,16 @@ def trained_scene(model: Model) -> str | None:
     return name if name in CANONICAL and f"trained_on_{SCENE_FILE}" not in model.info else None
 
 
+def learned_scene(model: Model) -> str:
+    """Return the canonical scene that a model was trained on, minicubes if it names none; reject others."""
+    names = model.info.get("trained_on_scene", "")
+    name = trained_scene(model) if names else "minicubes"
+    if name is None:
+        rule = "must be one canonical scene, or one must be chosen"
+        raise InputError("scene that the model was trained on", names, rule, "name one with --scene")
+    return name
+
+
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
     from ...models.data.scene_source import SCENE_FILE

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
-from ..common.inputs import load_model, load_scene, trained_scene
+from ..common.inputs import learned_scene, load_model, load_scene
 from ..common.packages import need
 
 if TYPE_CHECKING:
@@ -66,16 +66,6 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
     network = load_model(model)
     name = scene or learned_scene(network)
     return build_page(animation_of(name, assignments), network, load_model(fast) if fast else None)
-
-
-def learned_scene(model: Model) -> str:
-    """Return the canonical scene that a model was trained on, minicubes if it names none; reject others."""
-    names = model.info.get("trained_on_scene", "")
-    name = trained_scene(model) if names else "minicubes"
-    if name is None:
-        rule = "must be one canonical scene, or one must be chosen"
-        raise InputError("scene that the model was trained on", names, rule, "name one with --scene")
-    return name
 
 
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:

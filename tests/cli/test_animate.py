@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from wamnet.cli.commands import animate
+from wamnet.cli.common.inputs import learned_scene
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
 from wamnet.models.model_file import load_model, save_model
@@ -116,13 +117,15 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     network = load_model(tmp_path / "m.safetensors")
     facts = {"trained_on_scene": "cornell", "trained_on_feature_spp": "3"}
     learned = replace(network, info=facts)
-    assert (animate.scene_of(learned), learned_feature_spp(learned)) == ("cornell", 3)
-    assert (animate.scene_of(network), learned_feature_spp(network)) == ("minicubes", 0)
+    assert (learned_scene(learned), learned_feature_spp(learned)) == ("cornell", 3)
+    assert (learned_scene(network), learned_feature_spp(network)) == ("minicubes", 0)
     file = replace(network, info={"trained_on_scene": "cornell", "trained_on_scene_sha256": "0" * 64})
-    with pytest.raises(InputError, match=r"trained on 'cornell': is that of a scene file \(name the file"):
-        animate.scene_of(file)
+    with pytest.raises(InputError, match=r"trained on 'cornell': must be one canonical scene, or one must"):
+        learned_scene(file)
     odd = replace(network, info={"trained_on_scene": "cornell, empty", "trained_on_feature_spp": "1, 3"})
-    assert (animate.scene_of(odd), learned_feature_spp(odd)) == ("minicubes", 3)
+    with pytest.raises(InputError, match=r"trained on 'cornell, empty': must be one canonical scene"):
+        learned_scene(odd)
+    assert learned_feature_spp(odd) == 3
     save_model(tmp_path / "l.safetensors", learned)
     one = ("--seconds", 0.2, "--fps", 5, "--size", 13)
     assert wamnet("animate", "l.safetensors", *one, "-o", "own").status == 0

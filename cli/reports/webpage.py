@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import resources
@@ -94,7 +95,8 @@ def render_page(data: dict[str, Any]) -> str:
         return (resources.files(__package__) / FOLDER / name).read_text(encoding="utf-8")
 
     # In a script element nothing but its end tag and <!-- mean anything: JSON can do without the sign.
-    text = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    # The indentation of sources would be a twelfth of a page.
+    text = re.sub(r"\\n +", r"\\n", json.dumps(data, allow_nan=False)).replace("<", "\\u003c")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     return environment.from_string(part("page.html.jinja")).render(
         title=f"{data['scene'].replace('_', ' ').capitalize()}, path-traced and denoised live",

@@ -47,6 +47,8 @@ def test_a_page_is_written(wamnet, here):
         *["processor"] * bool(compiler()),
     ]
     assert not re.search(r"(src|href)=\"(?!data:)", text), "nothing is fetched"
+    assert "\n}\n" in data["paths"][0]["source"]
+    assert "\n " not in data["paths"][0]["source"], "indentation is left out"
     assert wamnet("view", "model.safetensors", "--scene", "lone_light", "-o", "again.html").status == 0
     assert (here / "again.html").read_text(encoding="utf-8") == text, "a page is a function of its inputs"
 

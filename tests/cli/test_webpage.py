@@ -89,7 +89,7 @@ def test_where_shaders_run_on_the_processor_a_page_begins_with_the_module(chromi
     "options", [{}, {"frame": FRAME, "seed": SEED, "turn": TURN, "colors": COLORS}], ids=["rest", "moved"]
 )
 def test_the_paths_are_the_reference_s(still, options):
-    """As the kernels of test_paths.py: 99 pixels in 100 have every number to 1e-5 of its layer's size."""
+    """WEB-10, as path kernels: 99 pixels in 100 have every number to 1e-5 of its layer's size."""
     told = draw(still, **options)
     expected, scene = traced(told, FEATURES, options.get("seed", 0))
     at_rest = scenes.canonical("minicubes", time=told["time"]).camera
@@ -351,7 +351,7 @@ def test_a_lost_device_comes_back(chromium, path):
 
 
 def test_slow_devices_get_small_pieces(still):
-    """However costly a pixel is, what is dispatched at once costs no more than a batch."""
+    """WEB-7: however costly a pixel is, what is dispatched at once costs no more than a batch."""
     rows = still.page.evaluate(
         """() => {
           const handed = [];

@@ -197,7 +197,7 @@ def test_the_pointer_turns_the_camera_and_moves_the_line(still):
     ids=["light", "dark"],
 )
 def test_people_who_do_not_see_it_can_use_it(chromium, path, options):
-    """axe-core finds nothing; no more scrolling to the side than none on a telephone."""
+    """WEB-9: axe-core finds nothing; no more scrolling to the side than none on a telephone."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with chromium.tab(path, **NO_MOTION, **options) as tab:
         tab.page.evaluate("wamnet.ready")

@@ -123,7 +123,7 @@ def test_the_small_network_is_the_one_with_zeros(name, border) -> None:
 
 @pytest.mark.parametrize("name", ["window3", "without-normal+window2"])
 def test_a_narrow_window_keeps_each_channel_s_sum(name) -> None:
-    """What a channel adds to a neuron in a picture of one colour."""
+    """VAR-3: what a channel adds to a neuron in a picture of one colour."""
     varied = vary(parse(name), small())
     before, after = (
         np.asarray(w, np.float64).reshape(7, 16, 6).sum(axis=1)

@@ -1,10 +1,7 @@
 """Tests of `wamnet animate`: what the pictures show, films that can be read, resuming, refusals."""
 
-import os
 import shutil
-import struct
 import subprocess
-import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +19,6 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import history
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
-from wamnet.refimpl.light.variation import Ranges, Variation, varied
 from wamnet.refimpl.network import factored, siren
 from wamnet.refimpl.network.dataset import Normalization, Window, n_inputs
 from wamnet.refimpl.network.denoise import Model, denoise, learned_feature_spp
@@ -140,24 +136,6 @@ def test_scene_and_rays_are_those_of_the_training(wamnet, tmp_path) -> None:
     assert np.array_equal(*pictures)
 
 
-def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
-    """How many, and what of the first: here of time, and of all from another side."""
-    network = load_model(tmp_path / "m.safetensors")
-    learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
-    save_model(tmp_path / "n.safetensors", replace(network, info=learned))
-    begin, unlike = "outside the training ranges: ", "frames differ from the training frames: "
-    outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
-    assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
-    outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")
-    told = "the camera's yaw is 5° (learned: 0° to 0°), lamp 1 has another colour (learned: its own)"
-    assert f"b: 2 of 2 {unlike}{begin}{told}; expect errors\n" in outcome.out
-    assert "unlike" not in wamnet("animate", "m.safetensors", *SHORT, "--yaw", 5, "-o", "c").out
-    noisy = render(varied(canonical("minicubes"), Variation(yaw_deg=5.0)), Job(13, 13)).frame
-    got = read_png(tmp_path / "c/00000.png")[LABEL_PX:-1, :13]
-    # Half a level of 8 bits, and float32's rounding of sums below 256.
-    assert np.abs(got - encoding.to_display(noisy["color"])).max() <= 0.5 / 255 + 256 * 2.0**-23
-
-
 @pytest.mark.nightly(but=("numpy", "opencl"))
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl", "c"])
 def test_a_cut_first_layer(wamnet, tmp_path, refused, executor_named, name) -> None:
@@ -219,23 +197,6 @@ def test_an_interrupted_run_goes_on(wamnet, tmp_path, monkeypatch) -> None:
         "2 frames, 1 of them rendered now\n"
     )
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "whole.gif").read_bytes()
-
-
-def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -> None:
-    """A pipe was waited for; a header of 60,000 x 60,000 pixels was a traceback of Pillow's."""
-    (tmp_path / "a").mkdir()
-    os.mkfifo(tmp_path / "a/00000.png")
-    assert "is a pipe or a device, not a regular file" in refused(
-        "animate", "m.safetensors", *SHORT, "-o", "a"
-    )
-    (tmp_path / "a/00000.png").unlink()
-    Image.new("RGB", (2, 2)).save(tmp_path / "a/00000.png")
-    content = bytearray((tmp_path / "a/00000.png").read_bytes())
-    content[16:24] = struct.pack(">II", 60_000, 60_000)
-    content[29:33] = struct.pack(">I", zlib.crc32(bytes(content[12:29])))
-    (tmp_path / "a/00000.png").write_bytes(content)
-    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
-    assert read_png(tmp_path / "a/00000.png").shape[0] < 100
 
 
 def test_the_folder_of_a_film_s_pictures_is_no_link(refused, tmp_path) -> None:

@@ -10,12 +10,11 @@ import pytest
 
 from wamnet.cli.commands import bench, bench_forms, bench_frames
 from wamnet.cli.common import inputs
-from wamnet.cli.files import exr
 from wamnet.cli.reports import bench_report, plots
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels.bench import contest, rates
 from wamnet.models.data.frame_plan import frame_draws
-from wamnet.models.model_file import load_model, save_checkpoint, save_model
+from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.variation import Ranges
 
@@ -250,24 +249,6 @@ def test_forms_are_trained_and_then_measured(wamnet, here, monkeypatch, executor
         assert row["state"] == "measured", row["reason"]
         if row["rounding"]["bound"] is not None:
             assert row["rounding"]["max"] <= row["rounding"]["bound"]
-
-
-def test_a_form_goes_on_where_an_interrupt_left_it(samples, tmp_path, monkeypatch) -> None:
-    """To the weights of one go, by the checkpoint; the model's own scales stay."""
-    from wamnet.refimpl.network.train import train as train_steps
-
-    model = load_model(samples / "model.safetensors")
-    pairs = [(exr.read_frame(samples / "noisy.exr"), exr.read_frame(samples / "reference.exr"))]
-    forms = bench_forms.planned(model, ("rank2",), 5)
-    (whole,) = bench_forms.trained(model, forms, pairs, tmp_path / "whole", "numpy")
-    begun = bench_forms.start_of(model, "rank2", 5, pairs)
-    half = train_steps(begun.recipe, pairs, state=begun, until=2)
-    (tmp_path / "cut").mkdir()
-    save_checkpoint(tmp_path / "cut" / "rank2.checkpoint.safetensors", half)
-    (resumed,) = bench_forms.trained(model, forms, pairs, tmp_path / "cut", "numpy")
-    for a, b in zip(whole.model.siren.weights, resumed.model.siren.weights, strict=True):
-        assert (a == b).all()
-    assert resumed.model.normalization == model.normalization
 
 
 @pytest.mark.parametrize("named", [["--synthetic"], ["paper"]])

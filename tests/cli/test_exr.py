@@ -131,25 +131,6 @@ def test_of_a_denoised_and_a_noisy_image_the_noisy_one_is_read(tmp_path: Path) -
     assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
 
 
-@pytest.mark.parametrize(
-    ("space", "others", "noted"),
-    [
-        ("sRGB", {}, True),
-        ("ACEScg", {}, True),
-        ("Linear", {}, False),
-        ("lin_rec709", {}, False),
-        ("ACEScg", {"colorInteropID": "lin_ap1_scene"}, False),
-    ],
-)
-def test_a_color_space_of_openimageio_is_named(tmp_path: Path, space: str, others: dict, noted: bool) -> None:
-    """It is a hint of one library; where nothing else says what the colours are, it may be right."""
-    path, notes = tmp_path / "a.exr", []
-    header = {"type": OpenEXR.scanlineimage, "oiio:ColorSpace": space, **others}
-    OpenEXR.File(header, rgb(1, 2, 3)).write(str(path))
-    exr.read_frame(path, tell=notes.append)
-    assert (f"oiio:ColorSpace is {space}" in "".join(notes)) is noted
-
-
 def test_half_floats_are_widened(tmp_path: Path) -> None:
     """Each half is a float32."""
     path = write(tmp_path / "a.exr", {name: plane(0.1, np.float16) for name in "RGB"})
@@ -232,22 +213,6 @@ def test_an_invalid_frame_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="layer 'color' at x=0, y=0"):
         exr.write_frame(tmp_path / "a.exr", Frame({"color": np.full((1, 1, 3), np.nan)}))
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("names", "layers"), [("Y", None), ("RGBY", {"color"}), ("RGBZ", {"color", "depth"})]
-)
-def test_luminance_is_no_depth(tmp_path: Path, names: str, layers: set[str] | None) -> None:
-    """Without a layer's name, only Z is depth."""
-    import OpenEXR
-
-    channels = {name: np.ones((2, 3), np.float32) for name in names}
-    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "a.exr"))
-    if layers is None:
-        with pytest.raises(InputError, match="list of channels 'Y': no known layer"):
-            exr.read_frame(tmp_path / "a.exr")
-    else:
-        assert set(exr.read_frame(tmp_path / "a.exr").layers) == layers
 
 
 def test_what_is_taken_from_other_names_is_said(tmp_path) -> None:

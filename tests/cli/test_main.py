@@ -196,21 +196,3 @@ def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
 
     monkeypatch.setattr(module, "application", lambda _: fail)
     assert "out of memory (use smaller frames" in refused("render")
-
-
-def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
-    """As the system does when the memory ends."""
-    code = (
-        "import sys, os; import wamnet.kernels.run.render_pool as pool; from wamnet.cli.main import main\n"
-        "if __name__ == '__main__':\n"
-        "    pool._render_band = os._exit; pool.bands = lambda job, workers: [7, 8]\n"
-        "    submit = pool.ProcessPoolExecutor.submit\n"
-        "    pool.ProcessPoolExecutor.submit = lambda self, f, scene, job, rows: submit(self, f, rows)\n"
-        "    sys.exit(main(['render', 'minicubes', '--spp', '64', '--workers', '2', '-o', 'a.exr']))\n"
-    )
-    (tmp_path / "run.py").write_text(code)
-    command = [sys.executable, "run.py"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 2
-    assert done.stderr.startswith("wamnet: error: workers 2: one of these processes was ended from outside")
-    assert done.stderr.count("\n") == 1

@@ -132,20 +132,6 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
     assert "steps 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
 
 
-def test_resuming_has_its_own_recipe(wamnet, refused, pair) -> None:
-    """A preset is refused; another number of steps is told to give another model."""
-    assert wamnet("train", *pair, "--steps", 2).status == 0
-    text = "--preset 'paper': cannot be combined with --resume"
-    assert text in refused("train", *pair[:4], "--resume", "--preset", "paper")
-    outcome = wamnet("train", *pair[:4], "--resume", "--steps", 3)
-    assert "the model differs from one of a 3-step run" in outcome.out
-
-
-def test_no_features_are_refused(refused, pair) -> None:
-    """An empty list is not the preset's."""
-    assert "at least one, each once" in refused("train", *pair[:4], "--features", "")
-
-
 def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:
     """With the checkpoint's name, if there is one."""
 

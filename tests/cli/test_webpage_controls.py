@@ -172,25 +172,6 @@ def test_the_page_says_what_the_reference_says(still, times, saturation, power):
     assert max(counts) >= 4
 
 
-def test_the_pointer_turns_the_camera_and_moves_the_line(still):
-    page = still.page
-    page.evaluate("wamnet.go(); wamnet.page.turn(wamnet.parts.REST); wamnet.page.wipeTo(0.5)")
-    box = page.locator("#picture").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + box["width"] / 4, y)
-    page.mouse.up()
-    assert still.state("wipe") == pytest.approx(0.75, abs=0.01)  # a pixel is a fifth of that
-    assert still.state("turn")["yaw"] == 0
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 50, y - 20)
-    page.mouse.up()
-    assert still.state("turn") == {"yaw": -20, "pitch": -8, "distance": 1}
-    page.evaluate("wamnet.page.turn(wamnet.parts.REST)")
-
-
 @pytest.mark.parametrize(
     "options",
     [{}, {"color_scheme": "dark", "viewport": {"width": 390, "height": 800}}],

@@ -6,22 +6,15 @@ all of them.
 
 from __future__ import annotations
 
-import base64
 import importlib.util
-import json
 import re
 import shutil
 import subprocess
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from wamnet.models.model_file import load_model, save_model
-from wamnet.refimpl.network import domain
-from wamnet.refimpl.network.dataset import channels_of
 from wamnet.spec.conformance import run, vectors
 from wamnet.spec.conformance.report import ELEMENTARY
 
@@ -96,30 +89,6 @@ def test_it_passes_all_cases_of_all_kinds(built, verdicts):
 def test_it_passes_under_sanitizers(built, verdicts):
     found = verdicts([built(SANITIZERS)], [])
     assert Counter(v.verdict for v in found) == {run.PASS: len(found)}
-
-
-def test_a_domain_is_a_text_like_others(built, tmp_path):
-    """DOM-4: a reader that knows nothing of domains gives the same answer for a model that states one."""
-    plain = base64.b64decode(run.read_vectors(vectors.FOLDER)["file.model"][0].inputs["content"])
-    path = tmp_path / "m.safetensors"
-    path.write_bytes(plain)
-    model = load_model(path)
-    flat = [np.full((2, 2, channels_of(model.features)), k / 9) for k in range(9)]
-    text = domain.to_json(domain.domain_of(flat, model.features))
-    save_model(path, replace(model, info={**model.info, domain.DOMAIN: text}))
-    assert path.read_bytes() != plain
-    lines = [
-        json.dumps(
-            {"id": "a", "kind": "file.model", "input": {"content": base64.b64encode(content).decode()}}
-        )
-        for content in (plain, path.read_bytes())
-    ]
-    done = subprocess.run(
-        [built(["-O0"])], input="\n".join(lines), capture_output=True, text=True, check=True
-    )
-    first, second = done.stdout.splitlines()
-    assert first == second
-    assert "output" in json.loads(first)
 
 
 # ---- mutants ----------------------------------------------------------------------------------------------

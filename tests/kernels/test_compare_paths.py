@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.proof import ranges
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.kernels.judge import compare_images, compare_paths, random_words
 from wamnet.kernels.judge.compare_images import ImageReport, blocks
@@ -122,33 +121,11 @@ def test_bounds_are_as_tight_as_rounding(executor_named):
     assert gaps["direction"].ratio >= 0.25  # and the differences that happen are of the same size
 
 
-def test_the_interpreter_computes_what_correct_arithmetic_gives(executor_named):
-    """NumPy fuses nothing and rounds divisions and roots correctly: bounds without their freedom hold too."""
-    executor = executor_named("numpy")
-    free, correct = (
-        compare_paths.compare_paths(
-            executor, scene("cornell"), Settings(max_depth=2), VIEW, arithmetic=arithmetic
-        )
-        for arithmetic in (ranges.PROMISED, ranges.CORRECT)
-    )
-    assert correct.passed, [str(example) for example in correct.examples]
-    for loose, tight in zip(free.depths, correct.depths, strict=True):
-        assert all(tight.gaps[name].bound <= loose.gaps[name].bound for name in ("direction", "pdf"))
-
-
 def test_random_numbers_are_the_reference_s_to_the_bit(executor):
     """All words of all blocks that a path of five bounces may use, for seeds and samples of 32 bits."""
     for view in (View(13, 7), View(5, 3, sample=2**32 - 1, seed=2**32 - 1)):
         given = compare_paths._given(view)
         assert random_words.wrong_words(executor, given, 5, view.width, view.height) == 0
-
-
-def test_blocks_of_paths_change_nothing(executor_named, monkeypatch):
-    executor = executor_named("numpy")
-    arguments = (executor, scene("cornell"), Settings(max_depth=1), VIEW)
-    whole = compare_paths.compare_paths(*arguments)
-    monkeypatch.setattr(compare_paths, "PATHS_AT_ONCE", 100)
-    assert compare_paths.compare_paths(*arguments) == whole
 
 
 # ---- wrong kernels -----------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.kernel.interface import PATH
-from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.kernels import Pipeline, render_on
 from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.light import scenes
@@ -87,16 +86,6 @@ def test_scenes_that_were_not_named_widen_the_inputs(executor, model, built):
         again = pipeline.run(6)
     assert counts == [1, 2, 3, 3]
     assert np.array_equal(again, constant(executor, model, shots[0], 6))
-
-
-def test_inputs_that_are_given(executor, model, built):
-    shots = [cubes(time) for time in TIMES]
-    inputs = varying(shots[:2], SETTINGS)
-    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=inputs) as pipeline:
-        for scene in shots:
-            pipeline.set_scene(scene)
-        assert len(built) == 1
-        assert np.array_equal(pipeline.moment.numbers, inputs.values(shots[-1]))
 
 
 @pytest.mark.nightly(but=("numpy",))

@@ -147,11 +147,6 @@ def test_samples_are_numbered_on(executor):
 # ---- refusals ------------------------------------------------------------------------------------------
 
 
-def test_double_precision_is_refused(executor):
-    with pytest.raises(InputError, match=r"dtype 'float64': kernels compute in float32 \(render with --exec"):
-        render_on(executor, scene("empty"), R.Job(4, 4, dtype="float64"))
-
-
 def test_kernel_in_another_language_is_refused(executor):
     other = "opencl" if executor.name == "numpy" else "numpy"
     kernel = compile_path(lower_scene(scene("empty"), Settings()), other)

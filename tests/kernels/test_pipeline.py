@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import compile_plan
-from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.scenes.emit_path import GROUPS
 from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at, layers_of
-from wamnet.compiler.scenes.lower_scene import FeatureRays, lower_scene
+from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
@@ -24,7 +22,7 @@ from wamnet.kernels.devices.passes import Passes
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import SEEN, Frame
 from wamnet.refimpl.light import scenes
-from wamnet.refimpl.light.render import Job, render
+from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
@@ -222,34 +220,6 @@ def test_features_of_their_own_rays_are_the_separate_way_s(executor, model_of, c
     assert near.mean() >= (1.0 if executor.name in ("numpy", "c") else 0.99)
 
 
-@pytest.mark.nightly(but="16")
-@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
-def test_sums_of_features_are_over_their_rays(executor_named, lanes):
-    """PTK-21: the interpreter adds the bits of single rays; kernels write its sums, deviations too."""
-    programs = lower_scene(scene("cornell"), SETTINGS, rays=FeatureRays(3, "net"))
-    part, size = Part(17, 9, 0, 9, 0, 2, 7), (17, 9)
-    made = compile_path(programs, "numpy")
-    wanted = dict(zip(made.planes, executor_named("numpy").trace(made, part), strict=True))
-    own = [
-        render(scene("cornell"), Job(*size, 1, 7, Settings(max_depth=0, sampler="net"), first_sample=n))
-        for n in range(3)
-    ]
-    for layer in ("albedo", "normal", "depth", "position", "direction", "unshadowed"):
-        total = own[0].frame[layer] + own[1].frame[layer] + own[2].frame[layer]
-        assert np.array_equal(np.stack([wanted[plane] for plane in GROUPS[layer]], axis=-1), total)
-    plain = compile_path(lower_scene(scene("cornell"), SETTINGS), "numpy")
-    colour = dict(zip(plain.planes, executor_named("numpy").trace(plain, part), strict=True))
-    for plane in (*GROUPS["color"], *GROUPS["deviation"]):
-        assert np.array_equal(wanted[plane], colour[plane])
-    for name in ("opencl", "c")[: 2 if lanes == 1 else 1]:
-        kernel = compile_path(programs, name, lanes=lanes)
-        found = executor_named(name).trace(kernel, part)
-        # Of numbers below 200, a sum of three: 2 roundings, and a few of each ray's hit.
-        apart = np.abs(found - np.stack(list(wanted.values()))).max(axis=0) > 200 * 64 * 2.0**-24
-        assert apart.mean() <= 0.02
-    assert kernel.manifest["feature_rays"] == {"count": 3, "sampler": "net"}
-
-
 def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of):
     executor, model = executor_named("numpy"), model_of(("color",), 1, "zero")
     given = (executor, scene("empty"), model, (2, 2))
@@ -351,34 +321,6 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opengl(
 
 
 # ---- its life ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.nightly(but=("numpy",))
-def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
-    """The picture of another time is that of a pipeline made for it; encoding and denoiser stay built."""
-    model, size = model_of(("color", "normal"), 3, "clamp"), (8, 12)
-    with Pipeline(executor, scene("cornell", 2.0), model, size, settings=SETTINGS) as pipeline:
-        wanted = pipeline.run(4)
-    with Pipeline(executor, scene("cornell", 1.0), model, size, settings=SETTINGS) as pipeline:
-        other = pipeline.run(4)
-        kernels = pipeline.encode, pipeline.denoise
-        pipeline.set_scene(scene("cornell", 2.0))
-        assert np.array_equal(pipeline.run(4), wanted)
-        assert kernels == (pipeline.encode, pipeline.denoise)
-    assert np.abs(other - wanted).max() > 1e-3
-
-
-def test_the_first_picture_waits_for_no_proof(executor_named, model_of):
-    """PPL-15: the bound in its header is a valid one, without a certificate's search for a small one."""
-    model, executor = model_of(("color", "normal"), 3, "clamp"), executor_named("numpy")
-    with Pipeline(executor, scene("furnace"), model, (8, 12), settings=SETTINGS) as pipeline:
-        made = pipeline.denoise
-    assert made.certificate is None
-    assert made.plan.unproven == "it was compiled to be run at once, without one"
-    proven = compile_plan(replace(made.plan, proves=True))
-    assert proven.certificate is not None
-    assert all(0 < error < 1 / 255 for error in made.manifest["bound"]["output"])
-    assert ir.digest(made.kernels[0].programs) == ir.digest(proven.kernels[0].programs)
 
 
 def test_seed_samples_and_first_sample(executor, model_of):

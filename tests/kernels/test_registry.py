@@ -50,17 +50,6 @@ def test_opencl_device_is_chosen_by_a_part_of_its_name(executor_named, monkeypat
         assert executor.device == device
 
 
-def test_no_opencl_platform(executor_named, monkeypatch):
-    executor_named("opencl")
-    from wamnet.kernels.devices import opencl_executor
-
-    monkeypatch.setattr(opencl_executor.cl, "get_platforms", list)
-    with pytest.raises(
-        ExecutorUnavailable, match=r"no platform is installed; pip install 'wamnet\[opencl\]'"
-    ):
-        kernels.open_executor("opencl")
-
-
 @pytest.mark.parametrize(
     ("profile", "rounding", "message"),
     [
@@ -86,12 +75,6 @@ def test_opencl_device_with_other_arithmetic(executor_named, monkeypatch, profil
     monkeypatch.setattr(opencl_executor, "_describe", lambda device: "box")
     with pytest.raises(ExecutorUnavailable, match=message):
         kernels.open_executor("opencl")
-
-
-def test_unknown_opengl_context(executor_named):
-    executor_named("opengl-egl")
-    with pytest.raises(InputError, match=r"OpenGL context 'glx': unknown \(choose one of auto, egl, osmesa"):
-        kernels.open_executor("opengl", context="glx")
 
 
 def test_no_opengl_context_names_what_was_tried(executor_named, monkeypatch):

@@ -221,7 +221,9 @@ def text(program: Program) -> str:
         ]
     lines += [f"  %{index} = {_line(node)}" for index, node in enumerate(program.nodes)]
     lines += [f"  output {name} = %{index}" for name, index in program.outputs]
-    lines += [f"  parameter {name}: {_array(array)}" for name, array in sorted(program.parameters.items())]
+    for name, array in sorted(program.parameters.items()):
+        content = sha256(_bytes(array))[:16]
+        lines.append(f"  parameter {name}: {array.dtype}{list(array.shape)} sha256 {content}")
     return "\n".join(lines) + "\n"
 
 
@@ -233,11 +235,6 @@ def _line(node: Node) -> str:
     if node.attributes:
         words.append("{" + ", ".join(f"{name}={value}" for name, value in node.attributes) + "}")
     return " ".join(words) + f" : {node.type}"
-
-
-def _array(array: NDArray[Any]) -> str:
-    """Return type and content hash of a parameter."""
-    return f"{array.dtype}{list(array.shape)} sha256 {sha256(_bytes(array))[:16]}"
 
 
 def digest(program: Program) -> str:

@@ -87,12 +87,6 @@ def groups_of(node: Node) -> list[tuple[int, ...]]:
     return [args[i : i + count] for i in range(0, len(args), max(count, 1))]
 
 
-def split(node: Node) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return a loop's carried numbers, and what they become in a trip (of the first part), as indices."""
-    carried, after, *_ = groups_of(node)
-    return carried, after
-
-
 @dataclass(frozen=True)
 class Part:
     """What is done with a row: the nodes that are computed, in order, and what the carried numbers become."""
@@ -163,7 +157,7 @@ def loops(program: Program) -> tuple[dict[int, Loop], frozenset[int]]:
             number = loop_number(node)
             body = tuple(i for i in kept if number in inside[i] and i < index)
             walk = _walk(program, node, body) if is_walk(node) else None
-            carried, after = split(node)
+            carried, after, *_ = groups_of(node)
             found[index] = Loop(number, int(node["trips"]), carried, after, body, walk)  # type: ignore[arg-type]
     return found, frozenset(kept)
 

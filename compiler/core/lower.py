@@ -57,11 +57,15 @@ def images_of(
     """Return the images of features; `whole`: as a network of integers reads them."""
     known = [FEATURES[name] for name in features]
     images = tuple(Image(f.name, f.channels, f.low, f.high, f.encoding(normalization)) for f in known)
-    return tuple(map(_whole_image, images)) if whole else images
-
-
-def _whole_image(image: Image) -> Image:
-    """Return the same image in integers, as a network of integers reads it."""
-    encoding = f"floor({INPUT_LEVELS} x + 1/2) of x = {image.encoding}"
-    low, high = INPUT_LEVELS * image.low, INPUT_LEVELS * image.high
-    return replace(image, low=low, high=high, encoding=encoding, whole=True)
+    if not whole:
+        return images
+    return tuple(
+        replace(
+            image,
+            low=INPUT_LEVELS * image.low,
+            high=INPUT_LEVELS * image.high,
+            encoding=f"floor({INPUT_LEVELS} x + 1/2) of x = {image.encoding}",
+            whole=True,
+        )
+        for image in images
+    )

@@ -75,53 +75,28 @@ class Polynomial:
     cosine_error: float
 
 
-def _polynomial(
-    coefficients: str, approximation_error: float, error: float, cosine_error: float
-) -> Polynomial:
-    """Return a polynomial whose coefficients are hexadecimal numbers."""
-    numbers = tuple(map(float.fromhex, coefficients.split()))
-    return Polynomial(numbers, approximation_error, error, cosine_error)
-
-
 POLYNOMIALS: Mapping[int, Polynomial] = {
-    3: _polynomial(
-        "0x1.f88ad8p-1 -0x1.23d14cp-3",
-        approximation_error=0.00453,
-        error=0.00453,
-        cosine_error=0.00453,
-    ),
-    5: _polynomial(
-        "0x1.ffd7dap-1 -0x1.5348eap-3 0x1.ec490ap-8",
-        approximation_error=6.86e-05,
-        error=6.88e-05,
-        cosine_error=6.88e-05,
-    ),
-    7: _polynomial(
-        "0x1p+0 -0x1.55501ep-3 0x1.10601p-7 -0x1.83b822p-13",
-        approximation_error=8.95e-07,
-        error=1.1e-06,
-        cosine_error=1.1e-06,
-    ),
-    9: _polynomial(
-        "0x1p+0 -0x1.555548p-3 0x1.110e58p-7 -0x1.9f5ccep-13 0x1.5ccedcp-19",
-        approximation_error=4.92e-09,
-        error=2.08e-07,
-        cosine_error=2.08e-07,
-    ),
-    11: _polynomial(
-        "0x1p+0 -0x1.555556p-3 0x1.111132p-7 -0x1.a0221p-13 0x1.72915ap-19 -0x1.b0e154p-26",
-        approximation_error=2.75e-10,
-        error=2.03e-07,
-        cosine_error=2.03e-07,
-    ),
-    13: _polynomial(
-        "0x1p+0 -0x1.555556p-3 0x1.111142p-7 -0x1.a02d8ap-13 0x1.7566dep-19 -0x1.2337fep-25 0x1.608abap-30",
-        approximation_error=1.61e-10,
-        error=2.03e-07,
-        cosine_error=2.03e-07,
-    ),
+    degree: Polynomial(tuple(map(float.fromhex, coefficients.split())), *errors)
+    for degree, (coefficients, errors) in {
+        3: ("0x1.f88ad8p-1 -0x1.23d14cp-3", (0.00453, 0.00453, 0.00453)),
+        5: ("0x1.ffd7dap-1 -0x1.5348eap-3 0x1.ec490ap-8", (6.86e-05, 6.88e-05, 6.88e-05)),
+        7: ("0x1p+0 -0x1.55501ep-3 0x1.10601p-7 -0x1.83b822p-13", (8.95e-07, 1.1e-06, 1.1e-06)),
+        9: (
+            "0x1p+0 -0x1.555548p-3 0x1.110e58p-7 -0x1.9f5ccep-13 0x1.5ccedcp-19",
+            (4.92e-09, 2.08e-07, 2.08e-07),
+        ),
+        11: (
+            "0x1p+0 -0x1.555556p-3 0x1.111132p-7 -0x1.a0221p-13 0x1.72915ap-19 -0x1.b0e154p-26",
+            (2.75e-10, 2.03e-07, 2.03e-07),
+        ),
+        13: (
+            "0x1p+0 -0x1.555556p-3 0x1.111142p-7 -0x1.a02d8ap-13 0x1.7566dep-19 -0x1.2337fep-25 "
+            "0x1.608abap-30",
+            (1.61e-10, 2.03e-07, 2.03e-07),
+        ),
+    }.items()
 }
-"""Polynomials by degree; the errors are the script's, rounded up."""
+"""Polynomials by degree; the errors (approximation, sine, cosine) are the script's, rounded up."""
 
 DEGREE = 11
 """The degree in use unless another is requested: its approximation error is far below one rounding."""

@@ -66,7 +66,13 @@ class Tracer(Builder):
 
     def where(self) -> tuple[str, ...]:
         """Return the lines of the reference that are being executed, callers first."""
-        return _reference_lines() if self.keeps_places else ()
+        places = []
+        frame: FrameType | None = sys._getframe(1) if self.keeps_places else None
+        while frame is not None:
+            if name := _reference_file(frame.f_code.co_filename):
+                places.append(f"{name}:{frame.f_lineno}")
+            frame = frame.f_back
+        return tuple(places[::-1])
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -111,7 +117,15 @@ class Traced(NDArrayOperatorsMixin):
         return _call(self.builder, function, args, options)
 
     def __fold_rows__(self, step: Any, tables: Any, start: Any) -> Any:
-        return _fold_rows(self.builder, step, tables, start)
+        builder = self.builder
+        if not isinstance(builder, Tracer) or builder.most_unrolled is None or any(map(_is_mixed, tables)):
+            return NotImplemented
+        # Over more rows than are unrolled it is a loop, whose body is one step.
+        if len(tables[0]) <= builder.most_unrolled:
+            return NotImplemented
+        number, carried = _carried(builder, start)
+        after = _stepped(builder, step, tables, number, carried)
+        return _results(builder, number, len(tables[0]), carried, after, {})
 
     def astype(self, dtype: Any) -> Traced:
         """Return the value in another kind of number."""
@@ -346,17 +360,6 @@ def _take(builder: Builder, table: Any, index: Any) -> Traced:
     return value
 
 
-def _fold_rows(builder: Builder, step: Any, tables: Any, start: Any) -> Any:
-    """A fold over more rows than are unrolled is a loop whose body is one step."""
-    if not isinstance(builder, Tracer) or builder.most_unrolled is None or any(map(_is_mixed, tables)):
-        return NotImplemented
-    if len(tables[0]) <= builder.most_unrolled:
-        return NotImplemented
-    number, carried = _carried(builder, start)
-    after = _stepped(builder, step, tables, number, carried)
-    return _results(builder, number, len(tables[0]), carried, after, {})
-
-
 def walk_rows(
     parts: Any, start: Any, enters: Any, boxes: Any, first: NDArray[Any], skip: NDArray[Any]
 ) -> Any:
@@ -494,17 +497,6 @@ def _reference_file(path: str) -> str:
     """Return the name of a file of the reference, refimpl/network/siren.py; nothing for another file."""
     found = Path(path)
     return found.relative_to(REFERENCE.parent).as_posix() if REFERENCE in found.parents else ""
-
-
-def _reference_lines() -> tuple[str, ...]:
-    """Return file:line of each line of the reference that is being executed, callers first."""
-    places = []
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None:
-        if name := _reference_file(frame.f_code.co_filename):
-            places.append(f"{name}:{frame.f_lineno}")
-        frame = frame.f_back
-    return tuple(places[::-1])
 
 
 def _place() -> str:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...refimpl.errors import CompileError
-from .ir import DTYPES, Attribute, Node, Program, Type
-from .loops import bodies, is_walk, loop_number, loops, split
+from .ir import DTYPES, Node, Program, Type
+from .loops import bodies, groups_of, is_walk, loop_number, loops
 from .ops import OPS, TypeRuleError
 
 Rule = Callable[[Program], Iterator[str]]
@@ -113,17 +113,13 @@ def loops_are_whole(program: Program) -> Iterator[str]:
         if node.op != "loop":
             continue
         first = ends.setdefault(loop_number(node), node)
-        if (node.args, _shared(node)) != (first.args, _shared(first)):
+        own, shared = (dict(each.attributes) | {"index": 0} for each in (node, first))
+        if (node.args, own) != (first.args, shared):
             yield f"%{index} and another result of loop {node['loop']} have other operands or trips"
-        for place, arg in enumerate(split(node)[0]):
+        for place, arg in enumerate(groups_of(node)[0]):
             found = program.nodes[arg]
             if found.op != "carried" or (found["index"], found["loop"]) != (place, node["loop"]):
                 yield f"%{index} loop: operand {place} must be carried number {place} of loop {node['loop']}"
-
-
-def _shared(node: Node) -> dict[str, Attribute]:
-    """Return the attributes that all results of a loop have."""
-    return {name: value for name, value in node.attributes if name != "index"}
 
 
 def tables_are_as_long_as_loops(program: Program) -> Iterator[str]:
@@ -172,20 +168,15 @@ def walks_stay_on_their_trees(program: Program) -> Iterator[str]:
             yield f"%{index} loop: table {loop.walk.first} must share out rows 0 to {loop.trips - 1} in order"
         read = [("branch", nodes, loop.walk.guard)]
         read += [("row", end, part.body) for end, part in zip(ends[:, -1], loop.walk.parts, strict=True)]
-        yield from _own_tables(program, read)
-
-
-def _own_tables(program: Program, read: list[tuple[str, int, tuple[int, ...]]]) -> Iterator[str]:
-    """Yield what reads a table in a way, or of a length, that is not its own."""
-    for op, length, body in read:
-        for index in body:
-            node = program.nodes[index]
-            if node.op not in ("row", "branch"):
-                continue
-            found = len(program.parameters[str(node["table"])])
-            if (node.op, found) != (op, length):
-                wanted = f"a {op} of a table of {length}"
-                yield f"%{index} {node.op}: table {node['table']} has {found} rows; {wanted} is read here"
+        for op, length, body in read:
+            for at in body:
+                reader = program.nodes[at]
+                if reader.op not in ("row", "branch"):
+                    continue
+                found = len(program.parameters[str(reader["table"])])
+                if (reader.op, found) != (op, length):
+                    rows = f"table {reader['table']} has {found} rows"
+                    yield f"%{at} {reader.op}: {rows}; a {op} of a table of {length} is read here"
 
 
 def window_matches(program: Program) -> Iterator[str]:

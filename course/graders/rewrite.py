@@ -9,7 +9,7 @@ import numpy as np
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Program, Type
-from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
+from wamnet.compiler.core.passes.rewrite import eliminate_dead
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
 from wamnet.refimpl.errors import CompileError

@@ -2,7 +2,7 @@
 
 A pass is a function from a program to a program that means the same, to the bit. `rewrite` copies a program
 node by node; your rule says what replaces a node: the index of a node that it adds, or None for a copy.
-Tutorial: page 7. Clauses: IR-1, IR-2, IR-8; an example: `compiler/core/passes/fuse_bias.py: fuse_bias`.
+Tutorial: page 7. Clauses: IR-1, IR-2, IR-8; an example: `compiler/core/passes/rewrite.py: fuse_bias`.
 
 The operations are called "add", "negative" and "subtract"; `rewrite(program, rule)` is in
 `wamnet.compiler.core.passes.rewrite`. A rule gets (builder, node, args): args are the node's operands in the

@@ -9,9 +9,8 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Type, text
 from wamnet.compiler.core.loops import bodies, loops
 from wamnet.compiler.core.passes import pipeline
-from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
 from wamnet.compiler.core.passes.fold import fold, fold_float32
-from wamnet.compiler.core.passes.scalarize import scalarize
+from wamnet.compiler.core.passes.rewrite import eliminate_dead, scalarize
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
 from wamnet.compiler.core.weights import tables, weights

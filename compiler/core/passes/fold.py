@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from ..interpret import apply, element
-from ..ir import Builder, Node, Program, Type, attributes
+from ..ir import Builder, Node, Program, Type
 from ..ops import OPS
-from .rewrite import rewrite
+from .rewrite import constant_of, rewrite
 
 NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "multiply": (1.0, True),
@@ -54,7 +54,8 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
     def rule(builder: Builder, node: Node, args: tuple[int, ...]) -> int | None:
         if node.op == "constant" and node.type.dtype == "float32":
             return constant_of(builder, kind.type(node["value"]), "float32")
-        constants = [_constant(builder.nodes[arg]) for arg in args]
+        operands = [builder.nodes[arg] for arg in args]
+        constants: Known = [each["value"] if each.op == "constant" else None for each in operands]  # type: ignore[misc]
         number = not node.type.shape and (OPS[node.op].elementwise or node.op == "take")
         if args and number and all(value is not None for value in constants):
             return _computed(builder, node, args, kind)
@@ -82,14 +83,6 @@ def _computed(builder: Builder, node: Node, args: tuple[int, ...], kind: np.dtyp
     if node.type.dtype == "float32" and not abs(float(value)) <= float(np.finfo(np.float32).max):
         return None
     return constant_of(builder, value, node.type.dtype)
-
-
-def constant_of(builder: Builder, value: Any, dtype: str) -> int:
-    """Return the index of a constant."""
-    if dtype == "float32":
-        return builder.add(Node("constant", (), Type(), attributes(value=float(value))))
-    plain = bool(value) if dtype == "bool" else int(value)
-    return builder.add(Node("constant", (), Type(dtype), attributes(value=plain, dtype=dtype)))
 
 
 def _neutral(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
@@ -141,11 +134,6 @@ def _negated(builder: Builder, node: Node, args: tuple[int, ...], constants: Kno
     if node.op not in ("logical_not", "negative") or builder.nodes[args[0]].op != node.op:
         return None
     return builder.nodes[args[0]].args[0]
-
-
-def _constant(node: Node) -> bool | int | float | None:
-    """Return the value of a constant, None for anything else."""
-    return node["value"] if node.op == "constant" else None  # type: ignore[return-value]
 
 
 def _same(found: bool | int | float | None, wanted: float) -> bool:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....refimpl.errors import CompileError
-from ..ir import Builder, Node, Program, attributes
+from ..ir import Builder, Program, attributes
 from ..ops import OPS
 from ..trace import Traced, emit
 
@@ -100,10 +100,11 @@ class _Walk:
     """What is known on the way from the output to the inputs: the slopes of values, and the sums so far."""
 
     def __init__(self, program: Program) -> None:
-        self.program, self.needs = program, _depends_on_parameters(program)
-        self.builder = Builder()
+        self.program, self.builder = program, Builder()
+        self.needs: list[bool] = []  # for each node, whether a parameter takes part in its value
         for node in program.nodes:
             self.builder.add(node)
+            self.needs.append(bool(OPS[node.op].parameters) or any(self.needs[arg] for arg in node.args))
         self.builder.parameters.update(program.parameters)
         self.slopes: dict[int, Traced] = {}
         self.outputs: list[tuple[str, int]] = []
@@ -119,12 +120,19 @@ class _Walk:
             if node.get("bias") is not None:
                 self._sum(str(node["bias"]), d)
             if self.needs[node.args[0]]:
-                self._add(index, node.args[0], _through(self.builder, node, d))
+                # The transposed matrix has a name of its own, so that it can follow W.
+                name = f"{node['weight']}{TRANSPOSED}"
+                transposed = np.ascontiguousarray(self.builder.parameters[str(node["weight"])].T)
+                self.builder.parameters[name] = transposed
+                through = emit(self.builder, "affine", d, **dict(attributes(weight=name)))
+                self._add(index, node.args[0], through)
         else:
+            if node.op not in RULES:
+                supported = ", ".join(("affine", "parameter", *RULES))
+                raise CompileError(f"{node.op} has no derivative rule; supported: {supported}")
             operands = tuple(Traced(self.builder, arg) for arg in node.args)
-            for arg, part in zip(
-                node.args, _rule(node)(d, Traced(self.builder, index), operands), strict=True
-            ):
+            parts = RULES[node.op](d, Traced(self.builder, index), operands)
+            for arg, part in zip(node.args, parts, strict=True):
                 if self.needs[arg]:
                     self._add(index, arg, part)
 
@@ -143,27 +151,3 @@ class _Walk:
         names = {side: f"{parameter}.{side}" for side in factors}
         self.outputs += [(names[side], factor) for side, factor in factors.items()]
         self.sums[parameter] = Sum(parameter, names["left"], names.get("right"))
-
-
-def _depends_on_parameters(program: Program) -> list[bool]:
-    """Return, for each node, whether a parameter takes part in its value."""
-    found: list[bool] = []
-    for node in program.nodes:
-        found.append(bool(OPS[node.op].parameters) or any(found[arg] for arg in node.args))
-    return found
-
-
-def _through(builder: Builder, node: Node, d: Traced) -> Traced:
-    """Return W^T d; the transposed matrix has a name of its own, so that it can follow W."""
-    name = f"{node['weight']}{TRANSPOSED}"
-    builder.parameters[name] = np.ascontiguousarray(builder.parameters[str(node["weight"])].T)
-    return emit(builder, "affine", d, **dict(attributes(weight=name)))
-
-
-def _rule(node: Node) -> Rule:
-    """Return the rule of the node's operation."""
-    if node.op not in RULES:
-        raise CompileError(
-            f"{node.op} has no derivative rule; supported: {', '.join(('affine', 'parameter', *RULES))}"
-        )
-    return RULES[node.op]

@@ -12,12 +12,8 @@ from ..ir import Program
 from ..profiles import EXPAND_SINE
 from ..sine import POLYNOMIALS
 from ..verify import verify
-from .eliminate_dead import eliminate_dead
-from .expand_sine import expand_sine
-from .expand_tables import expand_tables
 from .fold import fold, fold_float32
-from .fuse_bias import fuse_bias
-from .scalarize import scalarize
+from .rewrite import eliminate_dead, expand_sine, expand_tables, fuse_bias, scalarize
 
 PASSES: Mapping[str, Callable[[Program], Program]] = {
     "fold": fold,

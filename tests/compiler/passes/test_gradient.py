@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wamnet.compiler.core.ir import Type
-from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.core.passes.fuse_bias import fuse_bias
 from wamnet.compiler.core.passes.gradient import RULES, gradient
+from wamnet.compiler.core.passes.rewrite import eliminate_dead, fuse_bias
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.training import step
 from wamnet.compiler.training.step import lower_step, step_of

@@ -8,12 +8,14 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Type
 from wamnet.compiler.core.passes import pipeline
-from wamnet.compiler.core.passes.eliminate_dead import eliminate_dead
-from wamnet.compiler.core.passes.expand_sine import expand_sine
-from wamnet.compiler.core.passes.expand_tables import expand_tables
 from wamnet.compiler.core.passes.fold import fold, fold_float32
-from wamnet.compiler.core.passes.fuse_bias import fuse_bias
-from wamnet.compiler.core.passes.scalarize import scalarize
+from wamnet.compiler.core.passes.rewrite import (
+    eliminate_dead,
+    expand_sine,
+    expand_tables,
+    fuse_bias,
+    scalarize,
+)
 from wamnet.compiler.core.sine import cosine, sine
 from wamnet.compiler.core.trace import trace
 from wamnet.refimpl.errors import CompileError

@@ -1,10 +1,9 @@
 """Compile a plan: header, source, weights and manifest become one artifact [`compile_plan`].
 
 1. The plan has run the passes, picked the schedule and bounded the output [plan.py].
-2. A draft has what is particular to a kernel: a comment that says what it is and promises, what prints the
-   source below it, and facts of the manifest, which says the same as data [`Draft`].
-3. One function makes artifacts of drafts, for kernels of all roles [`assemble`]. A certificate has the steps
-   of the proof of a network's bound.
+2. One function makes artifacts of kernels of all roles: a comment says what a kernel is and promises, its
+   source is below it, and the manifest says the same as data [`assemble`].
+3. A certificate has the steps of the proof of a network's bound.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from . import artifact
 from .artifact import Artifact, schedule_text
 from .core import ir
 from .core.enclosure import round_up as round_up
-from .core.ir import OUTPUT_ENCODING, Gather, Image, Program
+from .core.ir import OUTPUT_ENCODING, Image, Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
 from .core.sums import is_split
@@ -69,54 +68,49 @@ Entry = tuple[str, Sequence[str]]
 """An entry of a header: its title and its lines."""
 
 
-@dataclass(frozen=True)
-class Draft:
-    """What is particular to a kernel: what prints it, the entries of its header, and facts of its manifest.
+def assemble(
+    title: str,
+    profile: Profile,
+    renderer: Renderer,
+    programs_by_name: Sequence[tuple[str, Program]],
+    entries: Sequence[Entry],
+    arguments: str,
+    facts: Mapping[str, Any],
+    programs: Any,
+    images: Sequence[Image] = (),
+    weights: NDArray[np.float32] | None = None,
+    part: str = "",
+) -> Artifact:
+    """Return a kernel with its source and its manifest, of what is particular to it.
 
-    `listed` are its programs by name, which are printed where no language is, `programs` what is kept for an
-    interpreter. `part`: what a language calls it whose hosts join it with the denoiser's other kernel.
+    `renderer` prints it, or where no language is its programs by name are listed; `entries` are those of its
+    header, `facts` of its manifest; `programs` are kept for an interpreter. `part`: what a language calls it
+    whose hosts join it with the denoiser's other kernel.
     """
-
-    title: str
-    profile: Profile
-    renderer: Renderer
-    listed: Sequence[tuple[str, Program]]
-    entries: Sequence[Entry]
-    arguments: str
-    facts: Mapping[str, Any]
-    programs: Any
-    images: Sequence[Image] = ()
-    weights: NDArray[np.float32] | None = None
-    part: str = ""
-
-
-def assemble(draft: Draft) -> Artifact:
-    """Return a kernel with its source and its manifest."""
-    dialect, profile, kernel = draft.renderer.dialect, draft.profile, draft.renderer.kernel
-    role, lines = kernel.interface.role, header(draft.title, dialect, draft.entries)
+    dialect, kernel = renderer.dialect, renderer.kernel
+    role, lines = kernel.interface.role, header(title, dialect, entries)
     is_listed, entry = isinstance(dialect, Listing), dialect.entries[role]
-    source = listed(lines, draft.listed) if is_listed else draft.renderer.source(lines)
-    if draft.part:
-        source, entry = dialect.apart(source, draft.part), dialect.apart(entry, draft.part)
+    source = listed(lines, programs_by_name) if is_listed else renderer.source(lines)
+    if part:
+        source, entry = dialect.apart(source, part), dialect.apart(entry, part)
     files = {f"{role}{dialect.suffix}": source.encode()}
-    if draft.weights is not None:
-        files[artifact.WEIGHTS_NAME] = draft.weights.astype("<f4").tobytes()
+    if weights is not None:
+        files[artifact.WEIGHTS_NAME] = weights.astype("<f4").tobytes()
     manifest = {
         "digest": ir.sha256(*files.values()),
         "target": dialect.target,
         "language": dialect.language,
         "entry_point": entry,
         "profile": {"name": profile.name, "text": profile.text},
-        "arguments": draft.arguments,
+        "arguments": arguments,
         "bound": None,
         "files": {name: ir.sha256(data) for name, data in files.items()},
         SIZES: {name: len(data) for name, data in files.items()},
-        **draft.facts,
+        **facts,
     }
     manifest = json.loads(json.dumps(manifest, allow_nan=False))
-    weights = artifact.NONE if draft.weights is None else draft.weights
-    images, programs = tuple(draft.images), draft.programs
-    return Artifact(source, manifest, kernel.interface, images, programs, kernel, weights)
+    held = artifact.NONE if weights is None else weights
+    return Artifact(source, manifest, kernel.interface, tuple(images), programs, kernel, held)
 
 
 def header(title: str, dialect: Dialect, entries: Sequence[Entry]) -> list[str]:
@@ -198,14 +192,17 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
     """Return the kernel of a plan without a cut; `notes` are further entries of its header."""
     emitted, schedule = plan.emitted, plan.schedule
     weights = schedule.pack(emitted)
+    held = schedule.layout(emitted).values()
+    slots = (f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in held)
+    places = f"{', '.join(slots) or 'none'}; {schedule.order}"
     # Where nothing rounds, a language need not keep the order of operations.
     is_ordered = bound.output is not None and not bound.exact
-    draft = Draft(
+    found = assemble(
         "denoiser",
         plan.profile,
         schedule.renderer(emitted, is_ordered),
         [("", emitted)],
-        [*_entries(plan, bound), *notes, _entry_of_weights(plan)],
+        [*_entries(plan, bound), *notes, ("weights", textwrap.wrap(places, WIDE))],
         schedule.arguments(emitted),
         _facts(plan, bound, weights),
         emitted,
@@ -213,7 +210,7 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
         weights=weights,
         part=part,
     )
-    found, proven = assemble(draft), None
+    proven = None
     if bound.exact:
         proven = certificate.integers(plan.analysed, schedule, emitted, found.manifest)
     elif bound.proof:
@@ -250,13 +247,6 @@ def _entries(plan: Plan, bound: Bound) -> list[Entry]:
     ]
 
 
-def _entry_of_weights(plan: Plan) -> Entry:
-    """Return the entry of the header that says where each parameter is."""
-    places = plan.schedule.layout(plan.emitted).values()
-    slots = [f"{s.name} ({' x '.join(map(str, s.shape))}) at {s.offset}" for s in places]
-    return "weights", textwrap.wrap(f"{', '.join(slots) or 'none'}; {plan.schedule.order}", WIDE)
-
-
 def _bound_text(bound: Bound, program: Program) -> str:
     """Return the bound as a reader wants it, rounded up."""
     if bound.exact:
@@ -270,12 +260,14 @@ def _bound_text(bound: Bound, program: Program) -> str:
 def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, Any]:
     """Return what only the manifest of a network's kernel says."""
     emitted, schedule, gather = plan.emitted, plan.schedule, kernel_gather(plan.emitted)
+    # Of a window along an axis.
+    oblong = {} if gather.rows == gather.columns else {"rows": gather.rows, "columns": gather.columns}
     return {
         "schema": artifact.SCHEMA,
         "program": ir.digest(plan.analysed),
         "sine": asdict_finite(plan.sine),
         "passes": [*pipeline.COMMON, *plan.profile.passes],
-        "window": _window(gather),
+        "window": {**asdict(gather.window), "centre": gather.window.size // 2, **oblong},
         "images": [image.facts for image in gather.images],
         "output": {
             "name": emitted.outputs[0][0],
@@ -297,12 +289,6 @@ def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, 
             "order": schedule.order,
         },
     }
-
-
-def _window(gather: Gather) -> dict[str, Any]:
-    """Return what a manifest says about the window; of one along an axis also its rows and columns."""
-    oblong = {} if gather.rows == gather.columns else {"rows": gather.rows, "columns": gather.columns}
-    return {**asdict(gather.window), "centre": gather.window.size // 2, **oblong}
 
 
 def _info_value(name: str, text: str) -> Any:

@@ -35,7 +35,6 @@ from ..refimpl.network.denoise import Model
 from ..refimpl.network.siren import Siren
 from .core import ir, sine
 from .core.enclosure import round_up
-from .core.ir import Program
 from .core.lower import lower
 from .core.profiles import SineContract
 from .kernel.interface import FULL as FULL
@@ -399,7 +398,10 @@ def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
     box = bounds.window_box(kernel_gather(program))
     layers = [index for index, node in enumerate(program.nodes) if node.op == "affine"]
     assert len(layers) == len(varied.weights), "a lowered model has one affine map a layer"
-    known = _rounded_inputs(program, box) if varied.bits else {}
+    known: dict[int, Enclosure] = {}
+    if varied.bits:  # the window's numbers are rounded: half a step each
+        window = next(index for index, node in enumerate(program.nodes) if node.op == "input")
+        known[window] = Enclosure(*box, np.full_like(box[0], 0.5 / whole.INPUT_LEVELS))
     for layer, index in enumerate(layers):
         node = program.nodes[index]
         until = replace(program, nodes=program.nodes[:index], outputs=())
@@ -423,12 +425,6 @@ def enclose(varied: Varied, plan: Plan) -> list[Enclosure]:
             error=(error + _moved(x, *(inside[n] - outside[n] for n in names))) * (1 + bounds.OUTWARD),
         )
     return bounds.enclose(program, {"window": box}, contract, known=known)
-
-
-def _rounded_inputs(program: Program, box: tuple[Array, Array]) -> dict[int, Enclosure]:
-    """Return the enclosure of the window whose numbers are rounded: half a step each."""
-    window = next(index for index, node in enumerate(program.nodes) if node.op == "input")
-    return {window: Enclosure(*box, np.full_like(box[0], 0.5 / whole.INPUT_LEVELS))}
 
 
 def _moved(x: Enclosure, weight: Array, bias: Array) -> Array:

@@ -364,7 +364,8 @@ class _Builder:
         if rays is None or not (found := self._features("its features")):
             return []
         # The rays of most features draw no further numbers; a compiler may refuse what nothing reads.
-        nodes = [n for part in ("arrive", "look", "shadow") for n in self._nodes(part)]
+        parts = (self.programs.parts.get(part) for part in ("arrive", "look", "shadow"))
+        nodes = (node for program in parts if program for node in program.nodes)
         unread = () if any(n.op == "input" and n["name"] == "pixel" for n in nodes) else ("pixel",)
         known = {"pixel": "uint32", **kinds({**STATE, **SURFACE})}
         body = (
@@ -378,11 +379,6 @@ class _Builder:
             Comment("the features of further camera rays"),
             For("n", const(rays.count), body, start=const(1)),
         ]
-
-    def _nodes(self, part: str) -> Sequence[Node]:
-        """Return the nodes of a program; none if it is not there."""
-        program = self.programs.parts.get(part)
-        return program.nodes if program else ()
 
     def _gathered(self) -> list[Statement]:
         """Return what adds what a path has gathered."""

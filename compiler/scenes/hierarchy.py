@@ -171,17 +171,16 @@ def _halves(low: Array, high: Array, members: Array) -> tuple[Array, Array]:
     counts = np.arange(1, len(members))
     for axis in range(3):
         rows = members[np.argsort((low[members] + high[members])[:, axis], kind="stable")]
-        left, right = (_areas(low[order], high[order]) for order in (rows, rows[::-1]))
+        # Of the boxes around the first 1, 2, ... N - 1 of N, from either end.
+        left, right = (
+            _area(np.minimum.accumulate(low[order]), np.maximum.accumulate(high[order]))[:-1]
+            for order in (rows, rows[::-1])
+        )
         costs = left * counts + (right * counts)[::-1]
         at = int(np.argmin(costs))
         if costs[at] < best:
             best, found = costs[at], (rows[: at + 1], rows[at + 1 :])
     return found
-
-
-def _areas(low: Array, high: Array) -> Array:
-    """Return the areas (N - 1,) of the boxes around the first 1, 2, ... N - 1 of N."""
-    return _area(np.minimum.accumulate(low), np.maximum.accumulate(high))[:-1]
 
 
 def _paying(nodes: tuple[_Node, ...], above: float) -> tuple[_Node, ...]:

@@ -23,9 +23,8 @@ from ...refimpl.errors import CompileError
 from ...refimpl.light.scene import Scene
 from ...refimpl.network.dataset import Normalization
 from ..artifact import Artifact
-from ..compile import Draft, Entry, asdict_finite, assemble
+from ..compile import Entry, asdict_finite, assemble
 from ..core import ir, profiles
-from ..core.ir import Image
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
@@ -55,16 +54,6 @@ SUMS = (
     "of world space; 0 where nothing is hit (a direction is always there)",
 )
 """What the numbers mean that a kernel adds up: for whoever calls it."""
-
-PAST_SUMS = ("seen_*: the same of what is seen past mirrors and glass; albedo times the tints on the way",)
-"""What the planes of `see` mean."""
-
-
-OF_SHADOWS = "direct_*: emission and direct light, by {0} shadow rays of each camera ray"
-"""What the planes of `shadow` mean."""
-
-OF_RAYS = "features are of {0} camera rays of the source {1}, whatever the number of samples: of one launch"
-"""What else is to be known where features have rays of their own."""
 
 
 def can_move(language: Language | str, scene: Scene, tables: Tables, inputs: SceneInputs) -> bool:
@@ -104,7 +93,9 @@ def compile_path(
     emitted, dialect = replace(programs, parts=passed), chosen.dialect
     planes, images = emit_path.planes(groups), encoding.images if encoding else ()
     renderer = renderer_of(emitted, dialect, groups, lanes, encoding)
-    written = (*(_written(images) if images else SUMS), *_notes(programs, bool(images)))
+    described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
+    means = (SUMS[0], "encoded features, means over the samples of one launch:", *described)
+    written = (*(means if images else SUMS), *_notes(programs, bool(images)))
     arguments = _arguments(dialect, lanes, () if images else planes, len(programs.inputs))
     at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
     entries = _entries(programs, promised, at_once, written)
@@ -122,7 +113,7 @@ def compile_path(
         **({"feature_rays": asdict(programs.rays)} if programs.rays else {}),
         **({"shadow_rays": programs.shadow_rays} if "shadow" in programs.parts else {}),
     }
-    draft = Draft(
+    return assemble(
         "path tracer",
         promised,
         renderer,
@@ -133,7 +124,6 @@ def compile_path(
         emitted,
         images=images,
     )
-    return assemble(draft)
 
 
 def _arguments(dialect: Dialect, lanes: int, planes: Sequence[str], count: int) -> str:
@@ -183,29 +173,15 @@ def numbers_of(programs: PathPrograms) -> list[dict[str, Any]]:
     ]
 
 
-NAME_SHOWN = 60
-"""Characters of a scene's name in a source's comment; the manifest has all of it."""
-
-
-def _harmless(name: str) -> str:
-    """Return a scene's name for a comment: a file's letters must not become a kernel's code."""
-    return re.sub(r"[^A-Za-z0-9_. +-]", "_", name[:NAME_SHOWN])
-
-
-def _written(images: Sequence[Image]) -> tuple[str, ...]:
-    """Return what the numbers of encoded images mean."""
-    described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
-    return (SUMS[0], "encoded features, means over the samples of one launch:", *described)
-
-
 def _notes(programs: PathPrograms, encoded: bool) -> Iterator[str]:
     """Yield what else there is to say of the numbers, by the programs that they come from."""
     if "see" in programs.parts and not encoded:
-        yield from PAST_SUMS
+        yield "seen_*: the same of what is seen past mirrors and glass; albedo times the tints on the way"
     if "shadow" in programs.parts:
-        yield OF_SHADOWS.format(programs.shadow_rays)
+        yield f"direct_*: emission and direct light, by {programs.shadow_rays} shadow rays of each camera ray"
     if programs.rays:
-        yield OF_RAYS.format(programs.rays.count, programs.rays.sampler)
+        rays = f"{programs.rays.count} camera rays of the source {programs.rays.sampler}"
+        yield f"features are of {rays}, whatever the number of samples: of one launch"
 
 
 def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Sequence[str]) -> list[Entry]:
@@ -219,8 +195,10 @@ def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Se
     fixed = "camera, time and all of the scene: another moment is another kernel"
     if programs.inputs:
         fixed = f"all of the scene but {len(programs.inputs)} numbers: {interface.SCENE_NUMBERS}"
+    # A file's letters must not become a kernel's code; the manifest has all of the name.
+    scene = re.sub(r"[^A-Za-z0-9_. +-]", "_", programs.scene[:60])
     return [
-        ("scene", [f"{_harmless(programs.scene)}, digest {programs.scene_digest[:32]}"]),
+        ("scene", [f"{scene}, digest {programs.scene_digest[:32]}"]),
         ("paths", [", ".join(settings)]),
         ("schedule", [f"{at_once} at once"]),
         ("profile", [f"{profile.name}: {profile.text}"]),

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...refimpl.errors import CompileError
 from ..artifact import Artifact
-from ..compile import Draft, assemble
+from ..compile import assemble
 from ..core import ir
 from ..core.ir import Image, Program
 from ..core.profiles import Profile
@@ -68,7 +68,7 @@ def compiled(
     ]
     several = {"role": role, "programs": digests, "lanes": kernel.step[0].value}
     own = {"program": digests[0]} if role == ENCODE else several
-    draft = Draft(
+    return assemble(
         title,
         profile,
         renderer,
@@ -79,4 +79,3 @@ def compiled(
         programs,
         images=images,
     )
-    return assemble(draft)

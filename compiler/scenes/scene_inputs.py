@@ -130,7 +130,10 @@ def flattened(laid: Mapping[str, Any]) -> Tables:
 
 def layout_of(tables: Tables) -> tuple[Any, ...]:
     """Return what scenes must have in common to be of one kernel: all but their floats."""
-    return tuple((path, *_kept(table)) for path, table in tables.items())
+    return tuple(
+        (path, table.dtype, table.shape, None if table.dtype == np.float32 else table.tobytes())
+        for path, table in tables.items()
+    )
 
 
 def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
@@ -144,11 +147,6 @@ def varying(scenes: Sequence[Scene], settings: Settings) -> SceneInputs:
                 "kernel takes other parameter values, but not another layout; leave these out"
             )
     return SceneInputs(settings, ()).widened(rows)
-
-
-def _kept(table: NDArray[Any]) -> tuple[Any, ...]:
-    """Return what two scenes must have in common of a table: its form, and its numbers if no floats."""
-    return table.dtype, table.shape, None if table.dtype == np.float32 else table.tobytes()
 
 
 def _tables(value: Any, path: str = "") -> Iterator[tuple[str, NDArray[Any]]]:

@@ -142,7 +142,11 @@ def lower_smooth(normalization: Normalization) -> SmoothPrograms:
     here = floats(*(f"{HERE}{each}" for each in guides))
     there = {**floats(THERE, ends=GUIDED), **light, **floats(SPLINE)}
     tap = lowered("filter", partial(_tap, factors), {**here, **there, **sums}, sums, PASSES)
-    return SmoothPrograms(guide, tap, lowered("filter", _mean, sums, light, PASSES), guides)
+
+    def mean(given: Given) -> Given:
+        return {FEATURE: smoothing.mean(given["total"], given[WEIGHTS])}
+
+    return SmoothPrograms(guide, tap, lowered("filter", mean, sums, light, PASSES), guides)
 
 
 def _guide(exposure_stops: float, layers: Given) -> Given:
@@ -158,11 +162,6 @@ def _tap(factors: Sequence[str | float], given: Given) -> Given:
     sums = given["total"], given[WEIGHTS], given[FEATURE], given[SPLINE]
     total, weights = smoothing.added(*sums, here, given[THERE], np.stack(known, axis=-1))
     return {"total": total, WEIGHTS: weights}
-
-
-def _mean(given: Given) -> Given:
-    """Return the means of a pixel's sums."""
-    return {FEATURE: smoothing.mean(given["total"], given[WEIGHTS])}
 
 
 def compile_smoothing(

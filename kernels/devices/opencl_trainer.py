@@ -21,8 +21,8 @@ from ...compiler.artifact import Artifact
 from ...compiler.core.passes.gradient import TRANSPOSED
 from ...compiler.kernel.kernel import Kernel, Launch, const, substituted
 from ...compiler.kernel.sizes import integer
-from ...compiler.training.derivatives import TILE
 from ...compiler.training.step import SQUARES
+from ...compiler.training.step_kernel import TILE
 from ...compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from ...refimpl.errors import InputError
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.training.step import factor_names
-from ...compiler.training.step_kernel import FIRST, compile_step
+from ...compiler.training.step_kernel import MATRIX, compile_step
 from ...refimpl.errors import InputError, TrainingError
 from ...refimpl.frame import Frame
 from ...refimpl.light.variation import RANGES
@@ -190,7 +190,7 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
 def load(device: Any, state: TrainState) -> None:
     """Put a state on a device: what moves, and the first layer's weights, which may follow its factors."""
     theta, m, v = map(named, (state.parameters, state.moments.m, state.moments.v))
-    device.load(state.step, {**theta, FIRST: state.siren.weights[0]}, m, v)
+    device.load(state.step, {**theta, MATRIX: state.siren.weights[0]}, m, v)
 
 
 def names_of(arrays: Sequence[NDArray[Any]]) -> list[str]:
@@ -199,7 +199,7 @@ def names_of(arrays: Sequence[NDArray[Any]]) -> list[str]:
     One more of them than a weight and a bias a layer: the first weights are two factors.
     """
     layers = len(arrays) // 2
-    first = factor_names(FIRST) if len(arrays) % 2 else (FIRST,)
+    first = factor_names(MATRIX) if len(arrays) % 2 else (MATRIX,)
     others = [f"W{layer}" for layer in range(1, layers)]
     return [*first, *others, *(f"b{layer}" for layer in range(layers))]
 

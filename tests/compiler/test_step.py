@@ -11,9 +11,8 @@ import pytest
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Node, Type, attributes
 from wamnet.compiler.training import step
-from wamnet.compiler.training.derivatives import BLOCK, INPUTS
 from wamnet.compiler.training.step import ADAM_INPUTS, lower_adam, lower_step, step_of
-from wamnet.compiler.training.step_kernel import compile_lowered, compile_step
+from wamnet.compiler.training.step_kernel import BLOCK, INPUTS, compile_lowered, compile_step
 from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import adam

@@ -11,7 +11,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.passes.gradient import TRANSPOSED
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.kernel.verify import KernelError
-from wamnet.compiler.training import derivatives, step
+from wamnet.compiler.training import step, step_kernel
 from wamnet.compiler.training.step import ADAM_INPUTS, lower_adam
 from wamnet.compiler.training.step_kernel import compile_step
 from wamnet.compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
@@ -25,7 +25,7 @@ WIDTHS, SIZE, BATCH, GROUPS = (2 * 2 * 3, 18, 3), 2, 39, 2
 @pytest.fixture(autouse=True)
 def small_tiles(monkeypatch):
     """Let each item have two tiles, of which the second is not full."""
-    monkeypatch.setattr(derivatives, "TILE", 16)
+    monkeypatch.setattr(step_kernel, "TILE", 16)
 
 
 def random_step(rank=0):

@@ -107,7 +107,13 @@ def model_bytes(model: Model) -> bytes:
         **{INFO_PREFIX + name: text for name, text in model.info.items()},
     }
     if isinstance(model.siren, Imported):
-        texts |= _imported_texts(model.siren) | {"version": IMPORTED_VERSION}
+        ends = (model.siren.low, model.siren.high)
+        texts |= {
+            "images": json.dumps([asdict(source) for source in model.siren.sources], sort_keys=True),
+            "steps": json.dumps([asdict(step) for step in model.siren.steps], sort_keys=True),
+            "clip": json.dumps([end if math.isfinite(end) else None for end in ends]),
+            "version": IMPORTED_VERSION,
+        }
         return _encode(MODEL_FORMAT, tensors, texts)
     texts |= {
         "features": json.dumps(model.features),
@@ -134,7 +140,11 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         if name.startswith(INFO_PREFIX)
     }
     if texts["version"] == IMPORTED_VERSION:
-        network = _imported(path, tensors, texts)
+        weights, biases = _layers(path, tensors)
+        sources = _parsed(path, texts, "images", lambda text: _records(Source, text, "images"))
+        steps = _parsed(path, texts, "steps", lambda text: _records(Step, text, "steps"))
+        low, high = _parsed(path, texts, "clip", _ends)
+        network = Imported(weights, biases, 1.0, 1.0, SINE, steps, low, high, sources)
         model = imported_model(network, window, info)
     else:
         model = Model(
@@ -151,25 +161,6 @@ def load_model(path: str | os.PathLike[str]) -> Model:
 def imported_model(network: Imported, window: Window, info: Texts) -> Model:
     """Return the model of an imported network, whose features are its images."""
     return Model(network, tuple(source.name for source in network.sources), window, Normalization(), info)
-
-
-def _imported_texts(network: Imported) -> dict[str, str]:
-    """Return the texts of an imported network."""
-    ends = (network.low, network.high)
-    return {
-        "images": json.dumps([asdict(source) for source in network.sources], sort_keys=True),
-        "steps": json.dumps([asdict(step) for step in network.steps], sort_keys=True),
-        "clip": json.dumps([end if math.isfinite(end) else None for end in ends]),
-    }
-
-
-def _imported(path: Path, tensors: Tensors, texts: Texts) -> Imported:
-    """Return the imported network of a model file."""
-    weights, biases = _layers(path, tensors)
-    sources = _parsed(path, texts, "images", lambda text: _records(Source, text, "images"))
-    steps = _parsed(path, texts, "steps", lambda text: _records(Step, text, "steps"))
-    low, high = _parsed(path, texts, "clip", _ends)
-    return Imported(weights, biases, 1.0, 1.0, SINE, steps, low, high, sources)
 
 
 def _records(kind: type[Any], text: str, name: str) -> tuple[Any, ...]:
@@ -284,7 +275,11 @@ def _read(
         name: np.frombuffer(entry["data"], _TYPES[entry["dtype"]]).reshape(entry["shape"])
         for name, entry in found
     }
-    _check_kind(path, texts, kind, versions)
+    if (given := texts.get("format", "missing")) != kind:
+        raise InputError(f"{path}: format", given, f"must be {kind}", "give a file that wamnet wrote")
+    if (version := texts.get("version", "missing")) not in versions:
+        rule = f"this program reads version {' and '.join(versions)}"
+        raise InputError(f"{path}: version", version, rule, "use the wamnet version that wrote it")
     return tensors, texts
 
 
@@ -297,28 +292,13 @@ def _header_texts(path: Path, content: bytes) -> dict[str, str]:
     header = parse_json(text, f"{path}: header", way_out)
     texts: dict[str, str] = header.pop("__metadata__", None) or {}
     for name, entry in header.items():
-        _check_entry(f"{path}: header: {name}", entry, way_out)
+        what = f"{path}: header: {name}"
+        if not isinstance(entry, dict) or set(entry) != _ENTRY:
+            rule = f"must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
+            raise InputError(what, entry, rule, way_out)
+        if entry["dtype"] not in _TYPES:
+            raise InputError(f"{what}.dtype", entry["dtype"], f"must be one of {', '.join(_TYPES)}", way_out)
     return texts
-
-
-def _check_entry(what: str, entry: Any, way_out: str) -> None:
-    """Refuse a tensor's entry with other keys than these three, or a type that is not known."""
-    if not isinstance(entry, dict) or set(entry) != _ENTRY:
-        rule = f"must be an object with the keys {', '.join(sorted(_ENTRY))} and no others"
-        raise InputError(what, entry, rule, way_out)
-    if entry["dtype"] not in _TYPES:
-        raise InputError(f"{what}.dtype", entry["dtype"], f"must be one of {', '.join(_TYPES)}", way_out)
-
-
-def _check_kind(path: Path, texts: Texts, kind: str, versions: Sequence[str]) -> None:
-    """Refuse a file of another kind or version."""
-    found = texts.get("format", "missing")
-    if found != kind:
-        raise InputError(f"{path}: format", found, f"must be {kind}", "give a file that wamnet wrote")
-    version = texts.get("version", "missing")
-    if version not in versions:
-        rule = f"this program reads version {' and '.join(versions)}"
-        raise InputError(f"{path}: version", version, rule, "use the wamnet version that wrote it")
 
 
 def _tensor(path: Path, tensors: Tensors, name: str) -> NDArray[Any]:

@@ -190,16 +190,11 @@ _BEGINNING = 200
 """Characters of a text that an error may show; it cuts them further."""
 
 
-def _checked(kind: Callable[[str], Any], text: str) -> Any:
-    """Return a number of a bounded length; Python's reader takes NaN and Infinity too."""
-    if len(text) > LONGEST_NUMBER:
-        raise ValueError(f"a number of {len(text)} digits")
-    return kind(text)
-
-
 def _read_number(unusual: list[str], kind: Callable[[str], Any], text: str) -> Any:
     """Return a number; the text of one that is not finite goes to `unusual`."""
-    value = _checked(kind, text)
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"a number of {len(text)} digits")
+    value = kind(text)
     # Python's integers have no largest one, and JSON knows one kind of numbers only.
     if (kind is float or len(text) >= _LONG) and not math.isfinite(float(text)):
         unusual.append(text)
@@ -265,12 +260,9 @@ def refusing(what: str, value: object, rule: str, way_out: str) -> Iterator[None
     except InputError:
         raise
     except BROKEN as error:
-        raise InputError(what, value, f"{rule}: {_reason(error)}", way_out) from None
-
-
-def _reason(error: BaseException) -> str:
-    """Return what an exception of Python says; a missing key says only its name."""
-    return f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
+        # A missing key says only its name.
+        said = f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
+        raise InputError(what, value, f"{rule}: {said}", way_out) from None
 
 
 # ---- dataclasses ------------------------------------------------------------------------------------------

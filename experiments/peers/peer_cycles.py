@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wamnet.kernels.bench.pipelines import Ways
-from wamnet.models.blender.line_process import LineProcess
+from wamnet.models.blender.session import LineProcess
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scene import Scene, to_json
 from wamnet.refimpl.light.transport import Settings

@@ -94,25 +94,20 @@ class Film:
             "device": scene.cycles.device,
         }
 
-    def _denoise(self, prefilter: str) -> None:
-        """Let Blender denoise by Open Image Denoise with this prefilter, or not at all."""
-        cycles = self._scene.cycles
-        cycles.use_denoising = bool(prefilter)
-        if prefilter:
-            cycles.denoiser, cycles.denoising_use_gpu = "OPENIMAGEDENOISE", False
-            cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", prefilter
-            cycles.denoising_quality = "HIGH"
-
     def render(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """Render a frame to the named file."""
-        scene, render = self._scene, self._scene.render
+        """Render a frame to the named file; with a prefilter Blender denoises it by Open Image Denoise."""
+        scene, render, cycles = self._scene, self._scene.render, self._scene.cycles
         scene.frame_set(int(asked["frame"]))
         render.resolution_percentage = self._percent
         if asked["percent"] != 100:
             render.resolution_x, render.resolution_y = int(asked["width"]), int(asked["height"])
             render.resolution_percentage = 100
-        scene.cycles.samples, scene.cycles.seed = int(asked["spp"]), int(asked["seed"])
-        self._denoise(asked.get("prefilter", ""))
+        cycles.samples, cycles.seed = int(asked["spp"]), int(asked["seed"])
+        cycles.use_denoising = bool(prefilter := asked.get("prefilter", ""))
+        if prefilter:
+            cycles.denoiser, cycles.denoising_use_gpu = "OPENIMAGEDENOISE", False
+            cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", prefilter
+            cycles.denoising_quality = "HIGH"
         render.filepath = asked["to"]
         self._bpy.ops.render.render(write_still=True)
         if not Path(asked["to"]).is_file():

@@ -286,12 +286,11 @@ def plan(request: Request) -> list[FramePlan]:
         target_spp = request.spp if split == TRAIN else request.test_spp or request.spp
         for offset, (kind, spp) in enumerate(zip(KINDS, (NOISY_SPP, target_spp), strict=True)):
             job = Job(size, size, spp, request.seed + 2 * index + offset, settings)
-            if split != TRAIN:  # a penumbra is measured by its reference
+            if split != TRAIN or kind == KINDS[0]:  # a penumbra is measured by its reference
                 job = replace(job, shadow_rays=request.shadow_rays)
             if kind == KINDS[0]:
                 rays, sampler = request.feature_spp, request.feature_sampler
                 job = replace(job, feature_spp=rays, feature_sampler=sampler, seen=request.seen)
-                job = replace(job, shadow_rays=request.shadow_rays)
             pictures[kind] = Picture(f"{split}/{numbers[split]:05d}-{kind}.exr", request, draw, job)
         frames.append(FramePlan(split, draw, pictures))
         numbers[split] += 1
@@ -318,22 +317,16 @@ def _check(request: Request) -> None:
         value = request.parameters["time"]
         raise InputError("parameter time", value, "each frame has its own", "use --start and --seconds")
     request.source.at()
-    if request.still is not None:
-        _check_still(request)
+    cameras = (request.yaw_deg, request.pitch_deg, request.distance)
+    varies = any(low < high for low, high in cameras) or request.saturation or request.power
+    if request.still is not None and not varies and sum(request.counts.values()) > 1:
+        rule = "is static, and without a range of camera or lights all its frames show the same"
+        way_out = "give one, for example --yaw=-24:24 --pitch=-5:10"
+        raise InputError("scene", request.scene, rule, way_out)
     last = request.seed + 2 * sum(request.counts.values()) - 1
     if request.seed < 0 or last >= 1 << 32:
         rule = "seeds up to that plus twice the number of frames must fit into 32 bits"
         raise InputError("seed", request.seed, rule, "choose a smaller one, 0 or more")
-
-
-def _check_still(request: Request) -> None:
-    """Reject a static scene whose frames would all show the same."""
-    cameras = (request.yaw_deg, request.pitch_deg, request.distance)
-    varies = any(low < high for low, high in cameras) or request.saturation or request.power
-    if not varies and sum(request.counts.values()) > 1:
-        rule = "is static, and without a range of camera or lights all its frames show the same"
-        way_out = "give one, for example --yaw=-24:24 --pitch=-5:10"
-        raise InputError("scene", request.scene, rule, way_out)
 
 
 def compared(

@@ -105,18 +105,14 @@ def compare(
         for frame in frames:
             for other in (*train, *seen):
                 if difference(hits[frame.name], hits[other.name]) < ALIKE:
-                    raise _alike(frame, other)
+                    what, same = (f"{shown.name} ({shown.time_s:g} s)" for shown in (frame, other))
+                    rule = f"normals and depths are those of {same} in over 99 % of the pixels"
+                    way_out = "move the camera (--yaw, --pitch, --distance) or the scene, choose another "
+                    raise InputError("test frame", what, rule, f"{way_out}--seed, or --test 0")
             seen.append(frame)
         if frames and train:
             found[split] = _nearest(train, frames, hits)
     return found
-
-
-def _alike(frame: Shown, other: Shown) -> InputError:
-    """Return the refusal of two frames."""
-    rule = f"normals and depths are those of {other.name} ({other.time_s:g} s) in over 99 % of the pixels"
-    way_out = "move the camera (--yaw, --pitch, --distance) or the scene, choose another --seed, or --test 0"
-    return InputError("test frame", f"{frame.name} ({frame.time_s:g} s)", rule, way_out)
 
 
 def _nearest(train: Sequence[Shown], frames: Sequence[Shown], hits: Mapping[str, Hits]) -> Comparison:

@@ -91,7 +91,12 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
     reader = Reader(graph, border)
     sources: list[Source] = []
     for name, each in graph.inputs.items():
-        layout = _layout(name, each.sizes)
+        layout = LAYOUTS.get(len(each.sizes), "")
+        if not layout:
+            rule = "rows of values (N, D), or an image (N, C, H, W) or (H, W, C)"
+            raise InputError(f"input {name}: axes", len(each.sizes), rule, "export it this way")
+        if len(layout) == 4 and each.sizes[1] is None and each.sizes[3] is not None:
+            layout = CHANNELS_LAST
         if each.dtype not in TYPES:
             rule = f"one of {', '.join(TYPES)}"
             raise InputError(
@@ -112,16 +117,6 @@ def import_network(path: Path, ranges: Mapping[str, tuple[float, float]], border
     check_model(model)
     types = {source.name: each.dtype for source, each in zip(sources, graph.inputs.values(), strict=True)}
     return Found(model, margin, layers.rounded, types)
-
-
-def _layout(name: str, sizes: tuple[int | None, ...]) -> str:
-    """Return what the axes of an input are."""
-    if len(sizes) == 4 and sizes[1] is None and sizes[3] is not None:
-        return CHANNELS_LAST
-    if len(sizes) not in LAYOUTS:
-        rule = "rows of values (N, D), or an image (N, C, H, W) or (H, W, C)"
-        raise InputError(f"input {name}: axes", len(sizes), rule, "export it this way")
-    return LAYOUTS[len(sizes)]
 
 
 def _source(

@@ -187,21 +187,14 @@ def validate(scene: Scene) -> Scene:
     _check_camera(scene.camera)
     rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
     _check(scene.background, "scene.background", _is_finite, rule, "fix the number")
-    _check(
-        scene.background, "scene.background", _not_negative, "radiance must not be negative", "use 0 or more"
-    )
+    least = "must not be negative", "use 0 or more"
+    _check(scene.background, "scene.background", _not_negative, f"radiance {least[0]}", least[1])
     if scene.environment is not None:
         _check_sky(scene.environment, scene.background)
     for path, part in _parts(scene):
         _check_finite(part, path)
         if not isinstance(part, Light):
-            _check(
-                part.emission,
-                f"{path}.emission",
-                _not_negative,
-                "emission must not be negative",
-                "use 0 or more",
-            )
+            _check(part.emission, f"{path}.emission", _not_negative, f"emission {least[0]}", least[1])
         if isinstance(part, Shape):
             _check(part.reflectance, f"{path}.reflectance", _is_share, *_SHARE_RULE)
             _check_material(part.material, f"{path}.material", has_inside=part.closed)
@@ -250,7 +243,8 @@ def _check_camera(camera: Camera) -> None:
     path, fov = "scene.camera", camera.vertical_fov_deg
     if not 0.0 < fov < 180.0:
         raise InputError(f"{path}.vertical_fov_deg", fov, "must lie between 0 and 180", "40 is a usual angle")
-    forward = _difference(camera.look_at, camera.position)
+    x, y, z = (b - a for a, b in zip(camera.position, camera.look_at, strict=True))
+    forward = (x, y, z)
     if length(forward) == 0.0:
         raise InputError(f"{path}.look_at", camera.look_at, "must differ from position", "move one of them")
     if not spans_area(forward, camera.up):
@@ -322,7 +316,3 @@ def _not_negative(value: Vector) -> bool:
 
 def _is_share(value: Vector) -> bool:
     return min(value) >= 0.0 and max(value) <= 1.0
-
-
-def _difference(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

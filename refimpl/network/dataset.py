@@ -116,13 +116,8 @@ def encode_highlights(values: Array, normalization: Normalization) -> Array:
     return to_display(values, normalization.exposure_stops + HIGHLIGHT_STOPS)
 
 
-def encode_albedo(values: Array, normalization: Normalization) -> Array:
-    """Clip reflectance (..., 3) to [0, 1]."""
-    return np.clip(values, 0.0, 1.0)
-
-
 def encode_share(values: Array, normalization: Normalization) -> Array:
-    """Clip shares (..., 1) to [0, 1]."""
+    """Clip reflectances or shares (...) to [0, 1]."""
     return np.clip(values, 0.0, 1.0)
 
 
@@ -173,7 +168,7 @@ FIRST_HITS = _features(
             "unit normal in world space towards the ray's origin, mean over samples; 0 where nothing is hit",
         ),
         "albedo": (
-            encode_albedo,
+            encode_share,
             "linear reflectance clipped to 0 .. 1, mean over samples; 0 where nothing is hit",
         ),
         "depth": (

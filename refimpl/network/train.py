@@ -114,16 +114,13 @@ PAPER = Recipe(
 )
 """The paper's protocol; what the paper leaves open (omega_0, learning rate) is decided in the spec."""
 
-SHORT = Recipe(
+SHORT = replace(
+    PAPER,
     features=("color", "normal", "albedo", "position"),
-    window=Window(12, "clamp"),
-    widths=(32, 32, 32, 32),
-    omega_0_first=1.0,
     omega_0_hidden=10.0,
     n_windows=0,
     batch=512,
     steps=12_000,
-    learning_rate=1e-3,
     schedule="cosine",
 )
 """Better than the paper's protocol on unseen frames in a minute: `experiments/records/presets.json`."""
@@ -344,7 +341,7 @@ def train(
     state = resumed(state, recipe, data.digest)
     pool = draw_pool(recipe, data)
     end = recipe.steps if until is None else min(until, recipe.steps)
-    keep = on_checkpoint or _forget
+    keep = on_checkpoint or (lambda _: None)
     good: TrainState | None = None
     try:
         while state.step < end:
@@ -374,10 +371,6 @@ def check_parameters(state: TrainState) -> None:
             f"parameters after step {state.step}: must be finite "
             f"(lower the learning rate, {state.recipe.learning_rate}, or check the frames)"
         )
-
-
-def _forget(state: TrainState) -> None:
-    """Keep no checkpoint."""
 
 
 def resumed(state: TrainState, recipe: Recipe, digest: str) -> TrainState:

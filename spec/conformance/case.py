@@ -228,18 +228,13 @@ def _case(data: Mapping[str, Any], folder: Path) -> Case:
     """Return a case from JSON; numbers stay texts until they are compared."""
     expected = None
     if data["valid"]:
-        expected = {name: _output(o) for name, o in data["expected"].items()}
+        expected = {
+            name: Output(**{**output, "accepted": tuple(output.get("accepted", ()))})
+            for name, output in data["expected"].items()
+        }
     inputs = {name: _placed(value, folder) for name, value in data["input"].items()}
     note, refusal = (str(data.get(name, "")) for name in ("note", "refusal"))
     return Case(str(data["clause"]), inputs, expected, note, refusal, tuple(data["flags"]), str(data["id"]))
-
-
-def _output(data: Mapping[str, Any]) -> Output:
-    """Return an expected output from JSON."""
-    accepted = tuple(data.get("accepted", ()))
-    return Output(
-        data["value"], data["bound"], data["source"], accepted, data.get("welch"), str(data.get("clause", ""))
-    )
 
 
 def _placed(value: Any, folder: Path) -> Any:

@@ -18,12 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.core.ir import Program, Type
-from ...compiler.core.passes import pipeline
-from ...compiler.core.trace import trace
+from ...compiler.core.ir import Program
 from ...compiler.proof import ranges
 from ...compiler.scenes.lower_scene import PASSES
-from ...refimpl import vectors
+from ...compiler.scenes.values import FLOAT, NUMBER, Values, apart, lowered, names, numbered
 from .case import EITHER, Kind, Output
 
 Numbers = Mapping[str, Any]
@@ -54,7 +52,7 @@ class Function:
     def kind(self) -> Kind:
         """Return the kind of case."""
         fields = [
-            {name: f"{_shape(field.size)}, {field.text}" for name, field in side.items()}
+            {name: f"float{f'[{f.size}]' * (f.size > 0)}, {f.text}" for name, f in side.items()}
             for side in (self.inputs, self.outputs)
         ]
         return Kind(self.name, self.title, fields[0], fields[1], self.answer, self.expect, float32=True)
@@ -70,9 +68,9 @@ class Function:
 
     def expect(self, inputs: Numbers, wanted: Numbers, told: Mapping[str, Any]) -> dict[str, Output]:
         """Return an answer with bounds; ties that no rounding decides are those that the file calls so."""
-        given = components(self.inputs, inputs)
+        given = apart(values_of(self.inputs), inputs)
         guided = bool(told) and all(output.get("source") == GUIDED for output in told.values())
-        found = ranges.evaluate(self.program(), given, guided=guided)
+        found = ranges.evaluate(self.program, given, guided=guided)
         sure = guided or all(bool(np.all(part.sure & part.known)) for part in found.values())
         outputs = {}
         for name, field in self.outputs.items() if sure else ():
@@ -87,7 +85,7 @@ class Function:
             outside = np.maximum(low - value, value - high)
             sure &= bool(np.max(outside) <= APART * (1.0 + float(np.max(np.abs(value)))))
         if not sure:
-            return self._either(inputs, wanted, ranges.evaluate(self.program(), given, guided=True))
+            return self._either(inputs, wanted, ranges.evaluate(self.program, given, guided=True))
         return outputs
 
     def _either(
@@ -117,32 +115,18 @@ class Function:
         return outputs
 
     @cached_property
-    def _program(self) -> Program:
-        """The traced function."""
-        inputs = {part: Type() for name, field in self.inputs.items() for part in names(name, field.size)}
-
-        def call(*numbers: Any) -> dict[str, Any]:
-            given = dict(zip(inputs, numbers, strict=True))
-            return self.parts(given)
-
-        return pipeline.run(trace(call, inputs), PASSES)
-
     def program(self) -> Program:
-        """Return the traced function, of numbers and to numbers."""
-        return self._program
+        """The traced function, of numbers and to numbers."""
+        return lowered("function", self.single, values_of(self.inputs), values_of(self.outputs), PASSES)
 
-    def parts(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the components of the outputs for those of the inputs, by name, in float32."""
-        fields = {
-            name: vectors.vector(*(given[part] for part in names(name, f.size))) if f.size else given[name]
-            for name, f in self.inputs.items()
-        }
-        return components(self.outputs, self.call(fields, np.float32))
+    def single(self, given: Numbers) -> Numbers:
+        """Return the outputs, with constants in float32."""
+        return self.call(given, np.float32)
 
 
 def _ends(found: Mapping[str, ranges.Range], name: str, field: Field, end: str) -> NDArray[np.float64]:
     """Return one end of the ranges of a field's components."""
-    return np.array([float(getattr(found[part], end)) for part in names(name, field.size)])
+    return np.array([float(getattr(found[part], end)) for part in names(values_of({name: field}))])
 
 
 def _nudged(inputs: Numbers) -> Iterator[dict[str, Any]]:
@@ -172,20 +156,6 @@ ENDS = ("low", "high")
 """The ends of a range."""
 
 
-def names(name: str, count: int) -> list[str]:
-    """Return the names of a field's components."""
-    return [f"{name}_{axis}" for axis in range(count)] if count else [name]
-
-
-def components(fields: Mapping[str, Field], values: Numbers) -> dict[str, Any]:
-    """Return the components of fields by name."""
-    found = {}
-    for name, field in fields.items():
-        for axis, part in enumerate(names(name, field.size)):
-            found[part] = values[name][..., axis] if field.size else values[name]
-    return found
-
-
-def _shape(count: int) -> str:
-    """Return the type of a field for the format page."""
-    return f"float[{count}]" if count else "float"
+def values_of(fields: Mapping[str, Field]) -> Values:
+    """Return fields as values of programs: their components are numbered."""
+    return {name: numbered(field.size) if field.size else (NUMBER, FLOAT) for name, field in fields.items()}

@@ -121,3 +121,15 @@ def _float(leaf: Any, what: str) -> float:
         pass
     rule = "must be a number, as JSON or as text such as 0x1.8p+1"
     raise InputError(what, leaf, rule, "see the format page of this kind")
+
+
+def mean_and_variance(mean: Any, variance: Any, size: int) -> tuple[Any, Any]:
+    """Return means of blocks of pixels (H / size, W / size, C), and the variances of one sample of a block.
+
+    Block means are nearly normal, which single pixels of a path tracer are not. A sample of a block is one of
+    each of its pixels, which are independent: variances are averaged, and divided by the number of pixels.
+    """
+    height, width, channels = mean.shape
+    parts = (height // size, size, width // size, size, channels)
+    means, variances = (np.mean(image.reshape(parts), axis=(1, 3)) for image in (mean, variance))
+    return means, variances / size**2

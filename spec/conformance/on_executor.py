@@ -27,6 +27,7 @@ from ...compiler.core.trace import trace
 from ...compiler.scenes.emit_path import END
 from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.scenes.values import apart, joined, names
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, language_named
 from ...kernels.devices.executor import Executor
@@ -41,12 +42,12 @@ from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import Window
 from ...refimpl.network.whole import INPUT_LEVELS, Whole
 from .case import check_integers, given
-from .functions import Function, components, names
+from .functions import Function, values_of
 from .kinds import FUNCTIONS, KINDS
 from .kinds.files import model_from
 from .kinds.images import frame_of
+from .kinds.network import layers, network_from
 from .kinds.paths import VERTEX
-from .kinds.whole import layers, network_from
 from .numbers import from_json
 
 Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
@@ -74,14 +75,11 @@ class OnExecutor:
             return self._own[kind]({name: given(value) for name, value in inputs.items()}, profile)
         function, kernels = FUNCTIONS[kind], self._compiled(kind, profile)
         fields = {name: np.asarray(from_json(inputs[name], name), np.float32) for name in function.inputs}
-        parts = components(function.inputs, fields)
+        parts = apart(values_of(function.inputs), fields)
         images = {part: np.full((1, 1, 1), value, np.float32) for part, value in parts.items()}
         found = np.concatenate([self.executor.run(kernel, images)[0, 0] for kernel in kernels])
-        outputs, at = {}, 0
-        for name, field in function.outputs.items():
-            outputs[name] = found[at : at + field.size] if field.size else found[at]
-            at += max(field.size, 1)
-        return outputs
+        values = values_of(function.outputs)
+        return joined(values, dict(zip(names(values), found, strict=True)))
 
     def _vertices(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
         """Return every vertex of a path, each from a kernel that stops there."""
@@ -128,7 +126,8 @@ class OnExecutor:
         types = {"window": Type(shape=(gather.n_inputs,))}
         pixel = {f"n{i}": np.full((1, 1, 1), n, np.float32) for i, n in enumerate(np.ravel(inputs["n"]))}
         found: dict[str, Any] = {}
-        for name, width in _widths(network).items():
+        *hidden, last = network.widths[1:]
+        for name, width in (*((f"layer_{i}", width) for i, width in enumerate(hidden)), ("color", last)):
             for first in range(0, width, 3):
                 wanted = range(first, min(first + 3, width))
                 program = trace(partial(_some, network, name, wanted), types, gather)
@@ -146,7 +145,7 @@ class OnExecutor:
     def _compile(self, kind: str, profile: str) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
-        total = sum(max(size, 1) for size in (field.size for field in function.outputs.values()))
+        total = len(names(values_of(function.outputs)))
         threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
         return [self._kernel(_program(function, wanted), profile) for wanted in threes]
 
@@ -173,24 +172,20 @@ def _joined(state: Mapping[str, Any], name: str) -> Any:
 
 def _program(function: Function, wanted: list[int]) -> Program:
     """Return the program of a pixel: inputs are its channels, outputs some of the function's numbers."""
+    inputs, outputs = values_of(function.inputs), values_of(function.outputs)
     images = [
-        Image(part, 1, field.low, field.high)
-        for name, field in function.inputs.items()
-        for part in names(name, field.size)
+        Image(part, 1, function.inputs[name].low, function.inputs[name].high)
+        for name, value in inputs.items()
+        for part in names({name: value})
     ]
     gather = Gather(Window(1, "clamp"), tuple(images))
 
     def call(window: Any) -> Any:
-        found = list(function.parts({image.name: window[..., i] for i, image in enumerate(images)}).values())
+        given = joined(inputs, {image.name: window[..., i] for i, image in enumerate(images)})
+        found = list(apart(outputs, function.single(given)).values())
         return np.stack([found[i] for i in wanted], axis=-1)
 
     return trace(call, {"window": Type(shape=(len(images),))}, gather)
-
-
-def _widths(network: Whole) -> dict[str, int]:
-    """Return the length of what each layer of a network gives, by the name of the output."""
-    *hidden, last = network.widths[1:]
-    return {**{f"layer_{i}": width for i, width in enumerate(hidden)}, "color": last}
 
 
 def _some(network: Whole, name: str, wanted: Sequence[int], window: Any) -> Any:

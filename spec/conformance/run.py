@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from ...kernels.judge.welch import sidak, welch_p
 from ...refimpl.errors import InputError
-from . import blocks
 from . import case as cases_module
 from .case import Case, Output
-from .numbers import from_file, from_json, is_number, number_text
+from .numbers import from_file, from_json, is_number, mean_and_variance, number_text
 from .protocol import NoAnswerError, Session
 
 Numbers = NDArray[Any]
@@ -103,9 +102,12 @@ def run(
                 text = f"not asked: {hung} cases of this kind had no answer in time"
                 yield Verdict(case.id, kind, case.clause, TIMEOUT, text)
             else:
-                verdict = _asked(session, kind, case, profile)
-                hung += verdict.verdict == TIMEOUT
-                yield verdict
+                request = {"id": case.id, "kind": kind, "profile": profile, "input": dict(case.inputs)}
+                try:
+                    yield judge(kind, case, session.ask(request))
+                except NoAnswerError as error:
+                    hung += error.verdict == TIMEOUT
+                    yield Verdict(case.id, kind, case.clause, error.verdict, str(error))
             on_progress(1)
 
 
@@ -117,16 +119,6 @@ def introduced(session: Session) -> Mapping[str, Any]:
         rule = f"must answer to hello ({error.verdict}: {error})"
         way_out = "see spec/conformance.md; give a path such as ./mine, flush each answer; or set --timeout"
         raise InputError("--program", " ".join(session.command), rule, way_out) from None
-
-
-def _asked(session: Session, kind: str, case: Case, profile: str) -> Verdict:
-    """Ask one case."""
-    request = {"id": case.id, "kind": kind, "profile": profile, "input": dict(case.inputs)}
-    try:
-        answer = session.ask(request)
-    except NoAnswerError as error:
-        return Verdict(case.id, kind, case.clause, error.verdict, str(error))
-    return judge(kind, case, answer)
 
 
 def judge(kind: str, case: Case, answer: Mapping[str, Any]) -> Verdict:
@@ -238,7 +230,7 @@ def _as_likely(
     own = int(_read("spp", outputs.get("spp", expected.welch["asked"])))
     if own < int(told["asked"]):
         return (f"{own} samples per pixel, {int(told['asked'])} asked", name, "", ""), np.inf
-    mean, _ = blocks.mean_and_variance(mean, variance, size)
+    mean, _ = mean_and_variance(mean, variance, size)
     wanted = from_json(expected.value, name)
     p = welch_p(mean, told["variance"], own, wanted, told["variance"], count)
     level = sidak(float(told["significance"]), p.size)

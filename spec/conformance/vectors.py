@@ -50,7 +50,7 @@ def _about(kind: Kind, cases: Sequence[Case]) -> list[str]:
     clauses = ", ".join(dict.fromkeys(clause for case in cases for clause in case.clauses))
     counted = f"{len(cases)} cases" + (f", {bad} of them to be refused" if bad else "")
     fields = [
-        f"| {side} | `{name}` | {_cell(text)} |"
+        f"| {side} | `{name}` | " + text.replace("|", "\\|") + " |"
         for side, some in (("input", kind.inputs), ("output", kind.outputs))
         for name, text in some.items()
     ]
@@ -65,11 +65,6 @@ def _about(kind: Kind, cases: Sequence[Case]) -> list[str]:
         "|---|---|---|",
         *fields,
     ]
-
-
-def _cell(text: str) -> str:
-    """Return a text for a cell of a table."""
-    return text.replace("|", "\\|")
 
 
 def contents() -> Mapping[str, bytes]:

@@ -16,7 +16,7 @@ from wamnet.refimpl.light import camera, environment, intersection, sampling, tr
 from wamnet.refimpl.light.materials import conductor, dielectric
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import adam, dataset, siren, smoothing
-from wamnet.spec.conformance import blocks, case, program, report, run, vectors
+from wamnet.spec.conformance import case, numbers, program, report, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
 from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
 from wamnet.spec.conformance.numbers import to_json
@@ -286,7 +286,7 @@ def test_a_large_variance_excuses_nothing(index):
 
 def test_blocks_are_means_of_their_pixels():
     image = np.arange(16.0).reshape(4, 4, 1)
-    mean, variance = blocks.mean_and_variance(image, np.ones((4, 4, 1)), 2)
+    mean, variance = numbers.mean_and_variance(image, np.ones((4, 4, 1)), 2)
     assert mean[..., 0].tolist() == [[2.5, 4.5], [10.5, 12.5]]
     assert np.all(variance == 0.25)
 

@@ -10,7 +10,7 @@ import pytest
 from wamnet.refimpl.network import whole
 from wamnet.spec.conformance.case import FOLDER, given, load
 from wamnet.spec.conformance.kinds import KINDS
-from wamnet.spec.conformance.kinds.whole import CHOSEN
+from wamnet.spec.conformance.kinds.network import CHOSEN
 
 KIND = KINDS["whole.rounded_on"]
 """The kind whose integers are chosen by least squares."""

@@ -19,7 +19,7 @@ from faults import members
 from targets import CommandRefused, Good, Target
 
 from wamnet.refimpl.light.scenes import empty
-from wamnet_verify.case import Shot
+from wamnet_verify.cases import Shot
 from wamnet_verify.judgement import Missing
 from wamnet_verify.renderers import NPZ, ByCommand
 

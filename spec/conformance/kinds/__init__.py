@@ -6,11 +6,9 @@ from collections.abc import Mapping
 
 from ..case import Kind
 from ..functions import Function
-from . import files, images, light, materials, network, numbers, paths, pictures, surfaces, whole
+from . import files, images, light, network, numbers, paths, pictures
 
-FUNCTIONS: Mapping[str, Function] = {
-    f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS, *surfaces.FUNCTIONS, *materials.FUNCTIONS)
-}
+FUNCTIONS: Mapping[str, Function] = {f.name: f for f in (*numbers.FUNCTIONS, *light.FUNCTIONS)}
 """Kinds that are functions of numbers, which executors can run."""
 
 KINDS: Mapping[str, Kind] = {
@@ -23,7 +21,6 @@ KINDS: Mapping[str, Kind] = {
         *images.KINDS,
         *files.KINDS,
         *pictures.KINDS,
-        *whole.KINDS,
         *(function.kind() for function in FUNCTIONS.values()),
     )
 }

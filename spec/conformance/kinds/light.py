@@ -1,18 +1,28 @@
-"""Kinds of light transport: camera rays, sampling with densities, intersections."""
+"""Kinds of light transport: camera rays, sampling with densities, rays against shapes, materials, the sky."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from ....refimpl import vectors
-from ....refimpl.light import camera, environment, sampling
-from ....refimpl.light.scene import Camera, Light, Quad, Sky, Sphere
+from ....refimpl.light import camera, environment, intersection, sampling, transport
+from ....refimpl.light import scene as scene_module
+from ....refimpl.light.intersection import reflecting
+from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirror
+from ....refimpl.light.materials.conductor import distribution, sample_visible_normal, schlick
+from ....refimpl.light.materials.dielectric import fresnel, refract
+from ....refimpl.light.materials.material import Site
+from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
+from ....refimpl.light.shapes.box import slabs
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
-from ....refimpl.light.shapes.shape import BLACK
-from ..case import Kind, within
+from ....refimpl.light.shapes.shape import BLACK, inverse
+from ....refimpl.vectors import dot
+from ..case import FOLDER, Kind, within
 from ..functions import Numbers
 from .tables import direct, function, kind
 
@@ -128,6 +138,156 @@ def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
     return {"t": Quad.distance(row, given["origin"], given["direction"])}
 
 
+# ---- boxes, rooms and scenes ------------------------------------------------------------------------------
+
+GRAY = (0.5, 0.5, 0.5)
+"""A reflectance, which these cases do not depend on."""
+
+EYE = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0))
+"""A camera, which they do not depend on either."""
+
+HALVES = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
+"""A rotation about z."""
+
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""The rotation of what is parallel to the axes."""
+
+BOX = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY, LEVEL)
+"""The box of all rays."""
+
+MIXED = Scene(
+    "mixed",
+    EYE,
+    boxes=(Box((0.0, -0.5, 0.0), (1.0, 0.5, 1.0), GRAY, LEVEL),),
+    spheres=(Sphere((0.0, 0.5, 0.0), 0.5, GRAY),),
+    quads=(Quad((-1.0, 1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), GRAY),),
+)
+"""A sphere between a box and a quad, which it touches."""
+
+HALL = replace(
+    MIXED,
+    name="hall",
+    room=Room((-3.0, -1.0, -3.0), (3.0, 3.0, 3.0), (GRAY,) * 6),
+    lights=(Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), GRAY, 1.0),),
+)
+"""The same shapes and a light in a room."""
+
+SCENES = {
+    "intersection.box": Scene("box", EYE, boxes=(BOX,)),
+    "intersection.turned_box": Scene("turned box", EYE, boxes=(replace(BOX, rotation=HALVES),)),
+    "intersection.room": Scene("room", EYE, Room((-2.0, -1.0, -3.0), (2.0, 1.5, 3.0), (GRAY,) * 6)),
+    "intersection.nearest": MIXED,
+}
+"""What the rays of each kind meet; the titles say it too."""
+
+
+def _met(scene: Scene) -> Any:
+    """Return the function from rays to distance, normal and number of the surface."""
+
+    def call(given: Numbers, dtype: Any) -> dict[str, Any]:
+        geometry = intersection.build(scene, dtype)
+        hit = intersection.closest_hit(geometry, given["origin"], given["direction"])
+        surface = intersection.surface_at(geometry, hit, given["origin"], given["direction"])
+        return {"t": hit.t, "normal": surface.normal, "surface": hit.surface.astype(dtype)}
+
+    return call
+
+
+def _slabs(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return where a ray enters and leaves each slab."""
+    half = np.asarray(BOX.half_extent, dtype)
+    enter, leave = slabs(np.asarray(BOX.center, dtype), half, given["origin"], inverse(given["direction"]))
+    return {"enter": enter, "leave": leave}
+
+
+def _occluded(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return 1 where something is nearer than a distance."""
+    geometry = intersection.build(HALL, dtype)
+    found = intersection.occluded(geometry, given["origin"], given["direction"], given["distance"])
+    one = np.ones_like(given["distance"])
+    return {"occluded": np.where(found, one, 0.0 * one)}
+
+
+# ---- surfaces ---------------------------------------------------------------------------------------------
+
+
+def _site(given: Numbers, parameter: Any = None, outside: Any = None) -> Site:
+    """Return the vertex with a throughput of 1."""
+    reflectance = given["reflectance"]
+    one = np.ones_like(reflectance)
+    return Site(given["wo"], given["normal"], outside, reflectance, one, one * reflectance, parameter)
+
+
+def _sampled(material: Any, given: Numbers, **of_site: Any) -> dict[str, Any]:
+    """Return how a path continues."""
+    found = material.sample(_site(given, **of_site), given["u0"], given["u1"], given["u_choice"])
+    return {name: getattr(found, name) for name in ("direction", "beta", "pdf")}
+
+
+def _valued(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return value and density."""
+    site, wi = _site(given, parameter=given["roughness"]), given["wi"]
+    cosine = np.maximum(dot(site.normal, wi), 0.0)
+    color, factor = Conductor.value(site, wi, cosine)
+    return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
+
+
+def _refracted(wo: Any, normal: Any, ratio: Any) -> tuple[Any, Any]:
+    """Return the direction behind a surface, and its cosine."""
+    nothing = np.zeros_like(wo)
+    site = Site(wo, normal, None, nothing, nothing, nothing, None)
+    return refract(site, np.minimum(np.maximum(dot(wo, normal), 0.0), 1.0), ratio)
+
+
+# ---- lights -----------------------------------------------------------------------------------------------
+
+NO_SETTINGS = cast(transport.Settings, None)
+"""Settings where nobody reads any."""
+
+SKY = Sky((0.16, 0.30, 0.62), (0.62, 0.70, 0.80), (0.18, 0.16, 0.14), (0.6, 0.8, 0.0), (2.6, 2.2, 1.6), 64.0)
+"""The sky of all directions."""
+
+
+@cache
+def _terrace() -> Scene:
+    """Return the scene whose lamps are sampled."""
+    return scene_module.from_json((FOLDER / "scenes/terrace.json").read_text(encoding="utf-8"))
+
+
+class Heuristic(NamedTuple):
+    """All that a weight reads of settings."""
+
+    heuristic: str
+
+
+def _sky(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return radiance and density."""
+    sky, direction = environment.build(SKY, dtype), given["direction"]
+    return {"radiance": environment.radiance(sky, direction), "pdf": environment.pdf(sky, direction)}
+
+
+def _sky_sample(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return a direction."""
+    numbers = (given[name] for name in ("u_choice", "u0", "u1"))
+    return {"direction": environment.sample(environment.build(SKY, dtype), *numbers)}
+
+
+def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return the light of the terrace's lamps at points of its surfaces."""
+    world = transport.build(_terrace(), NO_SETTINGS, dtype)
+    surface = reflecting(given["point"], given["normal"], given["reflectance"])
+    return {"unshadowed": transport.unshadowed(world, surface)}
+
+
+def _light_pdf(given: Numbers, dtype: Any) -> dict[str, Any]:
+    """Return the densities of both lamps of the terrace."""
+    lights = transport.build(_terrace(), NO_SETTINGS, dtype).lights
+    assert lights is not None
+    square, cosine = given["square"], given["cosine"]
+    index = np.zeros_like(square, np.int32)
+    return {f"lamp_{k}": transport.light_pdf(lights, index + np.int32(k), square, cosine) for k in (0, 1)}
+
+
 FUNCTIONS = (
     direct("vector", _vector),
     function("camera.ray", _ray),
@@ -149,5 +309,35 @@ FUNCTIONS = (
     ),
     function("intersection.sphere", _sphere),
     function("intersection.quad", _quad),
+    function("intersection.slabs", _slabs),
+    *(function(name, _met(scene)) for name, scene in SCENES.items()),
+    function("intersection.occluded", _occluded),
+    direct("material.ggx", distribution),
+    direct("material.schlick", schlick),
+    direct("material.visible_normal", sample_visible_normal),
+    direct("material.refracted", _refracted),
+    direct("material.fresnel", fresnel),
+    function("transport.light_pdf", _light_pdf),
+    function("material.lambertian", lambda given, dtype: _sampled(Lambertian, given)),
+    function("material.mirror", lambda given, dtype: _sampled(Mirror, given)),
+    function(
+        "material.conductor", lambda given, dtype: _sampled(Conductor, given, parameter=given["roughness"])
+    ),
+    function("material.conductor_value", _valued),
+    function(
+        "material.dielectric",
+        lambda given, dtype: _sampled(
+            Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5
+        ),
+    ),
+    direct(
+        "transport.mis_weight",
+        lambda pdf, other: tuple(
+            transport.mis_weight(cast(Any, Heuristic(name)), pdf, other) for name in ("balance", "power")
+        ),
+    ),
+    function("transport.unshadowed", _unshadowed),
+    function("sky.radiance", _sky),
+    function("sky.sample", _sky_sample),
 )
 """The functions of this module."""

@@ -1,7 +1,7 @@
-"""Kinds of the network: initial parameters, activations layer by layer, derivatives, Adam over several steps.
+"""Kinds of networks: first parameters, activations layer by layer, derivatives, Adam; and those of integers.
 
 Bounds are those of compiler/proof/bounds.py (PRO-6) at the case's own inputs; for Adam they are ranges, step
-by step.
+by step. Of integers every bound is 0.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from ....compiler.proof import bounds, ranges
 from ....compiler.proof.ranges import Range
 from ....compiler.training.step import ADAM_INPUTS, SQUARES, lower_adam, step_of, sum_errors
 from ....refimpl.errors import InputError
-from ....refimpl.network import adam, siren, train
+from ....refimpl.network import adam, siren, train, whole
 from ....refimpl.network.siren import Siren
+from ....refimpl.network.whole import Whole
 from ..case import Output, exact
 from .tables import kind
 
@@ -164,7 +165,7 @@ def _adam(inputs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.array([row[i] for row in rows]) for i, name in enumerate(("theta", "m", "v"))}
 
 
-def _rounded(value: float) -> Range:
+def _either_way(value: float) -> Range:
     """Return the range of a float64 number that may be rounded to float32, either way."""
     near = np.float32(value)
     ends = sorted((float(np.nextafter(near, np.float32(0))), float(np.nextafter(near, np.float32(np.inf)))))
@@ -178,7 +179,7 @@ def _of_adam(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) ->
     state: dict[str, Any] = {"theta": inputs["theta"], "m": zero, "v": zero}
     rows: list[Mapping[str, Range]] = []
     for t, gradient in enumerate(inputs["gradients"], start=1):
-        grown = [_rounded(value) for value in adam.growth(t)]
+        grown = [_either_way(value) for value in adam.growth(t)]
         given = (state["theta"], gradient, state["m"], state["v"], rate, *grown)
         state = dict(ranges.evaluate(program, dict(zip(ADAM_INPUTS, given, strict=True))))
         rows.append(state)
@@ -189,10 +190,92 @@ def _of_adam(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) ->
     return expected
 
 
+# ---- integers ---------------------------------------------------------------------------------------------
+
+INTEGERS = "integers: no operation rounds"
+"""Where the bound 0 comes from."""
+
+CHOSEN = "integers: what is rounded is at least 2^-12 from a tie, and float64 is off by less than 2^-20"
+"""Where the bound 0 comes from: the covariance has a condition of at most 100 D_in + 1 (WHO-14), so that any
+way to solve for a dozen inputs is off by some 1e-9."""
+
+PARTS = ("weight", "factor", "bias")
+"""The arrays of a layer, as inputs name them."""
+
+
+def integers(values: Array) -> Array:
+    """Return whole floats (...) as integers."""
+    return np.asarray(values).astype(np.int64)
+
+
+def _input(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of encoded features."""
+    return {"n": integers(whole.round_image(np.asarray(inputs["x"], np.float32)))}
+
+
+def _sine(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of phases."""
+    phases = np.asarray(inputs["phase"], np.float64).astype(np.uint32)
+    return {"value": integers(whole.whole_sine(phases, int(inputs["amplitude"])))}
+
+
+def network_from(inputs: Mapping[str, Any]) -> Whole:
+    """Return the network of a case, or refuse it."""
+    count = sum(name.startswith("weight_") for name in inputs)
+    given = [[np.asarray(inputs[f"{name}_{layer}"], np.float64) for layer in range(count)] for name in PARTS]
+    fields = {name: int(inputs[name]) for name in ("amplitude", "fraction")}
+
+    def network(dtype: type[np.floating[Any]]) -> Whole:
+        weights, factors, biases = (tuple(array.astype(dtype) for array in arrays) for arrays in given)
+        return Whole(weights, biases, 1.0, 1.0, factors=factors, **fields)  # type: ignore[arg-type]
+
+    whole.check_whole(network(np.float64))  # float32 rounds what is beyond the limits to what is not
+    return network(np.float32)
+
+
+def layers(network: Whole, numbers: Any) -> dict[str, Any]:
+    """Return the numbers of each hidden layer, and the colour; inputs (..., D_in) may be traced."""
+    hidden = whole.sine_layers(network, numbers, len(network.weights) - 1)
+    found = {f"layer_{layer}": values for layer, (_, values) in enumerate(hidden)}
+    return {**found, "color": whole.forward_whole(network, numbers)}
+
+
+def _forward_whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the integers of each hidden layer, and the colour."""
+    found = layers(network_from(inputs), np.asarray(inputs["n"], np.float32))
+    return {name: value if name == "color" else integers(value) for name, value in found.items()}
+
+
+def _rounded(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a network in integers."""
+    return _in_order(whole.rounded(network_of(inputs), int(inputs["size"]), int(inputs["amplitude"])))
+
+
+def _in_order(network: Whole) -> dict[str, Any]:
+    """Return what a network holds: first what the weights depend on, and those of the first layer last."""
+    found: dict[str, Any] = {"fraction": network.fraction}
+    for name, arrays in zip(PARTS, (network.weights, network.factors, network.biases), strict=True):
+        found |= {f"{name}_{layer}": integers(array) for layer, array in enumerate(arrays)}
+    order = sorted(found, key=lambda name: (name.startswith("weight_"), name == "weight_0"))
+    return {name: found[name] for name in order}
+
+
+def _rounded_on(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a network in integers that was rounded on windows."""
+    windows = np.asarray(inputs["windows"], np.float64)
+    size, amplitude = int(inputs["size"]), int(inputs["amplitude"])
+    return _in_order(whole.rounded_on(network_of(inputs), windows, size, amplitude))
+
+
 KINDS = (
     kind("network.init", _init, exact("exact, rounded once to float32")),
     kind("network.forward", _forward, _of_forward),
     kind("network.gradient", _gradient, _of_gradient),
     kind("adam.run", _adam, _of_adam),
+    kind("whole.input", _input, exact(INTEGERS)),
+    kind("whole.sine", _sine, exact(INTEGERS)),
+    kind("whole.forward", _forward_whole, exact(INTEGERS)),
+    kind("whole.rounded", _rounded, exact(INTEGERS)),
+    kind("whole.rounded_on", _rounded_on, exact(CHOSEN)),
 )
 """The kinds of this module."""

@@ -24,8 +24,8 @@ from ....refimpl.frame import LAYERS, Frame, validate
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.render import Job, render
 from ....refimpl.network import dataset, denoise
-from .. import blocks
 from ..case import Output, within
+from ..numbers import mean_and_variance
 from . import paths
 from .files import model_from
 from .images import ULP, frame_of
@@ -84,7 +84,7 @@ def _of_rendered(inputs: Mapping[str, Any], wanted: Any, told: Mapping[str, Any]
     block_px = int(told["mean"]["welch"]["block"])
     seed = REFERENCE_SEED + int(inputs["seed"])
     found = _render({**inputs, "spp": REFERENCE_SPP, "seed": seed})
-    mean, variance = blocks.mean_and_variance(found["mean"].astype(np.float64), found["variance"], block_px)
+    mean, variance = mean_and_variance(found["mean"].astype(np.float64), found["variance"], block_px)
     welch = {
         "variance": variance,
         "spp": REFERENCE_SPP,

@@ -1,13 +1,18 @@
-"""All cases: rows of `cases.json`, a picture each with its questions, and the answers that are computed.
+"""All cases: a rule, a picture to render, a question about some of its pixels, and the known answer.
 
-1. A camera of one degree looks at a place where the answer is known; its pixels are samples of one value.
-   Colours differ between channels, so that exchanged or joined channels show.
-2. Layers are those of one wall through the origin, seen at 39 degrees by a camera whose axes are not those of
+1. A [`Rule`] is a sentence about all renderers; [`RULES`] are in the order in which one rests on another, so
+   that the first one that is broken is the one to look at.
+2. A [`Shot`] is a scene and how to render it: a row of `cases.json`, with its questions. A camera of one
+   degree looks at a place where the answer is known; its pixels are samples of one value. Colours differ
+   between channels, so that exchanged or joined channels show.
+3. A [`Question`] asks for the mean of a block of a layer. `intents` are the answers of renderers that deviate
+   on purpose, by profile [`PROFILES`]. Answers without a number in the file are computed [`COMPUTED`].
+4. Layers are those of one wall through the origin, seen at 39 degrees by a camera whose axes are not those of
    the world, so that both kinds of normals differ; distances are requested in a corner of the picture, where
    those along the ray and along the view differ. Materials take turns on it. There distances change by 1.6
    and 0.9 per cent a pixel along its sides, points by twice that, and a layer that is not a mean over a pixel
    is of any point of it: hence their slack. Distances along the view are 11 per cent off.
-3. Rooms scatter 64 times: of a reflectance of 0.8 the tail is 5e-7.
+5. Rooms scatter 64 times: of a reflectance of 0.8 the tail is 5e-7.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -25,10 +31,80 @@ from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import scene as scene_module
 from wamnet.refimpl.light.camera import camera_basis
-from wamnet.refimpl.light.scene import Camera
+from wamnet.refimpl.light.scene import Camera, Scene
 
 from . import answers
-from .case import RULES, Question, Shot
+
+SLACK = 2e-3
+"""How far a mean may be off without a statistical reason, in the answer's largest channel: half floats of a
+picture round by 2**-11 = 5e-4; rays that leave a surface at a distance, and the curvature of an answer over a
+view of a degree, are below 1e-3 in every scene. That of display-encoded levels is 0.6 / 255: half a level of
+8 bits, and a tenth for tables of encoders."""
+
+SIZE = 8
+"""Pixels along each side of a picture: a few thousand of its paths are a mean that is nearly normal."""
+
+Block = tuple[int, int, int, int]
+"""Rows and columns of a picture: top, left, height, width."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A sentence that holds for every renderer, and what usually breaks it."""
+
+    sentence: str
+    suspects: str
+
+
+_TEXTS = json.loads(Path(__file__).with_name("rules.json").read_text(encoding="utf-8"))
+"""Sentences of rules, and of profiles."""
+
+RULES: Mapping[str, Rule] = {name: Rule(*texts) for name, texts in _TEXTS["rules"].items()}
+"""All rules by name: a later one's cases are made of what earlier ones are about."""
+
+PROFILES: Mapping[str, str] = _TEXTS["profiles"]
+"""Deviations by intent in a sentence, by the names of answers in [`Question.intents`]."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A scene to render: `size` square pixels, `spp` samples, at most `depth` scatterings.
+
+    `layers`: albedo, normal, depth and position are requested too; `display`: an 8-bit picture for a screen.
+    """
+
+    name: str
+    scene: Scene
+    size: int = SIZE
+    spp: int = 64
+    depth: int = 16
+    layers: bool = False
+    display: bool = False
+
+
+@dataclass(frozen=True)
+class Question:
+    """What the mean of a block of a layer must be: three numbers, or one for depth.
+
+    `scale` is the unit of `slack` and of what must be detected: by default the answer's largest magnitude,
+    or 1. An intent of None says that a renderer of that profile may show anything.
+    """
+
+    name: str
+    rule: str
+    shot: Shot
+    answer: tuple[float, ...]
+    source: str
+    layer: str = "color"
+    block: Block | None = None
+    slack: float = SLACK
+    intents: Mapping[str, tuple[float, ...] | None] = field(default_factory=dict)
+
+    @property
+    def scale(self) -> float:
+        """The unit of deviations; that of levels of a screen is white."""
+        return 1.0 if self.layer == "display" else max(map(abs, self.answer)) or 1.0
+
 
 Answer = tuple[float, ...]
 

@@ -15,7 +15,7 @@ from wamnet.cli.files.outputs import check_new_folder, check_output, making_fold
 from wamnet.refimpl.errors import InputError
 
 if TYPE_CHECKING:
-    from .case import Question
+    from .cases import Question
     from .judgement import Verdict
     from .renderers import Renderer
 
@@ -115,7 +115,7 @@ def verify_renderer(
     is "not tested". Ends with status 1 if a rule is broken.
     """
     from . import report, run
-    from .cases import chosen
+    from .cases import PROFILES, chosen
 
     questions = chosen(words or ())
     if write is not None:
@@ -124,7 +124,10 @@ def verify_renderer(
             raise InputError("--write", str(write), rule, "leave --renderer and --command out")
         _write_scenes(write, _known_form(form), questions)
         return
-    profiles = _known_profiles(profile or ())
+    profiles = list(profile or ())
+    for name in profiles:
+        if name not in PROFILES:
+            raise InputError("--profile", name, "it is unknown", f"known are {', '.join(PROFILES)}")
     _check_numbers(pictures, seed, timeout)
     for path in (as_json, markdown):
         if path is not None:
@@ -143,16 +146,6 @@ def verify_renderer(
     _print(asked.name, verdicts)
     if any(verdict.deviates for verdict in verdicts):
         raise typer.Exit(STATUS_DEVIATES)
-
-
-def _known_profiles(names: Sequence[str]) -> list[str]:
-    """Return the names, or refuse an unknown one."""
-    from .case import PROFILES
-
-    for name in names:
-        if name not in PROFILES:
-            raise InputError("--profile", name, "it is unknown", f"known are {', '.join(PROFILES)}")
-    return list(names)
 
 
 def _known_form(form: str | None) -> str:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from wamnet.kernels.judge.welch import holm, student_quantile, welch_p
 
-from .case import PROFILES, RULES, Question
+from .cases import PROFILES, RULES, Question
 
 SIGNIFICANCE = 0.01
 """Chance of any false alarm in a run over all questions."""
@@ -165,10 +165,11 @@ def judge(
     """Return the verdicts about pictures by the name of their shot."""
     missing = [_missing(question, pictures[question.shot.name]) for question in questions]
     tested = [q for q, why in zip(questions, missing, strict=True) if why is None]
-    found = {q.name: _verdict(q, pictures[q.shot.name], profiles, len(tested), significance) for q in tested}
+    shown = {name: some for name, some in pictures.items() if not isinstance(some, Missing)}
+    found = {q.name: _verdict(q, shown[q.shot.name], profiles, len(tested), significance) for q in tested}
     falls = holm(np.array([found[q.name].p for q in tested]), significance) if tested else np.zeros(0, bool)
     for question, falling in zip(tested, falls, strict=True):
-        found[question.name] = _decided(found[question.name], bool(falling), pictures[question.shot.name])
+        found[question.name] = _decided(found[question.name], bool(falling), shown[question.shot.name])
     return [found[q.name] if why is None else why for q, why in zip(questions, missing, strict=True)]
 
 
@@ -188,13 +189,12 @@ def _missing(question: Question, pictures: Sequence[Picture] | Missing) -> Verdi
 
 def _verdict(
     question: Question,
-    pictures: Sequence[Picture] | Missing,
+    pictures: Sequence[Picture],
     profiles: Collection[str],
     tested: int,
     significance: float,
 ) -> Verdict:
     """Return a verdict with all numbers, before the correction says whether it deviates."""
-    assert not isinstance(pictures, Missing)
     answer, profile = expected(question, profiles)
     found = measure(question, question.answer if answer is None else answer, pictures)
     freedom = max(found.count - 1, 1)
@@ -214,9 +214,8 @@ def _verdict(
     )
 
 
-def _decided(verdict: Verdict, falls: bool, pictures: Sequence[Picture] | Missing) -> Verdict:
+def _decided(verdict: Verdict, falls: bool, pictures: Sequence[Picture]) -> Verdict:
     """Return the verdict after the correction."""
-    assert not isinstance(pictures, Missing)
     if verdict.state == INTENT:
         return verdict
     if falls:

@@ -24,7 +24,7 @@ from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
 from wamnet.refimpl.light.shapes.quad import light_radiance
 from wamnet.refimpl.light.shapes.shape import Vector
 
-from .case import Shot
+from .cases import Shot
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from wamnet.refimpl.light.scene import to_json
 from wamnet.refimpl.light.transport import Settings
 
 from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray, write_three
-from .case import Shot
+from .cases import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
 from .parts import NotExpressed
 
@@ -70,20 +70,14 @@ class Format:
     intents: tuple[str, ...] = ()
 
 
-def _own_scene(shot: Shot, seed: int) -> str:
-    """Return the scene as this project writes it; size, samples and seed are for the command."""
-    del seed
-    return to_json(shot.scene)
-
-
 FORMATS: Mapping[str, Format] = {
-    "wamnet": Format(".json", _own_scene),
-    "mitsuba": Format(write_mitsuba.SUFFIX, write_mitsuba.write),
-    "blender": Format(write_blender.SUFFIX, write_blender.write),
-    "povray": Format(write_povray.SUFFIX, write_povray.write),
-    "luxcore": Format(write_luxcore.SUFFIX, write_luxcore.write),
-    "gltf": Format(write_gltf.SUFFIX, write_gltf.write, ("schlick-metals",)),
-    "three": Format(write_three.SUFFIX, write_three.write, ("schlick-metals",)),
+    "wamnet": Format(".json", lambda shot, _: to_json(shot.scene)),
+    "mitsuba": Format(".xml", write_mitsuba.write),
+    "blender": Format(".py", write_blender.write),
+    "povray": Format(".pov", write_povray.write),
+    "luxcore": Format(".py", write_luxcore.write),
+    "gltf": Format(".gltf", write_gltf.write, ("schlick-metals",)),
+    "three": Format(".json", write_three.write, ("schlick-metals",)),
 }
 """Forms of scene files by name: a new one is a module and a line here."""
 

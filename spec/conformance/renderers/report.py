@@ -15,7 +15,7 @@ from typing import Any
 
 from wamnet.refimpl.errors import escaped
 
-from .case import RULES
+from .cases import RULES
 from .judgement import DEVIATES, SIGNIFICANCE, UNTESTED, Verdict, first_blamed, sentence_of
 from .run import counts
 

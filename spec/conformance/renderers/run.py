@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .case import Question, Shot
+from .cases import Question, Shot
 from .judgement import DEVIATES, SIGNIFICANCE, UNCONFIRMED, Missing, Picture, Verdict, judge, measure
 from .renderers import Renderer
 

@@ -17,11 +17,8 @@ from __future__ import annotations
 
 import math
 
-from .case import Shot
+from .cases import Shot
 from .parts import GLASS, METAL, Look, axes_of, frame_of, parts_of, script
-
-SUFFIX = ".py"
-"""Of the file's name."""
 
 
 def write(shot: Shot, seed: int) -> str:

@@ -20,12 +20,10 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from wamnet.refimpl.light.scene import Camera
-
-from .case import Shot
+from .cases import Shot
 from .parts import (
     GLASS,
     MATTE,
@@ -39,14 +37,14 @@ from .parts import (
     sky_of,
 )
 
-SUFFIX = ".gltf"
-"""Of the file's name."""
-
 FLOAT, UINT32 = 5126, 5125
 """Types of the components of an accessor."""
 
 VERTICES, CORNERS = 34962, 34963
 """What a view of the buffer is for: points and normals, or numbers of corners."""
+
+ARRAYS = ("points", "normals", "corners")
+"""The arrays of a mesh."""
 
 NEAR = 1e-4
 """Distance of the near plane; there is no far one."""
@@ -62,6 +60,13 @@ def write(shot: Shot, seed: int) -> str:
     materials = [_material(mesh) for mesh in meshes]
     used = sorted({name for material in materials for name in material["extensions"]})
     named = {"name": "camera", "camera": 0, "matrix": matrix_of(scene.camera)}
+    angle = math.radians(scene.camera.vertical_fov_deg)
+    view = {"yfov": angle, "aspectRatio": 1.0, "znear": NEAR}
+    # A mesh by the numbers of its arrays, of which each has three, and of its material.
+    parts = [
+        {"attributes": {"POSITION": 3 * i, "NORMAL": 3 * i + 1}, "indices": 3 * i + 2, "material": i}
+        for i in range(len(meshes))
+    ]
     data = {
         "asset": {"version": "2.0", "generator": "wamnet"},
         "extensionsUsed": used,
@@ -70,8 +75,8 @@ def write(shot: Shot, seed: int) -> str:
             {"name": shot.name, "nodes": list(range(len(meshes) + 1)), "extras": request_of(shot, seed)}
         ],
         "nodes": [{"name": f"part {i}", "mesh": i} for i in range(len(meshes))] + [named],
-        "cameras": [_camera(scene.camera)],
-        "meshes": [_primitives(i) for i in range(len(meshes))],
+        "cameras": [{"type": "perspective", "perspective": view}],
+        "meshes": [{"primitives": [part]} for part in parts],
         "materials": materials,
         **_arrays(meshes),
     }
@@ -79,23 +84,11 @@ def write(shot: Shot, seed: int) -> str:
     return json.dumps({name: value for name, value in data.items() if value != []}, allow_nan=False) + "\n"
 
 
-def _camera(camera: Camera) -> dict[str, Any]:
-    """Return the camera's angle of view; it looks along its own -z."""
-    angle = math.radians(camera.vertical_fov_deg)
-    return {"type": "perspective", "perspective": {"yfov": angle, "aspectRatio": 1.0, "znear": NEAR}}
-
-
-def _primitives(number: int) -> dict[str, Any]:
-    """Return a mesh by the numbers of its arrays, of which each has three, and of its material."""
-    attributes = {"POSITION": 3 * number, "NORMAL": 3 * number + 1}
-    return {"primitives": [{"attributes": attributes, "indices": 3 * number + 2, "material": number}]}
-
-
 def _arrays(meshes: Sequence[Mesh]) -> dict[str, Any]:
     """Return accessors, views and the buffer; all components have four bytes, and so are aligned."""
     accessors: list[dict[str, Any]] = []
     views, parts, start = [], [], 0
-    for name, array in _each(meshes):
+    for name, array in ((each, getattr(mesh, each)) for mesh in meshes for each in ARRAYS):
         data = array.astype(array.dtype.newbyteorder("<")).tobytes()
         target = CORNERS if name == "corners" else VERTICES
         views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data), "target": target})
@@ -112,12 +105,6 @@ def _arrays(meshes: Sequence[Mesh]) -> dict[str, Any]:
     text = base64.b64encode(b"".join(parts)).decode("ascii")
     buffer = {"byteLength": start, "uri": f"data:application/octet-stream;base64,{text}"}
     return {"accessors": accessors, "bufferViews": views, "buffers": [buffer]}
-
-
-def _each(meshes: Sequence[Mesh]) -> Iterator[tuple[str, Any]]:
-    """Yield the arrays of each mesh with their names."""
-    for mesh in meshes:
-        yield from (("points", mesh.points), ("normals", mesh.normals), ("corners", mesh.corners))
 
 
 def _material(mesh: Mesh) -> dict[str, Any]:

@@ -11,11 +11,8 @@ Source: LuxCore's reference of properties of scenes and of render configurations
 
 from __future__ import annotations
 
-from .case import Shot
+from .cases import Shot
 from .parts import GLASS, MATTE, METAL, MIRROR, Look, NotExpressed, axes_of, parts_of, script
-
-SUFFIX = ".py"
-"""Of the file's name."""
 
 
 def write(shot: Shot, seed: int) -> str:

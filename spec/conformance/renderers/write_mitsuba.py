@@ -16,11 +16,8 @@ import numpy as np
 
 from wamnet.refimpl.light.scene import Camera
 
-from .case import Shot
+from .cases import Shot
 from .parts import GLASS, MATTE, METAL, MIRROR, Array, Look, Parts, Sheet, axes_of, parts_of, text
-
-SUFFIX = ".xml"
-"""Of the file's name."""
 
 LAYERS = "albedo:albedo,normal:sh_normal,depth:depth,position:position"
 """Names and kinds of arbitrary output variables."""

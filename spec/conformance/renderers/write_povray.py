@@ -11,11 +11,8 @@ Source: POV-Ray 3.7's reference, sections 3.3 to 3.5.
 
 from __future__ import annotations
 
-from .case import Shot
+from .cases import Shot
 from .parts import GLASS, MATTE, METAL, MIRROR, Array, Look, NotExpressed, axes_of, frame_of, parts_of, text
-
-SUFFIX = ".pov"
-"""Of the file's name."""
 
 
 def write(shot: Shot, seed: int) -> str:

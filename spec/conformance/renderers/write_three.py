@@ -24,13 +24,11 @@ from typing import Any
 import numpy as np
 
 from wamnet.refimpl.encoding import LEVELS, srgb_decode
-from wamnet.refimpl.light.scene import Camera
 
-from .case import Shot
+from .cases import Shot
 from .parts import (
     GLASS,
     MATTE,
-    Look,
     Mesh,
     NotExpressed,
     matrix_of,
@@ -39,9 +37,6 @@ from .parts import (
     physical,
     request_of,
 )
-
-SUFFIX = ".json"
-"""Of the file's name."""
 
 WHITE_LEVELS = 0xFFFFFF
 """A colour of 1 in all channels."""
@@ -82,14 +77,11 @@ def write(shot: Shot, seed: int) -> str:
         {"uuid": f"part {i}", "type": "Mesh", "geometry": f"geometry {i}", "material": f"material {i}"}
         for i in range(len(meshes))
     ]
-    scene["children"] = [*parts, _camera(shot.scene.camera)]
+    view = {"fov": shot.scene.camera.vertical_fov_deg, "aspect": 1.0, "zoom": 1.0, **PLANES}
+    matrix = matrix_of(shot.scene.camera)
+    camera = {"uuid": "camera", "type": "PerspectiveCamera", **view, "matrix": matrix}
+    scene["children"] = [*parts, camera]
     return json.dumps(data | {"object": scene}, allow_nan=False) + "\n"
-
-
-def _camera(camera: Camera) -> dict[str, Any]:
-    """Return the camera: right, up, back and position are the columns of its matrix."""
-    view = {"fov": camera.vertical_fov_deg, "aspect": 1.0, "zoom": 1.0, **PLANES}
-    return {"uuid": "camera", "type": "PerspectiveCamera", **view, "matrix": matrix_of(camera)}
 
 
 def _sky(radiance: Sequence[float]) -> dict[str, Any]:
@@ -145,15 +137,12 @@ def _material(number: int, mesh: Mesh) -> dict[str, Any]:
         "specularIntensity": 0.0 if look.kind == MATTE else 1.0,
         "side": FRONT if mesh.front else BOTH,
     }
-    return found | (_glass(look, mesh.thick) if look.kind == GLASS else {})
-
-
-def _glass(look: Look, thick: float) -> dict[str, Any]:
-    """Return what makes a body refract."""
-    if look.number > LARGEST_IOR:
-        raise NotExpressed(f"index above {LARGEST_IOR:.4g}")
-    reflectivity = 2.5 * (look.number - 1.0) / (look.number + 1.0)
-    return {"transmission": 1.0, "reflectivity": reflectivity, "thickness": thick}
+    if look.kind == GLASS:
+        if look.number > LARGEST_IOR:
+            raise NotExpressed(f"index above {LARGEST_IOR:.4g}")
+        reflectivity = 2.5 * (look.number - 1.0) / (look.number + 1.0)
+        found |= {"transmission": 1.0, "reflectivity": reflectivity, "thickness": mesh.thick}
+    return found
 
 
 def levels_of(emission: Sequence[float]) -> tuple[int, float]:

@@ -7,8 +7,7 @@ import pytest
 
 from wamnet.refimpl.light.scene import validate
 from wamnet_verify import answers
-from wamnet_verify.case import PROFILES, RULES, SLACK
-from wamnet_verify.cases import questions
+from wamnet_verify.cases import PROFILES, RULES, SLACK, questions
 
 
 def test_cases_are_whole():

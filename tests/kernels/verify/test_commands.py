@@ -16,8 +16,7 @@ from wamnet.refimpl.light.scene import Scene, Sphere, from_json
 from wamnet.refimpl.light.scenes import daylight, empty
 from wamnet_verify import renderers as R
 from wamnet_verify import report, run
-from wamnet_verify.case import Shot
-from wamnet_verify.cases import chosen, questions
+from wamnet_verify.cases import Shot, chosen, questions
 from wamnet_verify.command import read_layers
 from wamnet_verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing, Verdict
 from wamnet_verify.parts import NotExpressed, parts_of

@@ -15,8 +15,7 @@ from wamnet.refimpl.light.materials import Dielectric, Mirror
 from wamnet.refimpl.light.scene import Quad, Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify import write_gltf
-from wamnet_verify.case import Shot
-from wamnet_verify.cases import questions
+from wamnet_verify.cases import Shot, questions
 from wamnet_verify.parts import NotExpressed
 from wamnet_verify.run import shots_of
 

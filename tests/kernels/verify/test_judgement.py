@@ -14,8 +14,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify import judgement as J
 from wamnet_verify import report, run
-from wamnet_verify.case import RULES, Question, Shot
-from wamnet_verify.cases import chosen
+from wamnet_verify.cases import RULES, Question, Shot, chosen
 
 SIZE = 4
 SHOT = Shot("shot", empty(), size=SIZE)

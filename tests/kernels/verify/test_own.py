@@ -11,8 +11,7 @@ import pytest
 from wamnet.refimpl.light import camera, intersection, transport
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Lambertian, dielectric
 from wamnet_verify import judgement, run
-from wamnet_verify.case import RULES
-from wamnet_verify.cases import questions
+from wamnet_verify.cases import RULES, questions
 from wamnet_verify.renderers import Own
 
 CHEAP = 16

@@ -18,8 +18,7 @@ from wamnet.refimpl.light.materials import Dielectric
 from wamnet.refimpl.light.scene import Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify import write_three
-from wamnet_verify.case import Shot
-from wamnet_verify.cases import questions
+from wamnet_verify.cases import Shot, questions
 from wamnet_verify.parts import NotExpressed
 from wamnet_verify.run import shots_of
 from wamnet_verify.write_three import LEVEL_SLACK, levels_of

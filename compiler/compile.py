@@ -45,10 +45,6 @@ KEPT_INFO = ("normalization", "recipe", "steps_done", "data_digest", "trained_on
 """What of a model's info a manifest repeats: how to encode images, and where the weights come from."""
 
 
-JSON_INFO = ("normalization", "recipe")
-"""Which of them are JSON texts."""
-
-
 AGAINST = "float64 reference, same float32 weights and images"
 """What a bound compares a kernel with."""
 
@@ -294,7 +290,7 @@ def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, 
 def _info_value(name: str, text: str) -> Any:
     """Return a text of a model's info, or its value where it is JSON: an untrusted text may be anything."""
     with suppress(InputError):
-        return parse_json(text, name, "train again") if name in JSON_INFO else text
+        return parse_json(text, name, "train again") if name in ("normalization", "recipe") else text
     return text
 
 

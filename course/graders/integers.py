@@ -14,7 +14,7 @@ from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
-from wamnet.spec.conformance.kinds.whole import network_from
+from wamnet.spec.conformance.kinds.network import network_from
 
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors
 from ..wire import Expression

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 from ..errors import NO_VALUE, InputError, choice
-from ..reading import Special, parse_json, to_dataclass
+from ..reading import parse_json, to_dataclass
 from .materials import MATERIALS, Material
 from .shapes import SHAPES, Shape
 from .shapes import Box as Box
@@ -157,7 +157,7 @@ def from_json(text: str | bytes) -> Scene:
     if version is True or version != VERSION:
         rule = f"must be {VERSION}"
         raise InputError("scene.version", version, rule, "convert the file or update wamnet")
-    return validate(to_dataclass(Scene, data, "scene", largest=LARGEST_NUMBER, special=SPECIAL))
+    return validate(to_dataclass(Scene, data, "scene", largest=LARGEST_NUMBER, special={Material: _material}))
 
 
 def _material(value: Any, path: str) -> Material:
@@ -172,9 +172,6 @@ def _material(value: Any, path: str) -> Material:
         raise InputError(f"{path}.kind", kind, "unknown material", choice(str(kind), MATERIALS))
     return to_dataclass(MATERIALS[kind], data, path, largest=LARGEST_NUMBER)
 
-
-SPECIAL: Special = {Material: _material}
-"""Fields whose annotation does not say how they are made."""
 
 # -----------------------------------------------------------------------------------------------------------
 # Rules

@@ -28,23 +28,18 @@ def serve(requests: Iterable[str], answers: TextIO, name: str, kinds: Sequence[s
     """Answer each request with a line."""
     for line in requests:
         request = json.loads(line)
-        if request["kind"] == "hello":
-            found: Mapping[str, Any] = {"program": name, "kinds": list(kinds)}
+        kind, found = request["kind"], {"id": request.get("id")}
+        if kind == "hello":
+            found = {"program": name, "kinds": list(kinds)}
+        elif kind not in kinds:
+            found["unsupported"] = f"no kind {kind}"
         else:
-            found = {"id": request["id"], **_answered(request, kinds, answer)}
+            try:
+                found["output"] = to_json(dict(answer(kind, request["input"], request["profile"])))
+            except (InputError, CompileError) as error:
+                found["refused"] = str(error)
         answers.write(json.dumps(found) + "\n")
         answers.flush()
-
-
-def _answered(request: Mapping[str, Any], kinds: Sequence[str], answer: Answer) -> Mapping[str, Any]:
-    """Return what the answer to a request says."""
-    kind = request["kind"]
-    if kind not in kinds:
-        return {"unsupported": f"no kind {kind}"}
-    try:
-        return {"output": to_json(dict(answer(kind, request["input"], request["profile"])))}
-    except (InputError, CompileError) as error:
-        return {"refused": str(error)}
 
 
 def of_reference(kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:

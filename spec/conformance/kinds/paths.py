@@ -31,10 +31,8 @@ from ....refimpl.light.transport import Counters, Path, Settings
 from ....refimpl.reading import to_dataclass
 from ..case import Expect, Output
 from ..functions import SOURCE
+from .network import STEPS
 from .tables import kind
-
-CHAIN = "ranges of single precision under profile ieee, from step to step (compiler/proof/ranges.py)"
-"""Where the bounds of whole paths come from."""
 
 State = dict[str, Any]
 
@@ -279,7 +277,7 @@ def _of_whole(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -
         sides = [_ends(state, name, parts)[:2] for state in reach]
         low, high = (np.reshape([side[i] for side in sides], wanted[name].shape) for i in (0, 1))
         bound = np.maximum(high - wanted[name], wanted[name] - low)
-        expected[name] = Output(wanted[name], bound if name != "surface" else 0.0, CHAIN)
+        expected[name] = Output(wanted[name], bound if name != "surface" else 0.0, STEPS)
     return expected
 
 

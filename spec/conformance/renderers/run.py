@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -83,7 +84,4 @@ def smaller(question: Question) -> Question:
 
 def counts(verdicts: Sequence[Verdict]) -> Mapping[str, int]:
     """Return how many verdicts there are of each state."""
-    found: dict[str, int] = {}
-    for verdict in verdicts:
-        found[verdict.state] = found.get(verdict.state, 0) + 1
-    return found
+    return Counter(verdict.state for verdict in verdicts)

@@ -11,7 +11,7 @@ the header of a denoiser's other kernel [`C.finished`, `C.apart`].
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import (
@@ -163,7 +163,14 @@ class C(Arguments):
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif""",
     )
-    vector_kinds: Mapping[str, str] = {"float32": "wamnet_vector", "int32": "wamnet_sums"}
+    vector_kinds = {"float32": "wamnet_vector", "int32": "wamnet_sums"}
+    linkage = "static "
+    mixed = (
+        "float {name}[{count} * LANES];",
+        "{name} + ({index}) * LANES",
+        "({kind} *)({name} + {index} * LANES)",
+    )
+    mixed_number = "{name}[{index}]"
     at_once = "as many paths as a vector register of the compiler's target holds"
     path_lanes = 16
     paints = True
@@ -274,39 +281,18 @@ class C(Arguments):
         """
         found, role = super().fitted(kernel), kernel.interface.role
         found.calls_vectors = not kernel.functions and role != PATH
+        if not found.calls_vectors:
+            found.mixed = (self.mixed[0], f"*(wamnet_vector *)({self.mixed[1]})", self.mixed[2])
         found.clamp = self.clamp if role == DENOISE else f"wamnet_{role}_clamp"
         if role == PATH:
             vars(found).update(vector_kinds=TYPES, vector_operations=OPERATIONS, helpers=HELPERS)
         return found
-
-    def transform_head(self, name: str, kind: str) -> str:
-        """Return the first lines of a transform."""
-        return f"static {super().transform_head(name, kind)}"
-
-    def mixed_address(self, name: str, index: str, kind: str) -> str:
-        """Return the address of a vector of an array whose components are read by their own index."""
-        return f"({kind} *)({name} + {index} * LANES)"
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of one value in all lanes."""
         if kind in TYPES.values():
             return f"wamnet_all({kind}, {MASKS.get(values[0], values[0])})"
         return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
-
-    def vector_kind(self, dtype: str, lanes: int) -> str:
-        """Return the name of the vector type."""
-        return self.vector_kinds[dtype]
-
-    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
-        """Return the declaration of an array of vectors whose components are read by their own index."""
-        return f"float {name}[{count} * LANES];"
-
-    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
-        """Return a component of such an array, or the address of a vector."""
-        if number:
-            return f"{name}[{index}]"
-        address = f"{name} + ({index}) * LANES"
-        return address if self.calls_vectors else f"*(wamnet_vector *)({address})"
 
     def _of_paths(self, kernel: Interface) -> list[str]:
         """Return the functions of a path kernel up to the statements of a pixel."""

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from ..core.profiles import CUDA_SINE
 from ..kernel.instructions import CUDA_GROUP, CUDA_VECTOR
 from ..kernel.interface import DENOISE, PATH, Interface
-from ..kernel.kernel import Type
 from .c import C
 from .dialect import Dialect, Parts
 from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
@@ -55,6 +54,9 @@ class CUDA(Arguments):
     reads = "const {kind} *__restrict__ {name}"
     writes = "{kind} *__restrict__ {name}"
     long = "size_t"
+    space = ""
+    linkage = "static __device__ inline "
+    mixed_number = "((float *){name})[{index}]"
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     scalars = {**Dialect.scalars, "uint32": "unsigned int"}
     clamp = "wamnet_clamp"
@@ -111,16 +113,3 @@ class CUDA(Arguments):
         """Return a vector of values, or of one in all lanes."""
         made = "wamnet_made" if kind == "wamnet_vector" else f"make_{kind}"
         return f"{made}({', '.join(values if len(values) > 1 else [*values] * 4)})"
-
-    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
-        """Return the first lines of a function of values."""
-        return f"static __device__ inline {super().function_head(name, takes, result)}"
-
-    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
-        """Return a component of an array of vectors, or a vector."""
-        return f"((float *){name})[{index}]" if number else f"{name}[{index}]"
-
-    def weights_as_vectors(self, kind: Type) -> list[str]:
-        """Return the declaration of the weights as vectors."""
-        vector = self.vector_kind(kind.dtype, kind.lanes)
-        return [f"    const {vector} *w = (const {vector} *)weights;"] if kind.lanes > 1 else []

@@ -2,7 +2,7 @@
 
 A dialect is all that the emitters know of a language, for every role of a kernel:
 
-1. Statements are made by methods [`Dialect.let_value`, `Dialect.for_loop`, ...] and by templates of one line.
+1. Statements are made by methods [`Dialect.memory`, `Dialect.for_loop`, ...] and by templates of one line.
    Names in braces: `image` and `channels` of a feature image, `index` into the weights, `i` and `value` of an
    output channel and `result` its array, `0`, `1`, `2` the operands of an operation, `type` the type of its
    result, `table` the name of its table, `name`, `count` and `values` of a table's declaration. An
@@ -87,7 +87,9 @@ class Dialect:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
     `scalars`: the types of single numbers. `staged`: a launch is a program, which is compiled if STAGE is
     its number; `declares_memory`: what launches of a denoiser hand on are arrays like others. `numbers`
-    makes the address of a vector that of its first number.
+    makes the address of a vector that of its first number. `mixed`: of an array of vectors whose components
+    are read by their own index too the declaration, an element, and an element's address, and
+    `mixed_number` such a component; `linkage` is before the type of a function, `place_type` that of places.
     """
 
     target: str
@@ -115,6 +117,16 @@ class Dialect:
     clamp: str = "clamp"
     scalars: Mapping[str, str] = {"float32": "float", "int32": "int", "uint32": "uint", "bool": "bool"}
     byte: str = "uchar"
+    place_type: str = "int"
+    vector_kinds: Mapping[str, str] = {
+        "float32": "float{lanes}", "int32": "int{lanes}", "uint32": "uint{lanes}", "bool": "bool{lanes}",
+    }  # fmt: skip
+    let: str = "{kind} {name} = {value};"
+    loop: str = "for (int {name} = {start}; {name} < {end}; {turn}) {{"
+    turn: str = "++{name}"
+    linkage: str = ""
+    mixed: tuple[str, str, str] = ("{kind} {name}[{count}];", "{name}[{index}]", "{name} + {index}")
+    mixed_number: str = "{name}[({index}) / 4][({index}) % 4]"
     qualifiers: Mapping[str, str] = {}
     table: str
     at_once: str = ""
@@ -316,7 +328,7 @@ class Dialect:
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type."""
-        return f"{self.scalars[dtype]}{lanes}"
+        return self.vector_kinds[dtype].format(lanes=lanes)
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of values, or of one in all lanes."""
@@ -324,31 +336,15 @@ class Dialect:
 
     def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
         """Return the first lines of a function of values."""
-        return f"{result} {name}({', '.join(f'{kind} {each}' for each, kind in takes)})\n{{"
+        return f"{self.linkage}{result} {name}({', '.join(f'{kind} {each}' for each, kind in takes)})\n{{"
 
     def component(self, lane: int, lanes: int) -> str:
         """Return the name of a component of a vector."""
         return "xyzw"[lane]
 
-    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
-        """Return the declaration of an array of vectors whose components are read by their own index."""
-        return self.memory(kind, name, [count])
-
-    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
-        """Return a component of such an array, or a vector."""
-        return f"{name}[({index}) / 4][({index}) % 4]" if number else f"{name}[{index}]"
-
     def transform_head(self, name: str, kind: str) -> str:
         """Return the first lines of a transform: `from` in steps of `step`, `to` in those of `leap`."""
-        return f"void {self.own}{name}(const {kind} *from, int step, {kind} *to, int leap)\n{{"
-
-    def mixed_address(self, name: str, index: str, kind: str) -> str:
-        """Return the address of a vector of an array whose components are read by their own index."""
-        return f"{name} + {index}"
-
-    def let_value(self, kind: str, name: str, value: str) -> str:
-        """Return the declaration of a value that never changes."""
-        return f"{kind} {name} = {value};"
+        return f"{self.linkage}void {self.own}{name}(const {kind} *from, int step, {kind} *to, int leap)\n{{"
 
     def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
         """Return the declaration of an array, or of a variable."""
@@ -356,12 +352,12 @@ class Dialect:
 
     def for_loop(self, name: str, start: str, end: str, step: str) -> str:
         """Return the line that opens a loop."""
-        turn = f"++{name}" if step == "1" else f"{name} += {step}"
-        return f"for (int {name} = {start}; {name} < {end}; {turn}) {{"
+        turn = self.turn.format(name=name) if step == "1" else f"{name} += {step}"
+        return self.loop.format(name=name, start=start, end=end, turn=turn)
 
     def index(self, name: str, value: str) -> str:
         """Return the declaration of a place in an image or a window."""
-        return f"int {name} = {value};"
+        return self.let.format(kind=self.place_type, name=name, value=value)
 
     def number(self, value: Any, dtype: str) -> str:
         """Return the text of a number of the given kind."""

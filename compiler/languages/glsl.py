@@ -57,8 +57,10 @@ PREAMBLE = f"""\
 #endif"""
 """First lines of a shader. `PRECISE` qualifies temporaries: it is `precise` where the compiler knows that."""
 
-WEIGHT_TEXTURE = "uniform sampler2D weight_texture;"
-"""The declaration of the weights."""
+
+def is_texture(weights: Given | None) -> bool:
+    """Return whether weights are read from a texture."""
+    return weights is not None and weights.home != BLOCK and weights.shape != (0,)
 
 
 def fetch(kind: str, index: str, place: str, part: str) -> list[str]:
@@ -95,7 +97,11 @@ def said_of_denoiser(texture: str) -> str:
 
 
 class GLSL(Dialect):
-    """The dialect's table; `preamble` are the first lines, in which `{unordered}` has its place."""
+    """The dialect's table; `preamble` are the first lines, in which `{unordered}` has its place.
+
+    `sampler`, `colour`: the declarations of a texture and of a colour buffer; `started` is before the name of
+    a buffer that gets its first value; `above`: functions above `main`.
+    """
 
     target = "opengl"
     language = "GLSL 3.30, fragment shader"
@@ -113,6 +119,7 @@ class GLSL(Dialect):
     pixel = "texelFetch(image_{image}, ivec2({column}, {row}), 0)[{c}]"
     weight = "weights({index})"
     store = "{result}[{i}] = {value};"
+    vector_kinds = {"float32": "vec{lanes}", "int32": "ivec{lanes}", "bool": "bvec{lanes}"}
     texel = "texelFetch(image_{image}, ivec2({column}, {row}), 0).{part}"
     weight_vector = "weights({index})"
     vector_operations = {
@@ -138,6 +145,11 @@ class GLSL(Dialect):
         ),
     }
     fragment = ("int(gl_FragCoord.x)", "int(gl_FragCoord.y)")
+    sampler = "uniform sampler2D {name};"
+    colour = "layout(location = {number}) out vec4 {name};"
+    started = ""
+    main = "void main()"
+    above: tuple[str, ...] = ()
     max_output_channels = 4 * MOST_RESULTS
     channels_per_result: int | None = 4
     planes_per_buffer = 4
@@ -170,104 +182,41 @@ class GLSL(Dialect):
             return said.replace(said_of_weights("R32F"), "")
         return said.replace("R32F", "RGBA32F") if kernel.weights.lanes > 1 else said
 
-    def vector_kind(self, dtype: str, lanes: int) -> str:
-        """Return the name of a vector type."""
-        return f"{ {'float32': '', 'int32': 'i', 'uint32': 'u', 'bool': 'b'}[dtype] }vec{lanes}"
-
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
-        of_role = {DENOISE: self.denoise_begin, PATH: self.path_begin}.get(
-            kernel.role, self.begin_on_textures
-        )
-        return "\n".join(
-            [self.preamble.format(unordered=self.unordered[parts.bounded]), *of_role(kernel, parts)]
-        )
-
-    def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of a denoiser."""
-        array = kernel.named(WEIGHTS)
-        weights, function = [WEIGHT_TEXTURE], [*fetch("float", "index", "texel", ".r"), ""]
-        if self.vectors and self.vectors.lanes > 1:
-            function = [*fetch("vec4", "texel", "place", ""), ""]
-        if array is not None and array.home == BLOCK:
-            weights, function = [f"layout(std140) uniform Weights {{ vec4 weights[{array.quads}]; }};"], []
-        if array is None or array.shape == (0,):
-            weights, function = [], []
-        first = kernel.images[0].name
-        return [
-            parts.top,
-            *self.images(kernel),
-            *weights,
-            *self.declared_results(kernel),
-            "",
-            *function,
-            "void main()",
-            "{",
-            f"    int width = textureSize({first}, 0).x;",
-            f"    int height = textureSize({first}, 0).y;",
-            *self.started(kernel),
-        ]
-
-    def images(self, kernel: Interface) -> list[str]:
-        """Return the declarations of the images that are read."""
-        return [f"uniform sampler2D {image.name};" for image in kernel.images]
-
-    def declared_results(self, kernel: Interface) -> list[str]:
-        """Return the declarations of what a denoiser writes."""
-        names = enumerate(self._results(kernel))
-        return [f"layout(location = {number}) out vec4 {name};" for number, name in names]
-
-    def started(self, kernel: Interface) -> list[str]:
-        """Return the pixel's place, and the values that a result starts with."""
-        starts = [f"    {name} = vec4(0.0, 0.0, 0.0, 1.0);" for name in self._results(kernel)]
-        return ["    int x = int(gl_FragCoord.x);", "    int y = int(gl_FragCoord.y);", *starts]
-
-    def _results(self, kernel: Interface) -> list[str]:
-        """Return the names of a denoiser's results."""
-        result = kernel.named(RESULT)
-        assert result is not None, "denoisers have a result"
-        return self.results(int(result.shape[-1]))
-
-    def path_begin(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of a path kernel."""
-        planes, moving = int(kernel.arrays[0].shape[0]), kernel.named(SCENE_NUMBERS)
-        outputs = range(-(-planes // self.planes_per_buffer))
-        scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
-        return [
-            parts.top,
-            *(f"layout(location = {number}) out vec4 sums_{number};" for number in outputs),
-            *self.uniforms(kernel),
-            *scene,
-            "",
-            "void main()",
-            "{",
-            *self.places(kernel),
-        ]
-
-    def places(self, kernel: Interface) -> list[str]:
-        """Return the declarations of a fragment's column and row."""
-        return [f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)]
+        weights = kernel.named(WEIGHTS)
+        read = [array for array in kernel.arrays if array.access != WRITE and array.name != SCENE_NUMBERS]
+        samplers = [name for array in read if array is not weights for name in self.textures(array)]
+        colours = [name for array in kernel.written for name in self.textures(array)]
+        names = [*samplers, *(["weight_texture"] if is_texture(weights) else [])]
+        lines = [self.preamble.format(unordered=self.unordered[parts.bounded]), parts.top]
+        lines += [self.sampler.format(name=name, number=number) for number, name in enumerate(names)]
+        if weights is not None and weights.home == BLOCK:
+            lines.append(f"layout(std140) uniform Weights {{ vec4 weights[{weights.quads}]; }};")
+        lines += [self.colour.format(name=name, number=number) for number, name in enumerate(colours)]
+        lines = [*filter(None, [*lines, *self.uniforms(kernel)]), ""]
+        if is_texture(weights):
+            whole = self.vectors is not None and self.vectors.lanes > 1
+            lines += fetch("vec4", "texel", "place", "") if whole else fetch("float", "index", "texel", ".r")
+            lines.append("")
+        lines += [*self.above, self.main, "{"]
+        if kernel.role == DENOISE:
+            first = samplers[0]
+            lines += [
+                f"    int width = textureSize({first}, 0).x;",
+                f"    int height = textureSize({first}, 0).y;",
+            ]
+        lines += [f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)]
+        start = "vec4(0.0, 0.0, 0.0, 1.0)" if kernel.role == DENOISE else "vec4(0.0)"
+        starts = colours if kernel.role != PATH else []
+        return "\n".join([*lines, *(f"    {self.started}{name} = {start};" for name in starts)])
 
     def uniforms(self, kernel: Interface) -> list[str]:
-        """Return the declarations of the integers."""
+        """Return the declarations of the integers, and of a scene's numbers."""
         kinds = {name: "uint" if name in UNSIGNED else "int" for name in kernel.integers}
-        return [f"uniform {kind} {name};" for name, kind in kinds.items()]
-
-    def begin_on_textures(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of a kernel whose arrays are textures and colour buffers."""
-        read = [name for array in kernel.arrays if array.access != WRITE for name in self.textures(array)]
-        written = [name for array in kernel.arrays if array.access == WRITE for name in self.textures(array)]
-        return [
-            *([parts.top] if parts.top else []),
-            *(f"uniform sampler2D {name};" for name in read),
-            *(f"layout(location = {number}) out vec4 {name};" for number, name in enumerate(written)),
-            *self.uniforms(kernel),
-            "",
-            "void main()",
-            "{",
-            *self.places(kernel),
-            *(f"    {name} = vec4(0.0);" for name in written),
-        ]
+        moving = kernel.named(SCENE_NUMBERS)
+        scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
+        return [*(f"uniform {kind} {name};" for name, kind in kinds.items()), *scene]
 
     def about(self, array: Given) -> str:
         """Return what an array is that a kernel is given, by the names of its textures."""
@@ -287,6 +236,8 @@ class GLSL(Dialect):
 
     def textures(self, array: Given) -> list[str]:
         """Return the names of an array's textures: planes are four to each."""
+        if array.name == RESULT:
+            return self.results(int(array.shape[-1]))
         count = -(-array.planes // self.planes_per_buffer)
         return [f"{array.name}_{number}" for number in range(count)] or [array.name]
 
@@ -346,7 +297,7 @@ class GLSLCompute(GLSL):
             "#define PRECISE precise",
             parts.top,
             f"layout(local_size_x = {across}, local_size_y = {down}) in;",
-            *self.images(kernel),
+            *(self.sampler.format(name=image.name) for image in kernel.images),
             "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
             "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
         ]

@@ -136,7 +136,7 @@ class Vulkan(Declared):
     )
     extensions = VULKAN_EXTENSION
     instructions = VULKAN_GROUP
-    vector_kind = GLSL.vector_kind
+    vector_kinds = GLSL.vector_kinds
     item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
 
     def declared(self, kernel: Interface) -> list[str]:

@@ -12,34 +12,15 @@ the tab that is shown turns the picture.
 from __future__ import annotations
 
 from ..core.profiles import SineContract
-from ..kernel.interface import DENOISE, WEIGHTS, Interface
-from .dialect import Parts
+from ..kernel.interface import DENOISE
 from .glsl import GLSL
 from .glsl_es import ASSUMES, GLSLES
 
 CHANNELS = 4
 """Inputs of a Shadertoy tab, iChannel0 to iChannel3, and buffers that feed them: A to D."""
 
-TURNED = "int(iResolution.y) - 1 - int(fragCoord.y)"
-"""The picture's row of a pixel that Shadertoy shows."""
-
-
 NO_PRECISE = "#define PRECISE /* GLSL ES 3.00 has no `precise` */"
 """The first line of a tab."""
-
-NOTHING_YET = "    vec4 result = vec4(0.0, 0.0, 0.0, 1.0);"
-"""What a result starts with."""
-
-NEAREST = "filter_nearest, repeat_disable"
-"""How Godot reads a texture."""
-
-FETCH = (
-    "float weights(int index)",
-    "{",
-    "    return texelFetch(weight_texture, ivec2(index % 1024, index / 1024), 0).r;",
-    "}",
-)
-"""The function that reads a weight."""
 
 CHANNEL_OF = (
     "float channel_of(vec4 texel, int c)",
@@ -61,6 +42,9 @@ class ShadertoyDenoise(GLSLES):
     ends = {DENOISE: "    fragColor = result;\n}"}
     first: tuple[str, ...] = ()
     preamble = NO_PRECISE
+    sampler, colour, started = "#define {name} iChannel{number} /* Buffer */", "", "vec4 "
+    main = "void mainImage(out vec4 fragColor, in vec2 fragCoord)"
+    fragment = ("int(fragCoord.x)", "int(iResolution.y) - 1 - int(fragCoord.y)")
     native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     max_output_channels = 4
     said = {
@@ -69,23 +53,6 @@ class ShadertoyDenoise(GLSLES):
             "filter nearest. The result is display-encoded already"
         )
     }
-
-    def denoise_begin(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of a denoiser."""
-        return [
-            *(
-                f"#define {image.name} iChannel{number} /* Buffer */"
-                for number, image in enumerate(kernel.images)
-            ),
-            parts.top,
-            "void mainImage(out vec4 fragColor, in vec2 fragCoord)",
-            "{",
-            "    int x = int(fragCoord.x);",
-            f"    int y = {TURNED};",
-            f"    int width = textureSize({kernel.images[0].name}, 0).x;",
-            f"    int height = textureSize({kernel.images[0].name}, 0).y;",
-            NOTHING_YET,
-        ]
 
 
 class GodotDenoise(GLSL):
@@ -102,6 +69,11 @@ class GodotDenoise(GLSL):
     qualifiers = {}
     max_output_channels = 4
     first = ("shader_type canvas_item;", "render_mode unshaded, blend_disabled;")
+    preamble = ""
+    sampler, colour, started = "uniform sampler2D {name} : filter_nearest, repeat_disable;", "", "vec4 "
+    main = "void fragment()"
+    fragment = ("int(UV.x * float(width))", "int(UV.y * float(height))")
+    above = CHANNEL_OF
     indexes_results = False
     pixel = "channel_of(texelFetch(image_{image}, ivec2({column}, {row}), 0), {c})"
     said = {
@@ -113,26 +85,3 @@ class GodotDenoise(GLSL):
             "The result is display-encoded already"
         )
     }
-
-    def begin(self, kernel: Interface, parts: Parts) -> str:
-        """Return the text of a shader up to its first statement."""
-        texture = [f"uniform sampler2D weight_texture : {NEAREST};"] if kernel.named(WEIGHTS) else []
-        first = kernel.images[0].name
-        return "\n".join(
-            [
-                parts.top,
-                *(f"uniform sampler2D {image.name} : {NEAREST};" for image in kernel.images),
-                *texture,
-                "",
-                *(FETCH if texture else ()),
-                "",
-                *CHANNEL_OF,
-                "void fragment()",
-                "{",
-                f"    int width = textureSize({first}, 0).x;",
-                f"    int height = textureSize({first}, 0).y;",
-                "    int x = int(UV.x * float(width));",
-                "    int y = int(UV.y * float(height));",
-                NOTHING_YET,
-            ]
-        )

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.interface import BLOCK, DENOISE, PATH, READ, Array, Interface
-from ..kernel.kernel import Type
 from .c import C
 from .cuda import GROUPED
 from .dialect import Dialect, Parts
@@ -49,6 +48,9 @@ class Metal(Buffers):
     threads: Sequence[str] = ("uint2 thread_place [[thread_position_in_grid]]",)
     item = ("thread_place.x", "thread_place.y")
     size = "size."
+    space = "device "
+    linkage = "static inline "
+    mixed_number = "((thread float *){name})[{index}]"
     max_output_channels = 2**16
     group = (16, 8)
     grouped = {
@@ -99,20 +101,6 @@ class Metal(Buffers):
         """Return the lines above the function: the structure of the integers is a kernel's own."""
         sizes = ["struct Size {", *(f"    {self.typed(name)};" for name in kernel.integers), "};", ""]
         return [TOP, *super().top(kernel, parts), *sizes]
-
-    def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
-        """Return the first lines of a function of values."""
-        return f"static inline {super().function_head(name, takes, result)}"
-
-    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
-        """Return a component of an array of vectors, or a vector."""
-        return f"((thread float *){name})[{index}]" if number else f"{name}[{index}]"
-
-    def weights_as_vectors(self, kind: Type) -> list[str]:
-        """Return the declaration of the weights as vectors."""
-        vector = self.vector_kind(kind.dtype, kind.lanes)
-        line = f"    device const {vector} *w = (device const {vector} *)weights;"
-        return [line] if kind.lanes > 1 else []
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

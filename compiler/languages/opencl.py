@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from ..core.profiles import OPENCL_SINE
 from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
 from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
-from ..kernel.kernel import Kernel, Type
+from ..kernel.kernel import Kernel
 from .c_path import MASKS
 from .dialect import Dialect, Parts
 from .openings import IMAGES, WEIGHTS_RESULT, Arguments
@@ -74,6 +74,14 @@ class OpenCL(Arguments):
     writes = "__global {kind} *restrict {name}"
     numbers = "(__global float *)"
     long = "size_t"
+    space = "__global "
+    vector_kinds = {**Dialect.vector_kinds, "bool": "int{lanes}"}  # truth: all bits set, or none
+    mixed = (
+        "union {{ {kind} all[{count}]; float number[{count} * {lanes}]; }} {name};",
+        "{name}.all[{index}]",
+        "{name}.all + {index}",
+    )
+    mixed_number = "{name}.number[{index}]"
     row_reader = OPENCL_ROW
     lanes = 1
     inside = ""
@@ -136,35 +144,13 @@ class OpenCL(Arguments):
         "convert": "CONVERT({0}, {type})",
     }
 
-    def vector_kind(self, dtype: str, lanes: int) -> str:
-        """Return the name of a vector type; truth is an integer with all bits set."""
-        return f"{'int' if dtype == 'bool' else self.scalars[dtype]}{lanes}"
-
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
         """Return a vector of values, or of one in all lanes."""
         return f"({kind})({', '.join(MASKS.get(value, value) for value in values)})"
 
-    def weights_as_vectors(self, kind: Type) -> list[str]:
-        """Return the declaration of the weights as vectors."""
-        vector = f"{self.scalars[kind.dtype]}{kind.lanes}"
-        line = f"    __global const {vector} *w = (__global const {vector} *)weights;"
-        return [line] if kind.lanes > 1 else []
-
     def component(self, lane: int, lanes: int) -> str:
         """Return the name of a component of a vector."""
         return super().component(lane, lanes) if lanes <= 4 else f"s{lane:x}"
-
-    def mixed_address(self, name: str, index: str, kind: str) -> str:
-        """Return the address of a vector of an array whose components are read by their own index."""
-        return f"{name}.all + {index}"
-
-    def mixed_array(self, kind: str, name: str, count: str, lanes: int) -> str:
-        """Return the declaration of an array of vectors whose components are read by their own index."""
-        return f"union {{ {kind} all[{count}]; float number[{count} * {lanes}]; }} {name};"
-
-    def mixed_element(self, name: str, index: str, kind: str, number: bool) -> str:
-        """Return a component of such an array, or a vector."""
-        return f"{name}.{'number' if number else 'all'}[{index}]"
 
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""

@@ -33,13 +33,14 @@ class Buffers(Dialect):
     """Kernels whose arrays are buffers; `item` are the texts of an item's column and row.
 
     `size`: what is before the name of an integer. `long`: the type of a place in memory, if it is not that
-    of other integers.
+    of other integers. `space`: what is before the type of weights in memory, where pointers have types.
     """
 
     item: tuple[str, str]
     declares_memory = True
     size: str = ""
     long: str = ""
+    space: str | None = None
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
@@ -86,7 +87,10 @@ class Buffers(Dialect):
 
     def weights_as_vectors(self, kind: Type) -> list[str]:
         """Return the declaration of the weights as vectors, where they are some."""
-        return []
+        if kind.lanes == 1 or self.space is None:
+            return []
+        vector = f"{self.space}const {self.vector_kind(kind.dtype, kind.lanes)}"
+        return [f"    {vector} *w = ({vector} *)weights;"]
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""

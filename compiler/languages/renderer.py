@@ -360,7 +360,8 @@ class Renderer:
             return self.address(array, index[0], array in self.mixed and lanes == 1)
         if declared and array in self.mixed:
             number = lanes < declared.type.lanes
-            return self.dialect.mixed_element(array, self.text(index[0]), self.kind(declared.type), number)
+            form = self.dialect.mixed_number if number else self.dialect.mixed[1]
+            return form.format(name=array, index=self.text(index[0]))
         return array + "".join(f"[{self.text(each)}]" for each in index)
 
     def address(self, array: str, place: Expr, number: bool) -> str:
@@ -399,7 +400,8 @@ class Renderer:
             self._vector_call(f"&{statement.name}", statement.value, False, not factors)
             return
         text = self.text(statement.value)
-        self._line(self.dialect.let_value(self.variable(kind, statement.kept), statement.name, text))
+        kind_of = self.variable(kind, statement.kept)
+        self._line(self.dialect.let.format(kind=kind_of, name=statement.name, value=text))
 
     def _write_array(self, statement: Array) -> None:
         """Write a declaration of memory."""
@@ -410,7 +412,8 @@ class Renderer:
         if statement.name in self.mixed:
             size = statement.sizes[0]
             count = self.text(size, 11) if isinstance(size, Expr) else str(size)
-            self._line(self.dialect.mixed_array(kind, statement.name, count, statement.type.lanes))
+            shown = {"kind": kind, "name": statement.name, "count": count, "lanes": statement.type.lanes}
+            self._line(self.dialect.mixed[0].format(**shown))
             return
         first = self.text(statement.value) if statement.value else ""
         self._line(self.dialect.memory(kind, statement.name, sizes, first))
@@ -581,6 +584,6 @@ class Renderer:
         rows = "".join(f"[{self.text(each)}]" for each in index[:-1])
         last = self.text(index[-1], 10)
         if view.array in self.mixed:
-            place = self.dialect.mixed_address(view.array, self.text(index[-1], 11), self.kind(array.type))
-            return place, self.text(view.step)
+            shown = {"name": view.array, "index": self.text(index[-1], 11), "kind": self.kind(array.type)}
+            return self.dialect.mixed[2].format(**shown), self.text(view.step)
         return f"{view.array}{rows}" + (f" + {last}" if last != "0" else ""), self.text(view.step)

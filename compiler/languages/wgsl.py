@@ -48,6 +48,12 @@ class WGSL(Declared):
     instructions = WGSL_GROUP
     item = ("invocation.x", "invocation.y")
     size = "size."
+    place_type = "i32"
+    vector_kinds = {"float32": "vec{lanes}<f32>", "int32": "vec{lanes}<i32>"}
+    let = "let {name}: {kind} = {value};"
+    loop = "for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
+    turn = "{name}++"
+    mixed = ("var {name}: array<{kind}, {count}>;", *Dialect.mixed[1:])
     scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     define = "const {name}: i32 = {value};"
     table = "const {name} = array<{type}, {count}>({values});"
@@ -84,29 +90,12 @@ class WGSL(Declared):
         """Return the lines of the function up to its brace."""
         return [self.group_size, f"fn {self.entries[kernel.role]}({self.places}) {{"]
 
-    def vector_kind(self, dtype: str, lanes: int) -> str:
-        """Return the name of a vector type."""
-        return f"vec{lanes}<{self.scalars[dtype]}>"
-
     def function_head(self, name: str, takes: Sequence[tuple[str, str]], result: str) -> str:
         """Return the first line of a function of values."""
         return f"fn {name}({', '.join(f'{each}: {kind}' for each, kind in takes)}) -> {result} {{"
-
-    def let_value(self, kind: str, name: str, value: str) -> str:
-        """Return the declaration of a value that never changes."""
-        return f"let {name}: {kind} = {value};"
 
     def memory(self, kind: str, name: str, sizes: Sequence[str], value: str = "") -> str:
         """Return the declaration of an array, or of a variable."""
         for size in reversed(sizes):
             kind = f"array<{kind}, {size}>"
         return f"var {name}: {kind}{f' = {value}' if value else ''};"
-
-    def for_loop(self, name: str, start: str, end: str, step: str) -> str:
-        """Return the line that opens a loop."""
-        turn = f"{name}++" if step == "1" else f"{name} += {step}"
-        return f"for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
-
-    def index(self, name: str, value: str) -> str:
-        """Return the declaration of a place in an image or a window."""
-        return self.let_value("i32", name, value)

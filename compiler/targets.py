@@ -74,7 +74,7 @@ class Language:
     @property
     def encodes(self) -> bool:
         """Return whether there are kernels that encode features."""
-        return PATH in self.dialect.said
+        return PATH in self.dialect.entries
 
     def sine(self, profile: Profile) -> SineContract:
         """Return what is promised of a sine under a profile."""
@@ -159,7 +159,7 @@ def groups(dialect: Dialect) -> tuple[Schedule, ...]:
 
 def _of(dialect: Dialect, *ladder: Schedule) -> Language:
     """Return the target of a language; `ladder` are its schedules after the plain one."""
-    paths = (1,) if PATH in dialect.said else ()
+    paths = (1,) if PATH in dialect.entries else ()
     return Language(dialect, (Plain(dialect), *ladder), paths)
 
 
@@ -173,18 +173,15 @@ def processor(dialect: Dialect) -> Language:
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"
 """A weight in a block of `vec4`, as std140 wants it; one in a table, or in memory of numbers."""
 
-HOMES: Mapping[str, tuple[str, Mapping[type[Dialect], str]]] = {
-    TABLE: ("are in the source", dict.fromkeys((Metal, CUDA, OpenCL, C, GodotDenoise), PLAIN_INDEX)),
-    BLOCK: (
-        "are a uniform block, or constant memory, of vectors of 4",
-        {
-            **dict.fromkeys((GLSL, GLSLES, Vulkan, Compute, WGSL), QUAD),
-            **dict.fromkeys((Metal, OpenCL), PLAIN_INDEX),
-        },
-    ),
+HOMES: Mapping[str, Mapping[type[Dialect], str]] = {
+    TABLE: dict.fromkeys((Metal, CUDA, OpenCL, C, GodotDenoise), PLAIN_INDEX),
+    BLOCK: {
+        **dict.fromkeys((GLSL, GLSLES, Vulkan, Compute, WGSL), QUAD),
+        **dict.fromkeys((Metal, OpenCL), PLAIN_INDEX),
+    },
 }
-"""Other places for weights than a target's usual one: a table in the source, or a uniform block; what
-callers get to read, and how a weight is read there, by language.
+"""Other places for weights than a target's usual one, and how a weight is read there, by language: a table in
+the source, or a uniform block.
 
 Fragment shaders of GLSL have constants as straight code instead; compute shaders have no table: Mesa had not
 compiled one of 770 numbers after a minute, and a buffer is there wherever they are.
@@ -214,8 +211,8 @@ LANGUAGES: Mapping[str, Language] = {
         Language(ShadertoyDenoise(), (Inline(ShadertoyDenoise()),)),
         _of(GodotDenoise()),
         *(
-            _of(language().placed(home, weight, where))
-            for home, (where, languages) in HOMES.items()
+            _of(language().placed(home, weight))
+            for home, languages in HOMES.items()
             for language, weight in languages.items()
         ),
     )

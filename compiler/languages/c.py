@@ -27,9 +27,10 @@ from ..kernel.instructions import (
 )
 from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Array, Interface
 from ..kernel.kernel import Kernel, operations
+from ..kernel.sizes import integer, item_bytes
 from .c_path import HELPERS, MASKS, NUMBERS_OF_PATHS, OPERATIONS, PATHS, TYPES
 from .dialect import Dialect, Parts
-from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
+from .openings import Arguments
 
 POPPED = """\
 }
@@ -67,7 +68,7 @@ RESTORED = """\
 #endif"""
 """What ends [`IGNORED`]."""
 
-STACK = "stack: {stack} bytes at most, without optimisation too"
+STACK = "fewer than 2^31 floats an image; stack: {stack} bytes at most, without optimisation too"
 """What a denoiser's text says of the thread that calls it."""
 
 CLAMP = """\
@@ -123,20 +124,6 @@ class C(Arguments):
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    said = {
-        DENOISE: (
-            f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height: fewer than 2^31 numbers an image.\n"
-            "wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops\n"
-            f"{STACK}"
-        ),
-        PATH: (
-            "sums: float, one plane of rows * width numbers for each of:\n"
-            "{planes};\n"
-            f"part: {NUMBERS}; seed_number.\n"
-            "wamnet_trace does all pixels, wamnet_trace_pixel WAMNET_PATHS of a row from a column on, or\n"
-            "fewer at its end: call that from your own loops"
-        ),
-    }
     max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
     calls_vectors = True
@@ -148,12 +135,7 @@ class C(Arguments):
     dot_of_bytes = "wamnet_dot(&{total}, &{weights}, {place});"
     weight_vector = "*(const wamnet_vector *)(weights + ({index}) * LANES)"
     wide = False
-    launches = (
-        "wamnet_pixel one pixel: call that from your own loops",
-        "wamnet_pixel {columns} x {rows} pixels from (x, y) on:\n"
-        "call that from your own loops, for each x that is a multiple of {columns} and each y of {rows}",
-        "",
-    )
+    are_aligned = False
     unroll = "WAMNET_UNROLL"
     clamp = "wamnet_clamp"
     unordered = (
@@ -270,9 +252,19 @@ class C(Arguments):
         return [*declared, *all_pixels, "{", *calls, "}", "", *more, *one, "{"]
 
     def launch(self, kernel: Kernel) -> str:
-        """Return which function does what."""
-        name = self.entries[kernel.interface.role].removesuffix("_pixel")
-        return f"{name} does all pixels, {name}_pixel one: call that from your own loops"
+        """Return which function does what, and what a denoiser takes of the stack."""
+        name, role = self.entries[kernel.interface.role].removesuffix("_pixel"), kernel.interface.role
+        columns, rows = (integer(kernel, each) for each in kernel.step)
+        one, stack = "one", ""
+        if role == PATH:
+            one = "WAMNET_PATHS of a row from a column on, or fewer at its end"
+        elif columns > 1 or rows > 1:
+            multiples = f"for each x that is a\nmultiple of {columns} and each y of {rows}"
+            one = f"{columns} x {rows} from (x, y) on, {multiples}"
+        if role == DENOISE:
+            stack = "\n" + STACK.format(stack=stack_bytes(item_bytes(kernel)))
+        every = "wamnet_image" if role == DENOISE else name
+        return f"{every} does all pixels, {name}_pixel {one}: call that from your own loops{stack}"
 
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have.

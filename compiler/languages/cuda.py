@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 from ..core.profiles import CUDA_SINE
 from ..kernel.instructions import CUDA_GROUP, CUDA_VECTOR
-from ..kernel.interface import DENOISE, PATH, Interface
+from ..kernel.interface import DENOISE, Interface
 from .c import C
 from .dialect import Dialect, Parts
-from .openings import IMAGES, NUMBERS, WEIGHTS_RESULT, Arguments
+from .openings import Arguments
 
 CLAMP = """\
 #ifndef WAMNET_CLAMP
@@ -28,7 +28,7 @@ static __device__ inline int wamnet_clamp(int value, int low, int high)
 
 GROUPED = (
     "Start ceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group} items;\n"
-    "those beyond the picture write nothing. Weights at an address that is a multiple of {bytes}"
+    "those beyond the picture write nothing"
 )
 """How all kernels with groups are started."""
 
@@ -37,9 +37,6 @@ ASSUMES = (
     "-prec-sqrt=false; it may fuse products with sums, which the bound allows"
 )
 """What the source cannot check by itself."""
-
-LAUNCH = "Launch blocks of any size that together cover (width, {rows}) threads"
-"""How all these kernels are called."""
 
 
 class CUDA(Arguments):
@@ -64,12 +61,11 @@ class CUDA(Arguments):
     group = (16, 8)
     grouped = {"heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'}
     launches = (
-        LAUNCH.format(rows="height"),
+        "Launch blocks of any size that together cover (width, height) threads",
         "Launch blocks of any size that together cover (ceil(width / {columns}), ceil(height / {rows})) "
         "threads",
         GROUPED,
     )
-    aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
     shared_array = "__shared__ {kind} {name}[{count}];"
     local_place = ("threadIdx.x", "threadIdx.y")
     group_place = ("blockIdx.x", "blockIdx.y")
@@ -87,14 +83,6 @@ class CUDA(Arguments):
         },
     }
     pixel, weight, store = C.pixel, C.weight, C.store
-    said = {
-        DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\n{LAUNCH.format(rows='height')}",
-        PATH: (
-            "sums: float, one plane of rows * width numbers for each of:\n"
-            f"{{planes}};\n{NUMBERS}; seed.\n"
-            f"{LAUNCH.format(rows='rows')}; thread (x, y) follows pixel x of row first_row + y"
-        ),
-    }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""

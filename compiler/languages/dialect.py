@@ -19,17 +19,14 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.profiles import SineContract
-
-if TYPE_CHECKING:
-    from ..kernel.kernel import Kernel, Launch, Type
-
 from ..kernel.interface import (
+    BOTH,
     BUFFER,
     DENOISE,
     ENCODE,
@@ -37,12 +34,13 @@ from ..kernel.interface import (
     GUIDE,
     INTEGERS,
     PATH,
-    SCENE_NUMBERS,
     SMOOTH,
     TRAIN,
     Array,
     Interface,
 )
+from ..kernel.kernel import Kernel, Launch, Type
+from ..kernel.sizes import integer
 
 BATCHES = (
     "The last arrays are the manifest's `memory`: so many numbers of a tile each. Tiles of {columns} x\n"
@@ -57,6 +55,8 @@ STAGED = f"Compile the text once for each launch, STAGE defined as its number.\n
 
 LAUNCHED = f"Each launch is an entry point whose name ends with its number.\n{BATCHES}"
 """The same where they are functions."""
+
+NOTHING: Mapping[str, str] = {}
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
@@ -83,7 +83,7 @@ class Dialect:
     `first`: lines before any comment. `home`: where weights are [interface.py]. More channels than
     `channels_per_result` go into several results; `indexes_results`: a variable may choose a result's
     channel. A path kernel has `path_lanes` paths at once where the target's compiler chooses their number,
-    which `at_once` describes; it takes `most_numbers` of a scene, and callers read `said_numbers`. `paints`:
+    which `at_once` describes; it takes `most_numbers` of a scene. `paints`:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
     `scalars`: the types of single numbers. `staged`: a launch is a program, which is compiled if STAGE is
     its number; `declares_memory`: what launches of a denoiser hand on are arrays like others. `numbers`
@@ -100,7 +100,6 @@ class Dialect:
         PATH: "wamnet_trace",
     }
     integers: Mapping[str, tuple[str, ...]] = INTEGERS
-    said: Mapping[str, str]
     ends: Mapping[str, str] = dict.fromkeys(INTEGERS, "}")
     home: str = BUFFER
     pixel: str
@@ -132,7 +131,6 @@ class Dialect:
     at_once: str = ""
     path_lanes: int = 0
     helpers: Mapping[str, str] = {}
-    said_numbers: str = f"{SCENE_NUMBERS}: {{count}} floats, after the sums in the list of arguments"
     most_numbers: int = 2**16
     planes_per_buffer: int = 1
     max_planes: int = 2**16
@@ -166,8 +164,8 @@ class Dialect:
     launching: Mapping[str, Any] = {}
     vectors: Type | None = None
     launches: tuple[str, str, str] = ("", "", "")
+    followed: str = "item (i, j) follows the pixels from {columns} * i on of row first_row + j"
     declares_memory: bool = False
-    aligned: tuple[str, str] = ("", "")
     local_place: tuple[str, str] = ("", "")
     group_place: tuple[str, str] = ("", "")
     operations: Mapping[str, str] = {
@@ -203,25 +201,10 @@ class Dialect:
         """Return the text of a kernel up to its first statement."""
         raise NotImplementedError
 
-    def called(self, kernel: Kernel) -> str:
-        """Return how a denoiser is called: what its arguments are, and how many items are started."""
-        said, (one, row, group) = self.said[DENOISE], self.launches
-        if kernel.weights.lanes > 1:
-            said = said.replace(*self.aligned)
-        if not one:
-            one = row = group = said
-        if kernel.launches:
-            return said.replace(one, STAGED if self.staged else LAUNCHED)
-        if kernel.group:
-            across, down = kernel.group
-            return said.replace(one, group).replace("{group}", f"{across} x {down}")
-        return said if kernel.step[0].value == 1 else said.replace(one, row)
-
-    def placed(self, home: str, weight: str, where: str) -> Dialect:
+    def placed(self, home: str, weight: str) -> Dialect:
         """Return the dialect of a target whose weights are elsewhere."""
         found = copy(self)
-        said = {DENOISE: f"{self.said[DENOISE]}.\nWeights {where}, whatever stands above"}
-        vars(found).update(target=f"{self.target}:{home}", home=home, weight=weight, said=said)
+        vars(found).update(target=f"{self.target}:{home}", home=home, weight=weight)
         return found
 
     def cast(self, dtype: str, text: str) -> str:
@@ -249,19 +232,24 @@ class Dialect:
 
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
-    def arguments(self, kernel: Kernel, lists: Mapping[str, str], notes: Mapping[str, str]) -> str:
-        """Return how a kernel on images and planes is called.
+    def arguments(
+        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+    ) -> str:
+        """Return how a kernel is called: what its arguments are, and how many items are started.
 
         `lists`: what the planes or columns of arrays are; `notes`: what else callers must know of arguments.
         """
-        numbers = kernel.interface.numbers() if self.numbered else {}
-        said = [f"0 32-bit integers: {', '.join(kernel.interface.integers)}"] if self.numbered else []
-        for array in kernel.interface.by_number() if self.numbered else kernel.interface.arrays:
+        interface = kernel.interface
+        numbers = interface.numbers() if self.numbered else {}
+        said = [f"0 32-bit integers: {', '.join(interface.integers)}"] if self.numbered else []
+        for array in interface.by_number() if self.numbered else interface.arrays:
+            if array.shape == (0,) or (interface.role == DENOISE and array.access == BOTH):
+                continue
             number = f"{numbers[array.name]} " if self.numbered else ""
             note = f", {notes[array.name]}" if array.name in notes else ""
             listed = f":\n{lists[array.name]}" if array.name in lists else ""
             said.append(textwrap.fill(f"{number}{self.about(array)}{note}", 98) + listed)
-        names = [name for name in kernel.interface.integers if name in notes or not self.numbered]
+        names = [name for name in interface.integers if name in notes or not self.numbered]
         said.append("; ".join(f"{n}: {notes[n]}" if n in notes else n for n in names))
         return ";\n".join(filter(None, said)) + f".\n{self.launch(kernel)}"
 
@@ -271,9 +259,17 @@ class Dialect:
 
     def launch(self, kernel: Kernel) -> str:
         """Return how many items of such a kernel are started."""
-        columns = kernel.step[0].value
-        said = self.launches[columns > 1].format(columns=columns, rows=1)
-        return said.replace("ceil(height / 1)", "height")
+        columns, rows = (integer(kernel, each) for each in kernel.step)
+        one, several, grouped = self.launches
+        said = several if columns > 1 else one
+        if kernel.launches:
+            said = STAGED if self.staged else LAUNCHED
+        elif kernel.group:
+            said = grouped.replace("{group}", " x ".join(map(str, kernel.group)))
+        said = said.format(columns=columns, rows=rows).replace("ceil(height / 1)", "height")
+        if kernel.interface.role != PATH:
+            return said
+        return f"{said.replace('height', 'rows')}; {self.followed.format(columns=columns)}"
 
     def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
         """Return an element of an array that a kernel is given, or several of a row [`row_reader`]."""

@@ -8,7 +8,7 @@ planes a buffer, or one buffer for each image of an encoding.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.interface import (
@@ -28,9 +28,8 @@ from ..kernel.interface import (
     Interface,
 )
 from ..kernel.interface import Array as Given
-from ..kernel.kernel import BATCH, Array, Kernel, Launch, values, walk
-from ..kernel.kernel import parts as inside
-from .dialect import STAGED, Dialect, Parts
+from ..kernel.kernel import BATCH, Array, Kernel, Launch
+from .dialect import NOTHING, Dialect, Parts
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""
@@ -75,27 +74,6 @@ def fetch(kind: str, index: str, place: str, part: str) -> list[str]:
     ]
 
 
-def said_of_weights(texture: str) -> str:
-    """Return what the texture of the weights is, of this format."""
-    return (
-        f"weight_texture: {texture}, {WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill "
-        "(the last\n"
-        "padded), row by row; it is read with texelFetch alone, so filters do not matter;\n"
-    )
-
-
-def said_of_denoiser(texture: str) -> str:
-    """Return how a denoiser is called; `texture`: the format of the weights' texture."""
-    return (
-        "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
-        "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
-        "bottom, or the window stands on its head;\n"
-        f"{said_of_weights(texture)}"
-        "result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by\n"
-        "the target, the values are encoded already. Draw one triangle that covers it"
-    )
-
-
 class GLSL(Dialect):
     """The dialect's table; `preamble` are the first lines, in which `{unordered}` has its place.
 
@@ -119,7 +97,9 @@ class GLSL(Dialect):
     pixel = "texelFetch(image_{image}, ivec2({column}, {row}), 0)[{c}]"
     weight = "weights({index})"
     store = "{result}[{i}] = {value};"
-    vector_kinds = {"float32": "vec{lanes}", "int32": "ivec{lanes}", "bool": "bvec{lanes}"}
+    vector_kinds = {
+        "float32": "vec{lanes}", "int32": "ivec{lanes}", "uint32": "uvec{lanes}", "bool": "bvec{lanes}",
+    }  # fmt: skip
     texel = "texelFetch(image_{image}, ivec2({column}, {row}), 0).{part}"
     weight_vector = "weights({index})"
     vector_operations = {
@@ -134,16 +114,8 @@ class GLSL(Dialect):
         },
         "select": "mix({2}, {1}, {0})",
     }
-    said = {
-        DENOISE: said_of_denoiser("R32F"),
-        PATH: (
-            "uniforms width, height of the image; first_row; first_sample; samples to add up; seed_number.\n"
-            "sums_0, sums_1, ...: RGBA float colour buffers as wide as the image; number 4 k + c is "
-            "component c\nof sums_k:\n"
-            "{planes}.\n"
-            "Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y"
-        ),
-    }
+    covered = "Draw one triangle that covers what is written: row 0 is the TOP row of all images"
+    called = ""
     fragment = ("int(gl_FragCoord.x)", "int(gl_FragCoord.y)")
     sampler = "uniform sampler2D {name};"
     colour = "layout(location = {number}) out vec4 {name};"
@@ -156,7 +128,6 @@ class GLSL(Dialect):
     max_planes = 4 * MOST_RESULTS
     max_images = MOST_RESULTS  # of GLSL ES too: most devices draw into more buffers than it promises
     most_numbers = 4 * MOST_UNIFORMS
-    said_numbers = f"uniform vec4 {SCENE_NUMBERS}[]: {{count}} floats, four to a vector, the last one padded"
     native_sine = SineContract("sin() of GLSL 3.30, which promises nothing", None)
     qualifiers = {"float32": "PRECISE "}
     table = "const {type} {name}[{count}] = {type}[{count}]({values});"
@@ -171,16 +142,6 @@ class GLSL(Dialect):
         "maximum": "max({0}, {1})",
         "convert": "{type}({0})",
     }
-
-    def called(self, kernel: Kernel) -> str:
-        """Return how a denoiser is called: the texture of its weights, if any, has one or four per texel."""
-        said = super().called(kernel)
-        reads = WEIGHTS in {
-            e.value for s in walk(kernel.body) for v in values(s) for e in inside(v) if e.op == "load"
-        }
-        if not reads:
-            return said.replace(said_of_weights("R32F"), "")
-        return said.replace("R32F", "RGBA32F") if kernel.weights.lanes > 1 else said
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
@@ -218,21 +179,40 @@ class GLSL(Dialect):
         scene = [f"uniform vec4 {SCENE_NUMBERS}[{moving.quads}];"] if moving else []
         return [*(f"uniform {kind} {name};" for name, kind in kinds.items()), *scene]
 
+    def arguments(
+        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+    ) -> str:
+        """Return how a kernel is called."""
+        return self.called or super().arguments(kernel, lists, notes)
+
     def about(self, array: Given) -> str:
         """Return what an array is that a kernel is given, by the names of its textures."""
         name, written = ", ".join(self.textures(array)), array.access == WRITE
         if array.planes:
             kind = "float colour buffers" if written else "textures of 32-bit floats"
             return f"{name}: RGBA {kind}, plane 4 k + c in component c of number k"
-        if array.is_image:
+        if array.is_image or array.name == RESULT:
             buffer = f"a float colour buffer, RGBA, of which {array.shape[-1]} components are written"
+            buffer += ", encoded as `output` says" if array.name == RESULT else ""
             return f"{name}: {buffer if written else 'a texture of 32-bit floats'}"
+        if array.name == WEIGHTS and array.home != BLOCK:
+            one = "RGBA32F" if self.vectors and self.vectors.lanes > 1 else "R32F"
+            size = f"{WEIGHT_TEXTURE_WIDTH} texels wide, as many rows as weights fill, row by row"
+            return f"weight_texture: {one}, {size}, the last row padded"
+        if array.name == WEIGHTS or array.name == SCENE_NUMBERS:
+            return f"{name}: {array.shape[0]} floats, uniforms of four to a vector, the last one padded"
         rows = "rows" if len(array.shape) > 1 else "a row"
         return f"{name}: an R32F texture, {rows} of {array.shape[-1]} texels"
 
     def launch(self, kernel: Kernel) -> str:
         """Return what is drawn."""
-        return "Draw one triangle that covers what is written: row 0 is the TOP row of all images"
+        if kernel.interface.role == PATH:
+            return f"{self.covered}; fragment (x, y) follows pixel x of row first_row + y"
+        bound = (
+            "OpenGL's own row 0 is the bottom: flip what it has rendered. Half floats in images void the\n"
+            "bound, and a target that encodes sRGB encodes once more"
+        )
+        return f"{self.covered}.\n{bound}" if kernel.interface.role == DENOISE else self.covered
 
     def textures(self, array: Given) -> list[str]:
         """Return the names of an array's textures: planes are four to each."""
@@ -274,17 +254,12 @@ class GLSLCompute(GLSL):
     shared_array = "shared {kind} {name}[{count}];"
     channels_per_result = None
     store = "color[{i}] = {value};"
-    said = {
-        DENOISE: (
-            "each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel\n"
-            "row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the\n"
-            "bottom, or the window stands on its head;\n"
-            "weight_buffer: a storage buffer at binding 0, all weights;\n"
-            "result: an image of format RGBA32F at binding 0, width x height, row 0 again the top row. "
-            "Dispatch\nceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of "
-            "{group} items"
-        )
-    }
+    launches = (
+        "",
+        "",
+        "Dispatch ceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group}\n"
+        "items. Row 0 is the TOP row of all images; half floats in them void the bound",
+    )
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
@@ -312,14 +287,18 @@ class GLSLCompute(GLSL):
             [*lines, *self.group_memory(parts.kernel), "", *self.opened(kernel), *self.item_place()]
         )
 
-    def called(self, kernel: Kernel) -> str:
-        """Return how a denoiser is called."""
-        if not kernel.launches:
-            return super().called(kernel)
-        said, _, _ = self.said[DENOISE].partition("Dispatch")
-        return (
-            f"{said.rstrip()}\nstorage buffers 1 and on: the last arrays.\nDefine ITEMS as `items`. {STAGED}"
-        )
+    def about(self, array: Given) -> str:
+        """Return what an array is that a kernel is given."""
+        if array.name == WEIGHTS:
+            return f"weight_buffer: a storage buffer at binding 0, {array.shape[0]} floats"
+        if array.name == RESULT:
+            return "result: an image of format RGBA32F at binding 0, encoded as `output` says"
+        return super().about(array)
+
+    def launch(self, kernel: Kernel) -> str:
+        """Return how many items are started."""
+        memory = "Storage buffers 1 and on: the last arrays. Define ITEMS as `items`.\n"
+        return (memory if kernel.launches else "") + Dialect.launch(self, kernel)
 
     def opened(self, kernel: Interface | None = None) -> list[str]:
         """Return the first lines of the function."""

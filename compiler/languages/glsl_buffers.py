@@ -18,7 +18,6 @@ from ..kernel.interface import (
     ITEMS,
     PATH,
     READ,
-    SCENE_NUMBERS,
     WEIGHTS,
     Array,
     Interface,
@@ -37,33 +36,8 @@ maxComputeSharedMemorySize."""
 GROUP = (8, 8)
 """Invocations (x, y) in a work group: 64, which every implementation of Vulkan and of OpenGL 4.3 takes."""
 
-BUFFERS = (
-    "Storage buffers of floats, rows from the top, channels interleaved; binding 0 is a uniform block of\n"
-    "32-bit integers: {sizes}.\n"
-)
-"""How all these kernels are called."""
-
-GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil({{rows}} / {GROUP[1]})"
+GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil(height / {GROUP[1]})"
 """What is dispatched."""
-
-SAID = {
-    DENOISE: (
-        f"{BUFFERS.format(sizes='width, height')}"
-        "1 the weights, 2 the result (width * height * {channels} floats, encoded as `output` says), 3 and\n"
-        f"on the images in this order. {GROUPS.format(rows='height')}"
-    ),
-    PATH: (
-        f"{BUFFERS.format(sizes='width, height, first_row, rows, first_sample, samples, seed_number')}"
-        "2 the sums, one plane of rows * width floats for each of:\n"
-        "{planes}.\n"
-        f"{GROUPS.format(rows='rows')}; invocation (x, y) follows pixel x of row first_row + y"
-    ),
-}
-"""How a kernel of each role is called."""
-
-
-NUMBERS_SAID = f"1 {SCENE_NUMBERS}: {{count}} floats"
-"""How the numbers of a scene are given."""
 
 
 class Declared(Buffers):
@@ -73,7 +47,7 @@ class Declared(Buffers):
     group = (8, 8)
     largest_shared = LEAST_SHARED
     launches = (
-        GROUPS.format(rows="height"),
+        GROUPS,
         f"Groups of {GROUP[0]} x {GROUP[1]} items: "
         f"ceil(width / ({{columns}} * {GROUP[0]})) x ceil(height / ({{rows}} * {GROUP[1]}))",
         GROUPED,
@@ -82,8 +56,6 @@ class Declared(Buffers):
     entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
     max_output_channels = 2**16
     pixel, weight, store = C.pixel, C.weight, C.store
-    said = SAID
-    said_numbers = NUMBERS_SAID
 
     @abstractmethod
     def declared(self, kernel: Interface) -> list[str]:

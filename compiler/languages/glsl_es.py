@@ -49,4 +49,4 @@ class GLSLES(GLSL):
     indexes_results = False
     max_output_channels = 4 * MOST_BUFFERS
     max_planes = 4 * MOST_BUFFERS
-    said = {role: f"{text}.\n{TEXTURES}" for role, text in GLSL.said.items()}
+    covered = f"{GLSL.covered}.\n{TEXTURES}"

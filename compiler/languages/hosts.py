@@ -47,12 +47,10 @@ class ShadertoyDenoise(GLSLES):
     fragment = ("int(fragCoord.x)", "int(iResolution.y) - 1 - int(fragCoord.y)")
     native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     max_output_channels = 4
-    said = {
-        DENOISE: (
-            "iChannel0, iChannel1, ...: the buffers of the images in this order, of the size of the view,\n"
-            "filter nearest. The result is display-encoded already"
-        )
-    }
+    called = (
+        "iChannel0, iChannel1, ...: the buffers of the images in this order, of the size of the view,\n"
+        "filter nearest. The result is display-encoded already"
+    )
 
 
 class GodotDenoise(GLSL):
@@ -76,12 +74,10 @@ class GodotDenoise(GLSL):
     above = CHANNEL_OF
     indexes_results = False
     pixel = "channel_of(texelFetch(image_{image}, ivec2({column}, {row}), 0), {c})"
-    said = {
-        DENOISE: (
-            "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"
-            "weight_texture: Image.FORMAT_RF, 1024 texels wide, as many rows as weights fill, row by row;\n"
-            "the item has the images' size in pixels. Colours keep 8 bits. A viewport with HDR 2D keeps 16,\n"
-            "but encodes once more what it shows: read from it, and do not show it.\n"
-            "The result is display-encoded already"
-        )
-    }
+    called = (
+        "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"
+        "weight_texture: Image.FORMAT_RF, 1024 texels wide, as many rows as weights fill, row by row;\n"
+        "the item has the images' size in pixels. Colours keep 8 bits. A viewport with HDR 2D keeps 16,\n"
+        "but encodes once more what it shows: read from it, and do not show it.\n"
+        "The result is display-encoded already"
+    )

@@ -9,7 +9,7 @@ from ..core.ir import Program
 from ..core.profiles import SineContract
 from ..kernel.interface import INTEGERS
 from ..kernel.kernel import Kernel
-from .dialect import Dialect
+from .dialect import NOTHING, Dialect
 
 PRINTED = "the program's inputs and parameters, by name"
 """How a program is called that is not compiled."""
@@ -22,12 +22,12 @@ class Listing(Dialect):
     language = "wamnet IR"
     suffix = ".ir.txt"
     entries = dict.fromkeys(INTEGERS, "program")
-    said = dict.fromkeys(INTEGERS, PRINTED)
-    said_numbers = ""
     max_output_channels = 2**16
     native_sine = SineContract("np.sin, whose documentation promises nothing", None)
 
-    def arguments(self, kernel: Kernel, lists: Mapping[str, str], notes: Mapping[str, str]) -> str:
+    def arguments(
+        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+    ) -> str:
         """Return how a program is called."""
         return PRINTED
 

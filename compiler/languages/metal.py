@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.profiles import SineContract
-from ..kernel.interface import BLOCK, DENOISE, PATH, READ, Array, Interface
+from ..kernel.interface import BLOCK, READ, Array, Interface
 from .c import C
 from .cuda import GROUPED
 from .dialect import Dialect, Parts
-from .glsl_buffers import NUMBERS_SAID
 from .openings import Buffers
 
 ASSUMES = (
@@ -28,13 +27,6 @@ TOP = """\
 using namespace metal;
 """
 """The first lines."""
-
-CALLED = (
-    "Buffer 0 are the sizes, 32-bit integers: {sizes}; then buffers of floats, rows from the top,\n"
-    "channels interleaved: {buffers}.\n"
-    "Dispatch {width} x {height} threads, or more, in groups of any size"
-)
-"""How all these kernels are called."""
 
 
 class Metal(Buffers):
@@ -70,7 +62,6 @@ class Metal(Buffers):
     wait = "threadgroup_barrier(mem_flags::mem_threadgroup);"
     wide = False
     casts = numbered = True
-    said_numbers = NUMBERS_SAID
     table = "constant {type} {name}[{count}] = {{{values}}};"
     operations = {
         **C.operations,
@@ -80,22 +71,6 @@ class Metal(Buffers):
         "maximum": "max({0}, {1})",
     }
     pixel, weight, store = C.pixel, C.weight, C.store
-    said = {
-        DENOISE: CALLED.format(
-            sizes="width, height",
-            buffers="1 the weights, 2 the result (width *\n"
-            "height * {channels} floats, encoded as `output` says), 3 and on the images in this order",
-            width="width",
-            height="height",
-        ),
-        PATH: CALLED.format(
-            sizes="width, height, first_row, rows, first_sample, samples,\nseed_number",
-            buffers="2 the sums, one plane of rows * width floats for each of:\n{planes}",
-            width="width",
-            height="rows",
-        )
-        + "; thread (x, y) follows pixel x of row first_row + y",
-    }
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function: the structure of the integers is a kernel's own."""

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from ..core.profiles import OPENCL_SINE
 from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TILE
-from ..kernel.interface import BLOCK, DENOISE, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
+from ..kernel.interface import BLOCK, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
 from ..kernel.kernel import Kernel
 from .c_path import MASKS
 from .dialect import Dialect, Parts
-from .openings import IMAGES, WEIGHTS_RESULT, Arguments
+from .openings import Arguments
 
 MASKED = """\
 #if defined(__AVX512DQ__) && defined(__has_builtin)
@@ -90,15 +90,6 @@ class OpenCL(Arguments):
     pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
     weight = "weights[{index}]"
     store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    said = {
-        DENOISE: f"{IMAGES};\n{WEIGHTS_RESULT};\nwidth; height.\nGlobal size: at least (width, height)",
-        PATH: (
-            "sums: float, one plane of global_size(1) rows of global_size(0) * {lanes} numbers for each of:\n"
-            "{planes};\n"
-            "width, height of the image; first_row; first_sample; samples to add up; seed.\n"
-            "Work item (i, j) follows the pixels from {lanes} * i of row first_row + j on"
-        ),
-    }
     max_output_channels = 2**16
     native_sine = OPENCL_SINE
     table = "__constant {type} {name}[{count}] = {{{values}}};"
@@ -127,7 +118,6 @@ class OpenCL(Arguments):
         "Global size: at least (ceil(width / {columns}), ceil(height / {rows}))",
         "Groups of {group} items; global size: (ceil(width / {columns}), height), in whole groups",
     )
-    aligned = ("weights;", "weights, at an address that is a multiple of {bytes};")
     grouped = {
         "heading": "__kernel __attribute__((reqd_work_group_size(GROUP_WIDTH, GROUP_HEIGHT, 1)))\n"
         "void {entry}"
@@ -151,6 +141,11 @@ class OpenCL(Arguments):
     def component(self, lane: int, lanes: int) -> str:
         """Return the name of a component of a vector."""
         return super().component(lane, lanes) if lanes <= 4 else f"s{lane:x}"
+
+    def about(self, array: Array) -> str:
+        """Return what an array is that a kernel is given: a path's sums are as large as the grid of items."""
+        own = f"global_size(1) rows of global_size(0) * {self.lanes}"
+        return super().about(array).replace("rows rows of width", own)
 
     def array_argument(self, array: Array) -> str:
         """Return an argument that is an array."""

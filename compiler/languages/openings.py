@@ -10,20 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 
-from ..kernel.interface import DENOISE, PATH, READ, UNSIGNED, Array, Interface
+from ..kernel.interface import BLOCK, DENOISE, PATH, READ, RESULT, UNSIGNED, WEIGHTS, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Launch, Type
 from .dialect import Dialect, Parts
-
-IMAGES = "each image: width * height * channels floats, rows from the top, channels interleaved"
-"""What images are."""
-
-WEIGHTS_RESULT = (
-    "weights; result: width * height * {channels} floats in the same order, encoded as `output` says"
-)
-"""What the other arrays of a denoiser are."""
-
-NUMBERS = "width, height of the image; first_row; rows; first_sample; samples to add up"
-"""What the integers of a path kernel are."""
 
 OWN = (("y", "x"), ("row", "column"))
 """Texts of an item's own row and column [`Interface.place`]."""
@@ -41,6 +30,7 @@ class Buffers(Dialect):
     size: str = ""
     long: str = ""
     space: str | None = None
+    are_aligned = True
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
@@ -157,11 +147,20 @@ class Buffers(Dialect):
 
     def about(self, array: Array) -> str:
         """Return what an array is that a kernel is given, by its name."""
-        if array.is_image:
+        if array.is_image or (array.name == RESULT and not array.planes):
             size = f"width * height * {array.shape[-1]} floats"
-            return f"{array.name}: {size}, rows from the top, channels interleaved"
-        rows = f"planes of {array.shape[-2]} rows" if array.planes else "rows"
-        return f"{array.name}: {rows if len(array.shape) > 1 else 'a row'} of {array.shape[-1]} floats"
+            encoded = ", encoded as `output` says" if array.name == RESULT else ""
+            return f"{array.name}: {size}, rows from the top, channels interleaved{encoded}"
+        kind, vectors = f"{array.shape[-1]} floats", self.vectors if array.name == WEIGHTS else None
+        if array.home == BLOCK:
+            kind += ", a uniform block, or constant memory, of vectors of 4"
+        elif self.are_aligned and vectors is not None and vectors.lanes > 1:
+            kind += f", at an address that is a multiple of {4 * vectors.lanes}"
+        if array.planes:
+            kind = f"planes of {array.shape[-2]} rows of {kind}"
+        elif len(array.shape) > 1:
+            kind = f"rows of {kind}"
+        return f"{array.name}: {kind}"
 
     def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
         """Return an element of an array that a kernel is given."""

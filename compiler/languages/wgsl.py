@@ -12,7 +12,7 @@ from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
 from ..kernel.interface import BLOCK, ITEMS, READ, UNSIGNED, Array, Interface
 from .dialect import Dialect
-from .glsl_buffers import GROUP, SAID, Declared
+from .glsl_buffers import GROUP, Declared
 
 ASSUMES = (
     "the compiler keeps the order of the operations of an expression, fused or not, and rounds to nearest. "
@@ -49,7 +49,10 @@ class WGSL(Declared):
     item = ("invocation.x", "invocation.y")
     size = "size."
     place_type = "i32"
-    vector_kinds = {"float32": "vec{lanes}<f32>", "int32": "vec{lanes}<i32>"}
+    vector_kinds = {
+        "float32": "vec{lanes}<f32>", "int32": "vec{lanes}<i32>", "uint32": "vec{lanes}<u32>",
+        "bool": "vec{lanes}<bool>",
+    }  # fmt: skip
     let = "let {name}: {kind} = {value};"
     loop = "for (var {name}: i32 = {start}; {name} < {end}; {turn}) {{"
     turn = "{name}++"
@@ -65,7 +68,6 @@ class WGSL(Declared):
         "convert": "{type}({0})",
         "select": "select({2}, {1}, {0})",
     }
-    said = SAID
 
     def declared(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers and of all arrays."""

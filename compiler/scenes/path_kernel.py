@@ -32,7 +32,6 @@ from ..languages.dialect import Dialect, Parts
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise
 from ..languages.listing import Listing
-from ..languages.openings import IMAGES
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named
 from . import emit_path
@@ -96,7 +95,8 @@ def compile_path(
     described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
     means = (SUMS[0], "encoded features, means over the samples of one launch:", *described)
     written = (*(means if images else SUMS), *_notes(programs, bool(images)))
-    arguments = _arguments(dialect, lanes, () if images else planes, len(programs.inputs))
+    listed = {} if images else {interface.SUMS: "\n".join(textwrap.wrap(", ".join(planes), 98))}
+    arguments = renderer.dialect.arguments(renderer.kernel, listed, {"samples": "to add up"})
     at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
     entries = _entries(programs, promised, at_once, written)
     facts = {
@@ -124,17 +124,6 @@ def compile_path(
         emitted,
         images=images,
     )
-
-
-def _arguments(dialect: Dialect, lanes: int, planes: Sequence[str], count: int) -> str:
-    """Return how a kernel is called that writes planes, or images if there are none, of so many numbers."""
-    found = dialect.said[interface.PATH]
-    if not planes:
-        found = f"{IMAGES};\n{found.partition('{planes};' + chr(10))[2]}"
-    found = found.format(lanes=lanes, planes="\n".join(textwrap.wrap(", ".join(planes), 98)))
-    if count and dialect.said_numbers:
-        found += f".\n{dialect.said_numbers.format(count=count)}"
-    return found
 
 
 def renderer_of(
@@ -220,7 +209,6 @@ class _ShadertoyPath(GLSLES):
     first: tuple[str, ...] = ()
     preamble = NO_PRECISE
     most_numbers = 0
-    said = {interface.PATH: ""}
     paints = True
     fragment = ("at.x", "at.y")
     ends = {
@@ -236,9 +224,10 @@ void mainImage(out vec4 fragColor, in vec2 fragCoord)
     takes = "ivec2 at, int width, int height, uint seed_number"
     uniforms_of_host: tuple[str, ...] = ()
 
-    def path_begin(self, kernel: interface.Interface, parts: Parts) -> list[str]:
-        """Return what follows the first lines of a path kernel."""
-        return [
+    def begin(self, kernel: interface.Interface, parts: Parts) -> str:
+        """Return the text of a shader up to its first statement."""
+        lines = [
+            *([self.preamble] if self.preamble else []),
             parts.top,
             *self.uniforms_of_host,
             "",
@@ -246,8 +235,9 @@ void mainImage(out vec4 fragColor, in vec2 fragCoord)
             "{",
             "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
             *ONE_SAMPLE,
-            *self.places(kernel),
+            *(f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)),
         ]
+        return "\n".join(lines)
 
     def read(self, array: interface.Array, index: Sequence[str], lanes: int) -> str:
         """Return a channel of the image."""
@@ -272,6 +262,7 @@ class _GodotPath(_ShadertoyPath):
     language = "Godot 4 shading language, one canvas item a feature"
     suffix = ".gdshader"
     first = GodotDenoise.first
+    preamble = ""
     qualifiers = {}
     ends = {
         interface.PATH: """\
@@ -286,10 +277,6 @@ void fragment()
     }
     takes = "ivec2 at, uint seed_value"
     uniforms_of_host = tuple(f"uniform int {name} = {value};" for name, value in NUMBERS)
-
-    def begin(self, kernel: interface.Interface, parts: Parts) -> str:
-        """Return the text of a shader up to its first statement."""
-        return "\n".join(self.path_begin(kernel, parts))
 
     def integer(self, kernel: interface.Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""

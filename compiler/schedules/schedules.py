@@ -28,7 +28,6 @@ from ..core.weights import Slot
 from ..kernel.interface import PLAIN as PLAIN
 from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes, shared_bytes
-from ..languages.c import stack_bytes
 from ..languages.dialect import Dialect
 from ..languages.listing import Listing
 from ..languages.renderer import Renderer
@@ -143,10 +142,8 @@ class Schedule:
 
     def arguments(self, program: Program) -> str:
         """Return how the kernel is called."""
-        kernel, channels = self.kernel(program), output_channels(program)
-        columns, rows = self.extent(program)
-        numbers = {"stack": stack_bytes(item_bytes(kernel)), "bytes": 4 * kernel.weights.lanes}
-        return self.dialect.called(kernel).format(columns=columns, rows=rows, channels=channels, **numbers)
+        renderer = self.renderer(program, False)
+        return renderer.dialect.arguments(renderer.kernel)
 
     def enclosures(
         self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL

@@ -11,8 +11,11 @@
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  group:1: a tile of the image in memory that a work group shares; layers in registers, one pixel an item
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights, at an address that is a multiple of 16; result: width * height * 2 floats in the same order, encoded as `output` says;
+ * arguments image_i0: width * height * 2 floats, rows from the top, channels interleaved;
+ *           image_i1: width * height * 1 floats, rows from the top, channels interleaved;
+ *           weights: 124 floats, at an address that is a multiple of 16;
+ *           result: width * height * 2 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
  *           width; height.
  *           Groups of 16 x 8 items; global size: (ceil(width / 1), height), in whole groups
  * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up to

@@ -11,12 +11,12 @@
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  group:4: the same with 4 pixels an item, which share each weight
- * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
- *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
- *           bottom, or the window stands on its head;
- *           weight_buffer: a storage buffer at binding 0, all weights;
- *           result: an image of format RGBA32F at binding 0, width x height, row 0 again the top row. Dispatch
- *           ceil(width / (4 * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of 16 x 8 items
+ * arguments image_i0: a texture of 32-bit floats;
+ *           image_i1: a texture of 32-bit floats;
+ *           weight_buffer: a storage buffer at binding 0, 124 floats;
+ *           result: an image of format RGBA32F at binding 0, encoded as `output` says.
+ *           Dispatch ceil(width / (4 * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of 16 x 8
+ *           items. Row 0 is the TOP row of all images; half floats in them void the bound
  * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up to
  *           multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads the
  *           window go image by image, at most 4 channels at a time, then tap by tap in rows, then

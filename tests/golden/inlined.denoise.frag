@@ -11,11 +11,12 @@
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  inlined: all loops unrolled, every weight a constant of the source
- * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
- *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
- *           bottom, or the window stands on its head;
- *           result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by
- *           the target, the values are encoded already. Draw one triangle that covers it
+ * arguments image_i0: a texture of 32-bit floats;
+ *           image_i1: a texture of 32-bit floats;
+ *           result: a float colour buffer, RGBA, of which 2 components are written, encoded as `output` says.
+ *           Draw one triangle that covers what is written: row 0 is the TOP row of all images.
+ *           OpenGL's own row 0 is the bottom: flip what it has rendered. Half floats in images void the
+ *           bound, and a target that encodes sRGB encodes once more
  * weights   none; every weight is a constant of the source
  */
 #version 330 core

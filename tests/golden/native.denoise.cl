@@ -10,8 +10,11 @@
  * sine      sin() of OpenCL 1.2, 4 ulp on all arguments (full profile)
  * bound     |output - float64 reference| <= 3.1e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
+ * arguments image_color: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           weights: 115 floats;
+ *           result: width * height * 3 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
  *           width; height.
  *           Global size: at least (width, height)
  * weights   W0 (24 x 4) at 0, b0 (4) at 96, W1 (4 x 3) at 100, b1 (3) at 112; matrices input-major:

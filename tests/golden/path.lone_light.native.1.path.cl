@@ -11,12 +11,12 @@
  *           deviation_*: squared differences from the mean colour of this launch, summed; not to be added
  *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
  *           of world space; 0 where nothing is hit (a direction is always there)
- * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 1 numbers for each of:
+ * arguments sums: planes of global_size(1) rows of global_size(0) * 1 floats:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
  *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b;
- *           width, height of the image; first_row; first_sample; samples to add up; seed.
- *           Work item (i, j) follows the pixels from 1 * i of row first_row + j on
+ *           width; height; first_row; first_sample; samples: to add up; seed_number.
+ *           Global size: at least (width, rows); item (i, j) follows the pixels from 1 * i on of row first_row + j
  */
 #define LANES 1
 #define MAX_DEPTH 3 /* scatterings of a path */

@@ -11,13 +11,13 @@
  *           deviation_*: squared differences from the mean colour of this launch, summed; not to be added
  *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
  *           of world space; 0 where nothing is hit (a direction is always there)
- * arguments uniforms width, height of the image; first_row; first_sample; samples to add up; seed_number.
- *           sums_0, sums_1, ...: RGBA float colour buffers as wide as the image; number 4 k + c is component c
- *           of sums_k:
+ * arguments sums_0, sums_1, sums_2, sums_3, sums_4, sums_5: RGBA float colour buffers, plane 4 k + c in
+ *           component c of number k:
  *           color_r, color_g, color_b, deviation_r, deviation_g, deviation_b, albedo_r, albedo_g, albedo_b,
  *           normal_x, normal_y, normal_z, depth, position_x, position_y, position_z, direction_x, direction_y,
- *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b.
- *           Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y
+ *           direction_z, unshadowed_r, unshadowed_g, unshadowed_b;
+ *           width; height; first_row; first_sample; samples: to add up; seed_number.
+ *           Draw one triangle that covers what is written: row 0 is the TOP row of all images; fragment (x, y) follows pixel x of row first_row + y
  */
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable

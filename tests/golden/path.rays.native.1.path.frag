@@ -12,11 +12,10 @@
  *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
  *           of world space; 0 where nothing is hit (a direction is always there)
  *           features are of 4 camera rays of the source net, whatever the number of samples: of one launch
- * arguments uniforms width, height of the image; first_row; first_sample; samples to add up; seed_number.
- *           sums_0, sums_1, ...: RGBA float colour buffers as wide as the image; number 4 k + c is component c
- *           of sums_k:
- *           color_r, color_g, color_b, normal_x, normal_y, normal_z.
- *           Draw one triangle that covers them: fragment (x, y) follows pixel x of row first_row + y
+ * arguments sums_0, sums_1: RGBA float colour buffers, plane 4 k + c in component c of number k:
+ *           color_r, color_g, color_b, normal_x, normal_y, normal_z;
+ *           width; height; first_row; first_sample; samples: to add up; seed_number.
+ *           Draw one triangle that covers what is written: row 0 is the TOP row of all images; fragment (x, y) follows pixel x of row first_row + y
  */
 #version 330 core
 #extension GL_ARB_gpu_shader5 : enable

@@ -11,10 +11,10 @@
  *           deviation_*: squared differences from the mean colour of this launch, summed; not to be added
  *           colour is linear radiance; depth is measured along the ray; normal, position and direction are those
  *           of world space; 0 where nothing is hit (a direction is always there)
- * arguments sums: float, one plane of global_size(1) rows of global_size(0) * 16 numbers for each of:
+ * arguments sums: planes of global_size(1) rows of global_size(0) * 16 floats:
  *           color_r, color_g, color_b;
- *           width, height of the image; first_row; first_sample; samples to add up; seed.
- *           Work item (i, j) follows the pixels from 16 * i of row first_row + j on
+ *           width; height; first_row; first_sample; samples: to add up; seed_number.
+ *           Global size: at least (ceil(width / 16), rows); item (i, j) follows the pixels from 16 * i on of row first_row + j
  */
 #define LANES 16
 #define MAX_DEPTH 1 /* scatterings of a path */

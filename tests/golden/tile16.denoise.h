@@ -11,12 +11,15 @@
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  tile:16: 14 pixels share each weight: 28 vectors of 16 sums stay in registers
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights; result: width * height * 2 floats in the same order, encoded as `output` says;
- *           width; height: fewer than 2^31 numbers an image.
- *           wamnet_image does the whole picture, wamnet_pixel 14 x 1 pixels from (x, y) on:
- *           call that from your own loops, for each x that is a multiple of 14 and each y of 1
- *           stack: 14108 bytes at most, without optimisation too
+ * arguments image_i0: width * height * 2 floats, rows from the top, channels interleaved;
+ *           image_i1: width * height * 1 floats, rows from the top, channels interleaved;
+ *           weights: 288 floats;
+ *           result: width * height * 2 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
+ *           width; height.
+ *           wamnet_image does all pixels, wamnet_pixel 14 x 1 from (x, y) on, for each x that is a
+ *           multiple of 14 and each y of 1: call that from your own loops
+ *           fewer than 2^31 floats an image; stack: 14108 bytes at most, without optimisation too
  * weights   W0 (1 x 12 x 16) at 0, b0 (16) at 192, W1 (1 x 5 x 16) at 208; vectors filled up with
  *           zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows of one that
  *           reads the window go image by image, then tap by tap in rows, then channel by channel

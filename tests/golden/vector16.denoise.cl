@@ -11,10 +11,13 @@
  * bound     |output - float64 reference| <= 2.29e-06 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
  * schedule  vector:16: a layer's neurons side by side in vectors of 16, one pixel after another
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights, at an address that is a multiple of 64; result: width * height * 2 floats in the same order, encoded as `output` says;
+ * arguments image_i0: width * height * 2 floats, rows from the top, channels interleaved;
+ *           image_i1: width * height * 1 floats, rows from the top, channels interleaved;
+ *           weights: 288 floats, at an address that is a multiple of 64;
+ *           result: width * height * 2 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
  *           width; height.
- *           Global size: at least (ceil(width / 1), ceil(height / 1))
+ *           Global size: at least (width, height)
  * weights   W0 (1 x 12 x 16) at 0, b0 (16) at 192, W1 (1 x 5 x 16) at 208; vectors filled up with
  *           zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows of one that
  *           reads the window go image by image, then tap by tap in rows, then channel by channel

@@ -18,31 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ops import OPS
+from . import kernel as tree
 from .domain import STORED, Domain, computed
 from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .interface import Array as Declared
-from .kernel import (
-    BATCH,
-    FLOAT,
-    INTEGERS,
-    Array,
-    Body,
-    Break,
-    Call,
-    Expr,
-    For,
-    Function,
-    If,
-    Kernel,
-    Launch,
-    Let,
-    Statement,
-    Store,
-    Type,
-    Write,
-    apply,
-    const,
-)
 from .memory import Items, Memory, Part
 from .sizes import integer
 from .verify import STEPS, KernelError, verify
@@ -52,7 +31,10 @@ Values = Any
 
 
 def run(
-    kernel: Kernel, images: Mapping[str, NDArray[Any]], weights: NDArray[Any], domain: Domain | None = None
+    kernel: tree.Kernel,
+    images: Mapping[str, NDArray[Any]],
+    weights: NDArray[Any],
+    domain: Domain | None = None,
 ) -> NDArray[Any]:
     """Return the result (H, W, C) for images (H, W, channels) by name, or raise a KernelError."""
     height, width = next(iter(images.values())).shape[:2]
@@ -61,7 +43,7 @@ def run(
 
 
 def run_on(
-    kernel: Kernel,
+    kernel: tree.Kernel,
     arrays: Mapping[str, NDArray[Any]],
     integers: Mapping[str, int],
     domain: Domain | None = None,
@@ -81,7 +63,7 @@ class Runner:
 
     def __init__(
         self,
-        kernel: Kernel,
+        kernel: tree.Kernel,
         arrays: Mapping[str, NDArray[Any]],
         integers: Mapping[str, int],
         domain: Domain,
@@ -107,9 +89,9 @@ class Runner:
         self.memory |= self.results
         self.evaluators = self._evaluators()
         if kernel.batch is not None:
-            self.names |= dict(zip(BATCH, (0, self.value(kernel.batch)), strict=True))
+            self.names |= dict(zip(tree.BATCH, (0, self.value(kernel.batch)), strict=True))
 
-    def _evaluators(self) -> dict[str, Callable[[Expr], Values]]:
+    def _evaluators(self) -> dict[str, Callable[[tree.Expr], Values]]:
         """Return the methods that evaluate expressions, by operation."""
         return {
             key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")
@@ -132,10 +114,10 @@ class Runner:
     def _read(self, key: str, array: NDArray[Any]) -> Memory:
         """Return the memory of an array that is only read."""
         declared = self.kernel.interface.named(key)
-        kind = Type(declared.dtype, declared.lanes) if declared else FLOAT
+        kind = tree.Type(declared.dtype, declared.lanes) if declared else tree.FLOAT
         return Memory.of(key, self._lifted(array, kind), "read", kind)
 
-    def _lifted(self, array: NDArray[Any], kind: Type) -> NDArray[Any]:
+    def _lifted(self, array: NDArray[Any], kind: tree.Type) -> NDArray[Any]:
         """Return values of a kind as they are stored."""
         return self.domain.lift(array) if kind.dtype == "float32" else np.array(array, STORED[kind.dtype])
 
@@ -143,7 +125,7 @@ class Runner:
         self, declared: Declared, arrays: Mapping[str, NDArray[Any]], integers: Mapping[str, int]
     ) -> Memory:
         """Return the memory of an array that is read and written; nothing is written if none is given."""
-        kind, given = Type(declared.dtype, declared.lanes), arrays.get(declared.name)
+        kind, given = tree.Type(declared.dtype, declared.lanes), arrays.get(declared.name)
         if given is None:
             given = np.zeros([each if isinstance(each, int) else integers[each] for each in declared.shape])
             given = np.repeat(given, kind.lanes)
@@ -155,22 +137,22 @@ class Runner:
         """Return the memory of the weights, which may be words bit by bit."""
         flat, lanes = np.ascontiguousarray(weights).ravel(), self.kernel.weights.lanes
         data = self.domain.lift(flat.view(np.float32))[:, None]
-        memory = Memory(WEIGHTS, data, FLOAT.of(lanes), (len(flat) // lanes,), "read")
+        memory = Memory(WEIGHTS, data, tree.FLOAT.of(lanes), (len(flat) // lanes,), "read")
         memory.words = flat.view(np.int32)[:, None]
         return memory
 
     # ---- statements --------------------------------------------------------------------------------------
 
-    def body(self, body: Body) -> None:
+    def body(self, body: tree.Body) -> None:
         """Run statements."""
         for statement in body:
             self.statement(statement)
 
-    def statement(self, statement: Statement) -> None:
+    def statement(self, statement: tree.Statement) -> None:
         """Run a statement."""
         getattr(self, f"_run_{type(statement).__name__.lower()}")(statement)
 
-    def _under(self, mask: NDArray[np.bool_], body: Body) -> NDArray[np.bool_]:
+    def _under(self, mask: NDArray[np.bool_], body: tree.Body) -> NDArray[np.bool_]:
         """Run statements for some of the active items; return those that no break has stopped."""
         before = self.items.mask
         if mask.any():
@@ -180,14 +162,14 @@ class Runner:
             self.items.only(before)
         return mask
 
-    def _run_comment(self, statement: Statement) -> None:
+    def _run_comment(self, statement: tree.Statement) -> None:
         """Skip a comment."""
 
-    def _run_let(self, statement: Let) -> None:
+    def _run_let(self, statement: tree.Let) -> None:
         """Name a value."""
         self.names[statement.name] = self.value(statement.value)
 
-    def _run_array(self, statement: Array) -> None:
+    def _run_array(self, statement: tree.Array) -> None:
         """Make new memory, of which nothing is written."""
         kind = statement.type
         columns = {"item": self.items.count, "group": self.items.groups, "device": 1}[statement.space]
@@ -200,7 +182,7 @@ class Runner:
         if statement.value is not None:
             made.write(self.items, 0, kind, self.value(statement.value))
 
-    def _run_store(self, statement: Store) -> None:
+    def _run_store(self, statement: tree.Store) -> None:
         """Write an element, or add to it."""
         if statement.value.type.lanes > 1 and statement.array in self.results:
             self._spread(statement)
@@ -210,33 +192,33 @@ class Runner:
         if statement.add:
             read = memory.read(self.items, place, kind)
             value = (
-                self.domain.apply(Expr("add", (), kind), [read, value])
+                self.domain.apply(tree.Expr("add", (), kind), [read, value])
                 if kind.dtype == "float32"
                 else read + value
             )
         memory.write(self.items, place, kind, value)
 
-    def _spread(self, statement: Store) -> None:
+    def _spread(self, statement: tree.Store) -> None:
         """Write the lanes of a value to pixels side by side, up to the end of a row."""
         mask, index, axis = self.items.mask, statement.index, 1 if statement.array.startswith(IMAGE) else 2
         for lane in range(statement.value.type.lanes):
             there, value = index[axis] + lane, statement.value.lane(lane)
             inside = mask & (self.value(there) < self.results[statement.array].sizes[axis])
-            store = Store(statement.array, (*index[:axis], there, *index[axis + 1 :]), value)
+            store = tree.Store(statement.array, (*index[:axis], there, *index[axis + 1 :]), value)
             self._under(inside, (store,))
 
-    def _run_write(self, statement: Write) -> None:
+    def _run_write(self, statement: tree.Write) -> None:
         """Write all channels of a pixel."""
         for channel, value in enumerate(statement.values):
-            self._run_store(Store(RESULT, (statement.row, statement.column, const(channel)), value))
+            self._run_store(tree.Store(RESULT, (statement.row, statement.column, tree.const(channel)), value))
 
-    def _run_for(self, statement: For) -> None:
+    def _run_for(self, statement: tree.For) -> None:
         """Run a loop: at once for all items where its bounds are theirs, else while any is in it."""
         ends = (statement.start, statement.count, statement.step)
         start, count, step = map(self.value, ends)
         if not np.all(np.asarray(step) > 0):
             raise KernelError(f"the loop over {statement.name} has a step that is not positive")
-        breaks = statement.until or any(isinstance(each, Break) for each in statement.body)
+        breaks = statement.until or any(isinstance(each, tree.Break) for each in statement.body)
         if not breaks and all(isinstance(each, int) for each in (start, count, step)):
             for turn in range(start, count, step):
                 self.names[statement.name] = turn
@@ -256,11 +238,11 @@ class Runner:
             mask = self._under(mask, statement.body)
             turn = turn + step
 
-    def _run_break(self, statement: Break) -> None:
+    def _run_break(self, statement: tree.Break) -> None:
         """Leave the other items in the loop."""
         self.items.only(self.items.mask & ~np.asarray(self.value(statement.condition)))
 
-    def _run_if(self, statement: If) -> None:
+    def _run_if(self, statement: tree.If) -> None:
         """Run each branch for the items that take it."""
         condition = np.asarray(self.value(statement.condition))
         mask = self.items.mask
@@ -271,7 +253,7 @@ class Runner:
         """Run statements whose names end with them."""
         self.body(statement.body)
 
-    def _run_barrier(self, statement: Statement) -> None:
+    def _run_barrier(self, statement: tree.Statement) -> None:
         """Let all items of each group wait for each other."""
         active = np.bincount(self.items.group[self.items.mask], minlength=self.items.groups)
         size = self.items.count // self.items.groups
@@ -282,7 +264,7 @@ class Runner:
         for memory in self.memory.values():
             memory.settle(active > 0)
 
-    def _run_launch(self, statement: Launch) -> None:
+    def _run_launch(self, statement: tree.Launch) -> None:
         """Run a grid of items; for memory of the device they are one group, and the end is a barrier."""
         outer, (across, down) = self.items, [*map(self.value, statement.counts), 1][:2]
         row, column = (each.ravel() for each in np.mgrid[:down, :across])
@@ -293,7 +275,7 @@ class Runner:
             memory.settle(np.ones(1, np.bool_))
         self.items = outer
 
-    def _run_call(self, statement: Call) -> None:
+    def _run_call(self, statement: tree.Call) -> None:
         """Run a function on views."""
         function = self.functions[statement.function]
         names: dict[str, Values] = {}
@@ -304,7 +286,7 @@ class Runner:
         self._inside(function, names, memory)
 
     def _inside(
-        self, function: Function, names: dict[str, Values], memory: dict[str, Memory | Part]
+        self, function: tree.Function, names: dict[str, Values], memory: dict[str, Memory | Part]
     ) -> Values:
         """Run a function, and return its result."""
         outer = self.names, self.memory
@@ -316,21 +298,21 @@ class Runner:
 
     # ---- values ------------------------------------------------------------------------------------------
 
-    def value(self, value: Expr) -> Values:
+    def value(self, value: tree.Expr) -> Values:
         """Return the values of an expression."""
         evaluate = self.evaluators.get(value.op)
         return (
             evaluate(value) if evaluate else self._operation(value, [self.value(each) for each in value.args])
         )
 
-    def _operation(self, value: Expr, args: list[Values]) -> Values:
+    def _operation(self, value: tree.Expr, args: list[Values]) -> Values:
         """Return an operation on values."""
         if value.type.dtype == "float32" or any(each.type.dtype == "float32" for each in value.args):
             return self.domain.apply(value, args)
         if value.op in ("divide", "remainder"):
             return self._divided(value.op, *args)
-        if value.op in INTEGERS and all(isinstance(each, int) for each in args):
-            return INTEGERS[value.op](*args)
+        if value.op in tree.INTEGERS and all(isinstance(each, int) for each in args):
+            return tree.INTEGERS[value.op](*args)
         if value.op == "convert":
             return self.domain.apply(value, args)
         return OPS[value.op].definition(*args)
@@ -343,7 +325,7 @@ class Runner:
             b = np.where(np.asarray(b) == 0, 1, b)
         return a // b if what == "divide" else a % b
 
-    def _value_const(self, value: Expr) -> Values:
+    def _value_const(self, value: tree.Expr) -> Values:
         """Return a constant."""
         if value.type.dtype == "int32":
             return int(value.value)
@@ -354,50 +336,50 @@ class Runner:
             self.numbers[key] = computed(np.asarray(value.value, STORED[kind]))
         return self.numbers[key]
 
-    def _value_name(self, value: Expr) -> Values:
+    def _value_name(self, value: tree.Expr) -> Values:
         """Return a named value, or that of a variable."""
         if value.value in self.names:
             return self.names[value.value]
-        return self._value_load(Expr("load", (), value.type, value.value))
+        return self._value_load(tree.Expr("load", (), value.type, value.value))
 
-    def _value_load(self, value: Expr) -> Values:
+    def _value_load(self, value: tree.Expr) -> Values:
         """Return an element of an array."""
         memory, place = self._place(value.value, value.args, value.type)
         return memory.read(self.items, place, value.type)
 
-    def _place(self, array: str, index: Sequence[Expr], kind: Type) -> tuple[Memory, Values]:
+    def _place(self, array: str, index: Sequence[tree.Expr], kind: tree.Type) -> tuple[Memory, Values]:
         """Return the memory of an array, and the component where an access begins."""
         return self.memory[array].place(self.items, [self.value(each) for each in index], kind)
 
-    def _value_take(self, value: Expr) -> Values:
+    def _value_take(self, value: tree.Expr) -> Values:
         """Return an entry of a table."""
         table, index = self.tables[value.value], self.value(value.args[0])
         return table[self.items.checked(value.value, index, len(table))]
 
-    def _value_any(self, value: Expr) -> Values:
+    def _value_any(self, value: tree.Expr) -> Values:
         """Return whether a condition holds in any lane."""
         mask = np.asarray(self.value(value.args[0]))
         return mask.any(axis=0) if mask.ndim == 2 else mask
 
-    def _value_lanes(self, value: Expr) -> Values:
+    def _value_lanes(self, value: tree.Expr) -> Values:
         """Return the number of each lane."""
         return np.arange(value.type.lanes, dtype=np.uint32)[:, None]
 
-    def _value_component(self, value: Expr) -> Values:
+    def _value_component(self, value: tree.Expr) -> Values:
         """Return one component of a vector."""
         vector = self.value(value.args[0])
         return vector[value.value] if np.ndim(vector) == 2 else vector
 
-    def _value_splat(self, value: Expr) -> Values:
+    def _value_splat(self, value: tree.Expr) -> Values:
         """Return a value in all lanes: it is the same array, which NumPy repeats."""
         return self.value(value.args[0])
 
-    def _value_stack(self, value: Expr) -> Values:
+    def _value_stack(self, value: tree.Expr) -> Values:
         """Return a vector of single values."""
         lanes = np.broadcast_arrays(*(np.atleast_1d(self.value(each)) for each in value.args))
         return np.stack(lanes)
 
-    def _value_clamp(self, value: Expr) -> Values:
+    def _value_clamp(self, value: tree.Expr) -> Values:
         """Return an index within limits."""
         index, low, high = map(self.value, value.args)
         if value.type.lanes > 1:
@@ -406,24 +388,24 @@ class Runner:
             return min(max(index, low), high)
         return np.where(index < low, low, np.where(index > high, high, index))
 
-    def _value_bits(self, value: Expr) -> Values:
+    def _value_bits(self, value: tree.Expr) -> Values:
         """Return the bits of words as floats."""
         return self.domain.cast(value, [self.value(value.args[0])])
 
-    def _value_pack4(self, value: Expr) -> Values:
+    def _value_pack4(self, value: tree.Expr) -> Values:
         """Return the bytes of four floats as a word, the first one the lowest."""
-        as_word = [apply("convert", each, value="int32") for each in value.args]
+        as_word = [tree.apply("convert", each, value="int32") for each in value.args]
         whole = [self.domain.apply(each, [self.value(each.args[0])]) for each in as_word]
         word = sum((np.asarray(each) & 255) << (8 * k) for k, each in enumerate(whole))
         return computed(np.asarray(word).astype(np.uint32).view(np.int32))
 
-    def _value_dot4(self, value: Expr) -> Values:
+    def _value_dot4(self, value: tree.Expr) -> Values:
         """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""
         words, four = map(self.value, value.args)
         factors = four if value.args[1].type.lanes == 4 else [signed_byte(four, k) for k in range(4)]
         return sum(signed_byte(words, k) * factors[k] for k in range(4))
 
-    def _value_call(self, value: Expr) -> Values:
+    def _value_call(self, value: tree.Expr) -> Values:
         """Return the result of a function of values."""
         function = self.functions[value.value]
         names = {key: self.value(each) for (key, _), each in zip(function.takes, value.args, strict=True)}

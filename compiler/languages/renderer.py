@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernel import kernel as tree
 from ..kernel.interface import (
     DENOISE,
     IMAGE,
@@ -30,35 +31,6 @@ from ..kernel.interface import (
     Interface,
 )
 from ..kernel.interface import Array as Memory
-from ..kernel.kernel import (
-    FLOAT,
-    INT,
-    Array,
-    Barrier,
-    Block,
-    Body,
-    Break,
-    Call,
-    Comment,
-    Constant,
-    Expr,
-    For,
-    Function,
-    If,
-    Kernel,
-    Launch,
-    Let,
-    Statement,
-    Store,
-    Type,
-    View,
-    Write,
-    const,
-    parts,
-    substituted,
-    values,
-    walk,
-)
 from ..kernel.sizes import handed_on
 from .dialect import Dialect, Parts
 
@@ -87,20 +59,20 @@ def binding(template: str) -> int:
     return UNARY if template[0] in "-!" else ATOM
 
 
-def _accesses(body: Body) -> Iterator[tuple[str, Type]]:
+def _accesses(body: tree.Body) -> Iterator[tuple[str, tree.Type]]:
     """Yield the arrays that statements read and write, and the types of what is read and written."""
-    for statement in walk(body):
-        if isinstance(statement, Store):
+    for statement in tree.walk(body):
+        if isinstance(statement, tree.Store):
             yield statement.array, statement.value.type
-        for value in values(statement):
-            yield from ((each.value, each.type) for each in parts(value) if each.op == "load")
+        for value in tree.values(statement):
+            yield from ((each.value, each.type) for each in tree.parts(value) if each.op == "load")
 
 
 NO_WEIGHTS = np.zeros(0, np.float32)
 """The weights of a kernel that is no denoiser."""
 
 
-def housed(kernel: Kernel, dialect: Dialect, packed: NDArray[np.float32] = NO_WEIGHTS) -> Kernel:
+def housed(kernel: tree.Kernel, dialect: Dialect, packed: NDArray[np.float32] = NO_WEIGHTS) -> tree.Kernel:
     """Return a kernel whose weights and integers are where a language has them."""
     integers = tuple(dialect.integers[kernel.interface.role])
     if kernel.interface.role != DENOISE:
@@ -120,7 +92,7 @@ class Renderer:
     """Prints one kernel in one language."""
 
     def __init__(
-        self, dialect: Dialect, kernel: Kernel, bounded: bool, packed: NDArray[np.float32] = NO_WEIGHTS
+        self, dialect: Dialect, kernel: tree.Kernel, bounded: bool, packed: NDArray[np.float32] = NO_WEIGHTS
     ) -> None:
         self.dialect, self.bounded = dialect.fitted(kernel), bounded
         kernel = self.kernel = housed(kernel, dialect, packed)
@@ -130,14 +102,14 @@ class Renderer:
         bound, path = kernel.interface, kernel.interface.role == PATH
         self.integers = {each: self.dialect.integer(bound, each) for each in bound.integers if path}
         everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
-        self.arrays = {s.name: s for s in walk(tuple(everything)) if isinstance(s, Array)}
+        self.arrays = {s.name: s for s in tree.walk(tuple(everything)) if isinstance(s, tree.Array)}
         if bound.role == TRAIN:
             self.arrays |= {
-                a.name: Array(a.name, Type(a.dtype, a.lanes), (1,), "device") for a in bound.arrays
+                a.name: tree.Array(a.name, tree.Type(a.dtype, a.lanes), (1,), "device") for a in bound.arrays
             }
         self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
 
-    def _narrower(self, array: str, kind: Type) -> bool:
+    def _narrower(self, array: str, kind: tree.Type) -> bool:
         """Return whether an access is to a component of an array of vectors by its own index."""
         return array in self.arrays and kind.lanes < self.arrays[array].type.lanes
 
@@ -159,7 +131,7 @@ class Renderer:
         lines = [*dialect.first, *comment, begin, *self.lines, *end]
         return dialect.finished("\n".join(lines)) + "\n"
 
-    def constant(self, constant: Constant) -> str:
+    def constant(self, constant: tree.Constant) -> str:
         """Return the definition of a named integer."""
         value = self.text(constant.value)
         value = f"({value})" if constant.value.args else value
@@ -172,12 +144,12 @@ class Renderer:
 
     def helpers(self) -> list[str]:
         """Return the functions that operations on vectors call."""
-        used = [e for s in walk(self.kernel.body) for v in values(s) for e in parts(v)]
+        used = [e for s in tree.walk(self.kernel.body) for v in tree.values(s) for e in tree.parts(v)]
         operations = {e.op for e in used if max(e.type.lanes, *(a.type.lanes for a in e.args), 1) > 1}
         wanted = [text for operation, text in self.dialect.helpers.items() if operation in operations]
         return list(dict.fromkeys(wanted))
 
-    def function(self, function: Function) -> None:
+    def function(self, function: tree.Function) -> None:
         """Write a function above the kernel."""
         takes = [(name, self.kind(kind)) for name, kind in function.takes]
         result = function.result
@@ -191,7 +163,7 @@ class Renderer:
             self._line(f"return {self.text(result)};")
         self.lines.append("}")
 
-    def _nest(self, head: str, body: Body) -> None:
+    def _nest(self, head: str, body: tree.Body) -> None:
         """Write statements in braces."""
         self._line(head)
         self.depth += 1
@@ -205,72 +177,72 @@ class Renderer:
 
     # ---- types -------------------------------------------------------------------------------------------
 
-    def kind(self, kind: Type) -> str:
+    def kind(self, kind: tree.Type) -> str:
         """Return the name of a type."""
         if kind.lanes == 1:
             return self.dialect.byte if kind.dtype == "uint8" else self.dialect.scalars[kind.dtype]
         return self.dialect.vector_kind(kind.dtype, kind.lanes)
 
-    def variable(self, kind: Type, kept: bool) -> str:
+    def variable(self, kind: tree.Type, kept: bool) -> str:
         """Return the words before the name of a variable."""
         return (self.dialect.qualifiers.get(kind.dtype, "") if kept else "") + self.kind(kind)
 
     # ---- expressions -------------------------------------------------------------------------------------
 
-    def text(self, value: Expr, least: int = 0) -> str:
+    def text(self, value: tree.Expr, least: int = 0) -> str:
         """Return the text of an expression that binds at least as strongly as `least`, or in parentheses."""
-        form: Callable[[Expr], tuple[str, int]] = getattr(self, f"_{value.op}", self._operation)
+        form: Callable[[tree.Expr], tuple[str, int]] = getattr(self, f"_{value.op}", self._operation)
         text, binds = form(value)
         return text if binds >= least else f"({text})"
 
-    def _const(self, value: Expr) -> tuple[str, int]:
+    def _const(self, value: tree.Expr) -> tuple[str, int]:
         """Return a constant."""
         return self.dialect.number(
             value.value, "int32" if value.type.dtype == "uint8" else value.type.dtype
         ), ATOM
 
-    def _name(self, value: Expr) -> tuple[str, int]:
+    def _name(self, value: tree.Expr) -> tuple[str, int]:
         """Return a name."""
         return self.integers.get(value.value, str(value.value)), ATOM
 
-    def _component(self, value: Expr) -> tuple[str, int]:
+    def _component(self, value: tree.Expr) -> tuple[str, int]:
         """Return one component of a vector."""
         vector, (lanes,) = self.text(value.args[0], ATOM), {each.type.lanes for each in value.args}
         return f"{vector}.{self.dialect.component(value.value, lanes)}", ATOM
 
-    def _splat(self, value: Expr) -> tuple[str, int]:
+    def _splat(self, value: tree.Expr) -> tuple[str, int]:
         """Return a value in all lanes."""
         number = self.text(value.args[0])
         number = number[1:-1] if number.startswith("(-") else number
         return self.dialect.vector_of(self.kind(value.type), [number]), ATOM
 
-    def _stack(self, value: Expr) -> tuple[str, int]:
+    def _stack(self, value: tree.Expr) -> tuple[str, int]:
         """Return a vector of values."""
         return self.dialect.vector_of(self.kind(value.type), [self.text(each) for each in value.args]), ATOM
 
-    def _call(self, value: Expr) -> tuple[str, int]:
+    def _call(self, value: tree.Expr) -> tuple[str, int]:
         """Return a call of a function of values."""
         return f"{value.value}({', '.join(self.text(each) for each in value.args)})", ATOM
 
-    def _clamp(self, value: Expr) -> tuple[str, int]:
+    def _clamp(self, value: tree.Expr) -> tuple[str, int]:
         """Return an index within limits."""
         return f"{self.dialect.clamp}({', '.join(self.text(each) for each in value.args)})", ATOM
 
-    def _remainder(self, value: Expr) -> tuple[str, int]:
+    def _remainder(self, value: tree.Expr) -> tuple[str, int]:
         """Return the remainder of indices."""
         return self._filled("{0} % {1}", value)
 
-    def _take(self, value: Expr) -> tuple[str, int]:
+    def _take(self, value: tree.Expr) -> tuple[str, int]:
         """Return an entry of a table."""
         if value.type.lanes > 1:
             return self._filled(self.dialect.vector_operations["take"], value)
         return f"{value.value}[{self.text(value.args[0])}]", ATOM
 
-    def _lanes(self, value: Expr) -> tuple[str, int]:
+    def _lanes(self, value: tree.Expr) -> tuple[str, int]:
         """Return the numbers of the lanes."""
         return self._filled(self.dialect.vector_operations["lanes"], value)
 
-    def _operation(self, value: Expr) -> tuple[str, int]:
+    def _operation(self, value: tree.Expr) -> tuple[str, int]:
         """Return an operation of the program."""
         dialect, kind = self.dialect, value.args[-1].type
         if min(kind.lanes, value.args[0].type.lanes) > 1 and (vectors := dialect.vector_operations):
@@ -280,7 +252,7 @@ class Renderer:
         template = dialect.operations.get(f"{value.op}.{kind.dtype}") or dialect.operations[value.op]
         return self._filled(template, value)
 
-    def _filled(self, template: str, value: Expr) -> tuple[str, int]:
+    def _filled(self, template: str, value: tree.Expr) -> tuple[str, int]:
         """Return a template with operands as strongly bound as their places need."""
         binds, infix = binding(template), bool(INFIX.match(template))
         args = list(value.args)
@@ -295,7 +267,7 @@ class Renderer:
         }
         return template.format(*texts, **shown), binds
 
-    def _places(self, template: str, value: Expr) -> list[int]:
+    def _places(self, template: str, value: tree.Expr) -> list[int]:
         """Return how strongly each operand of a template must bind."""
         binds = binding(template)
         if INFIX.match(template):
@@ -307,7 +279,7 @@ class Renderer:
 
     # ---- memory ------------------------------------------------------------------------------------------
 
-    def _load(self, value: Expr) -> tuple[str, int]:
+    def _load(self, value: tree.Expr) -> tuple[str, int]:
         """Return an element of an image, of the weights, or of an array."""
         array, index = str(value.value), value.args
         if (given := self.given(array)) is not None:
@@ -331,7 +303,7 @@ class Renderer:
         interface = self.kernel.interface
         return None if interface.role in (DENOISE, TRAIN) else interface.named(array)
 
-    def _pixel(self, array: str, index: Sequence[Expr], lanes: int) -> str:
+    def _pixel(self, array: str, index: Sequence[tree.Expr], lanes: int) -> str:
         """Return a channel of an image's pixel, all of its channels, or the value at a position of a row."""
         found = self.kernel.interface.named(array)
         assert found is not None, array
@@ -353,7 +325,7 @@ class Renderer:
             image=array.removeprefix(IMAGE), channels=channels, row=y, column=x, c=c
         )
 
-    def element(self, array: str, index: Sequence[Expr], lanes: int) -> str:
+    def element(self, array: str, index: Sequence[tree.Expr], lanes: int) -> str:
         """Return an element of an array of the kernel."""
         declared = self.arrays.get(array)
         if declared and declared.space == "device" and self.dialect.numbers:
@@ -364,7 +336,7 @@ class Renderer:
             return form.format(name=array, index=self.text(index[0]))
         return array + "".join(f"[{self.text(each)}]" for each in index)
 
-    def address(self, array: str, place: Expr, number: bool) -> str:
+    def address(self, array: str, place: tree.Expr, number: bool) -> str:
         """Return an element of memory of the device: what a loop does not change is an address of its own."""
         memory = f"{self.dialect.numbers}{array}" if number else array
         first, beyond = place.args if place.op == "add" else (place, place)
@@ -374,24 +346,24 @@ class Renderer:
 
     # ---- statements --------------------------------------------------------------------------------------
 
-    def body(self, body: Body) -> None:
+    def body(self, body: tree.Body) -> None:
         """Write statements."""
         for statement in body:
             self.statement(statement)
 
-    def statement(self, statement: Statement) -> None:
+    def statement(self, statement: tree.Statement) -> None:
         """Write a statement."""
         getattr(self, f"_write_{type(statement).__name__.lower()}")(statement)
 
-    def _write_comment(self, statement: Comment) -> None:
+    def _write_comment(self, statement: tree.Comment) -> None:
         """Write a comment on a line of its own, after an empty one."""
         self.lines.append("")
         self._line(f"/* {statement.text} */")
 
-    def _write_let(self, statement: Let) -> None:
+    def _write_let(self, statement: tree.Let) -> None:
         """Write a value that never changes."""
         kind = statement.value.type
-        if kind == INT and not statement.kept:
+        if kind == tree.INT and not statement.kept:
             self._line(self.dialect.index(statement.name, self.text(statement.value)))
             return
         if kind.lanes > 1 and self.dialect.calls_vectors:
@@ -403,22 +375,22 @@ class Renderer:
         kind_of = self.variable(kind, statement.kept)
         self._line(self.dialect.let.format(kind=kind_of, name=statement.name, value=text))
 
-    def _write_array(self, statement: Array) -> None:
+    def _write_array(self, statement: tree.Array) -> None:
         """Write a declaration of memory."""
         if statement.space != "item":
             return  # declared where the language wants it [dialects' `shared_array`]
         kind = self.variable(statement.type, statement.kept)
-        sizes = [self.text(size) if isinstance(size, Expr) else str(size) for size in statement.sizes]
+        sizes = [self.text(size) if isinstance(size, tree.Expr) else str(size) for size in statement.sizes]
         if statement.name in self.mixed:
             size = statement.sizes[0]
-            count = self.text(size, 11) if isinstance(size, Expr) else str(size)
+            count = self.text(size, 11) if isinstance(size, tree.Expr) else str(size)
             shown = {"kind": kind, "name": statement.name, "count": count, "lanes": statement.type.lanes}
             self._line(self.dialect.mixed[0].format(**shown))
             return
         first = self.text(statement.value) if statement.value else ""
         self._line(self.dialect.memory(kind, statement.name, sizes, first))
 
-    def _write_store(self, statement: Store) -> None:
+    def _write_store(self, statement: tree.Store) -> None:
         """Write a change of memory."""
         value, index = statement.value, statement.index
         if (given := self.given(statement.array)) is not None:
@@ -440,32 +412,32 @@ class Renderer:
             sign, value = "-", value.args[0]
         self._line(f"{target} {sign}= {self.text(value)};")
 
-    def _dotted(self, total: str, weights: Expr, four: Expr) -> str:
+    def _dotted(self, total: str, weights: tree.Expr, four: tree.Expr) -> str:
         """Return the statement that adds products of bytes to a sum."""
         if four.op == "load" and four.type.lanes > 1:
             place = f"{four.value} + {self.text(four.args[0], 10)}"
             return self.dialect.dot_of_bytes.format(total=total, weights=self.text(weights), place=place)
         return f"{total} = wamnet_dots({total}, {self.text(weights)}, {self.text(four)});"
 
-    def _pack4(self, value: Expr) -> tuple[str, int]:
+    def _pack4(self, value: tree.Expr) -> tuple[str, int]:
         """Return four values as the bytes of a word."""
         return f"wamnet_packed({', '.join(self.text(each) for each in value.args)})", ATOM
 
-    def _bits(self, value: Expr) -> tuple[str, int]:
+    def _bits(self, value: tree.Expr) -> tuple[str, int]:
         """Return words of weights read as floats."""
         function = "wamnet_numbers" if self.kernel.group else f"as_{self.kind(value.type)}"
         return f"{function}({self.text(value.args[0])})", ATOM
 
-    def _convert(self, value: Expr) -> tuple[str, int]:
+    def _convert(self, value: tree.Expr) -> tuple[str, int]:
         """Return values of another kind."""
-        sums = value.args[0].type.dtype == "int32" and value.type == FLOAT.of(4)
+        sums = value.args[0].type.dtype == "int32" and value.type == tree.FLOAT.of(4)
         if self.kernel.group and self.kernel.weights.dtype == "int32" and sums:
             return f"wamnet_floats({self.text(value.args[0])})", ATOM
         if value.type.lanes == 1 and self.dialect.casts:
             return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY
         return self._operation(value)
 
-    def _vector_call(self, into: str, value: Expr, add: bool, starts: bool = True) -> None:
+    def _vector_call(self, into: str, value: tree.Expr, add: bool, starts: bool = True) -> None:
         """Write a change of a vector as a call of one of the language's own functions.
 
         `starts`: words of weights are where a sum begins, not factors.
@@ -487,7 +459,7 @@ class Renderer:
             given = [place if value.value in self.mixed else f"&{place}"]
         self._line(f"wamnet_{call}({', '.join([into, *given])});")
 
-    def _result(self, index: Sequence[Expr], value: Expr) -> None:
+    def _result(self, index: Sequence[tree.Expr], value: tree.Expr) -> None:
         """Write a channel of the result."""
         row, column, channel = index
         shown = {"row": self.text(row, 11), "column": self.text(column, 10), "i": self.text(channel, 10)}
@@ -500,12 +472,12 @@ class Renderer:
             self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown)
         )
 
-    def _write_write(self, statement: Write) -> None:
+    def _write_write(self, statement: tree.Write) -> None:
         """Write all channels of a pixel."""
         for line in self.dialect.pixel_begin:
             self._line(line)
         for channel, value in enumerate(statement.values):
-            self._result((statement.row, statement.column, const(channel)), value)
+            self._result((statement.row, statement.column, tree.const(channel)), value)
         row, column = self.text(statement.row), self.text(statement.column)
         for line in self.dialect.pixel_end:
             self._line(line.format(row=row, column=column))
@@ -517,15 +489,15 @@ class Renderer:
         assert result is not None
         return int(result.shape[-1])
 
-    def _write_for(self, statement: For) -> None:
+    def _write_for(self, statement: tree.For) -> None:
         """Write a loop; one over channels of several results is written out."""
         if self._splits(statement):
             for number in range(int(statement.count.value)):
-                known = {statement.name: const(number)}
+                known = {statement.name: tree.const(number)}
                 for each in statement.body:
-                    assert isinstance(each, Store)
-                    index = tuple(substituted(e, known) for e in each.index)
-                    self.statement(replace(each, index=index, value=substituted(each.value, known)))
+                    assert isinstance(each, tree.Store)
+                    index = tuple(tree.substituted(e, known) for e in each.index)
+                    self.statement(replace(each, index=index, value=tree.substituted(each.value, known)))
             return
         if statement.how == "unroll" and self.dialect.unroll:
             self._line(self.dialect.unroll)
@@ -533,33 +505,33 @@ class Renderer:
         until = f" && {self.text(statement.until, 4)}" if statement.until else ""
         self._nest(self.dialect.for_loop(statement.name, start, count + until, step), statement.body)
 
-    def _splits(self, statement: For) -> bool:
+    def _splits(self, statement: tree.For) -> bool:
         """Return whether a loop chooses among results that no variable may choose of."""
         dialect = self.dialect
-        stores = all(isinstance(each, Store) and each.array == RESULT for each in statement.body)
+        stores = all(isinstance(each, tree.Store) and each.array == RESULT for each in statement.body)
         most = dialect.channels_per_result
         return stores and bool((most and self.channels > most) or not dialect.indexes_results)
 
-    def _write_break(self, statement: Break) -> None:
+    def _write_break(self, statement: tree.Break) -> None:
         """Write the end of a loop."""
         for line in (f"if ({self.text(statement.condition)}) {{", "    break;", "}"):
             self._line(line)
 
-    def _write_if(self, statement: If) -> None:
+    def _write_if(self, statement: tree.If) -> None:
         """Write a branch."""
         self._nest(f"if ({self.text(statement.condition)}) {{", statement.body)
         if statement.otherwise:
             self._nest("else {", statement.otherwise)
 
-    def _write_block(self, statement: Block) -> None:
+    def _write_block(self, statement: tree.Block) -> None:
         """Write statements whose names end with them."""
         self._nest("{", statement.body)
 
-    def _write_barrier(self, statement: Barrier) -> None:
+    def _write_barrier(self, statement: tree.Barrier) -> None:
         """Write that all items of a group wait."""
         self._line(self.dialect.wait)
 
-    def _write_launch(self, statement: Launch) -> None:
+    def _write_launch(self, statement: tree.Launch) -> None:
         """Write a launch as a function, or as a program, which is compiled if STAGE is its number."""
         number = self.kernel.launches.index(statement)
         counts = [self.text(each, 9) for each in statement.counts]
@@ -573,12 +545,12 @@ class Renderer:
         self.depth = 0
         self.lines.append("}")
 
-    def _write_call(self, statement: Call) -> None:
+    def _write_call(self, statement: tree.Call) -> None:
         """Write a call of a function on views."""
         given = ", ".join(text for view in statement.views for text in self.view(view))
         self._line(f"{self.dialect.own}{statement.function}({given});")
 
-    def view(self, view: View) -> tuple[str, str]:
+    def view(self, view: tree.View) -> tuple[str, str]:
         """Return the address of a view, and its step."""
         array, index = self.arrays[view.array], view.index
         rows = "".join(f"[{self.text(each)}]" for each in index[:-1])

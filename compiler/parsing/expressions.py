@@ -51,8 +51,7 @@ class Expressions(Reader):
         self._check_vectors("?", chosen)
         if condition.type.lanes > 1 and not self.language.casts:
             raise Unread("a vector of conditions in front of ?")
-        self._take(":")
-        return self._made("select", condition, chosen, self._expression())
+        return self._made("select", condition, chosen, *self._form(": E"))
 
     def _binary(self, level: int) -> Expr:
         """Read operators of a level, from the left."""
@@ -86,14 +85,12 @@ class Expressions(Reader):
             return self._made("logical_not", self._unary())
         if self.in_floats and self._has("*", "("):
             self._has("const")
-            self._take("wamnet_vector", "*", ")", "(")
+            self._form("wamnet_vector * ) (")
             vector = self._vector()
             self._take(")")
             return vector
         if self.language.casts and self._now() == "(" and self._now(1) in self.types and self._now(2) == ")":
-            self._take("(")
-            kind = self._type()
-            self._take(")")
+            (kind,) = self._form("( K )")
             if kind.lanes > 1 and self.in_floats:
                 self._take("{", "0", "}")
                 return Expr("splat", (const(0.0),), kind)
@@ -131,13 +128,10 @@ class Expressions(Reader):
                 raise Unread(f"{text}, which {of.dtype} does not hold")
             return const(whole, of)
         if self.language.number and self._has("(", "(", *self.language.number):
-            self._take(")")
-            array = self._word()
-            self._take(")")
+            (array,) = self._form(") N )")
             return self._component(array, self._sizes())
         if self._has("("):
-            value = self._expression()
-            self._take(")")
+            value: Expr = self._form("E )")[0]
             return value
         if text in ("true", "false"):
             return const(self._take() == "true")
@@ -213,13 +207,11 @@ class Expressions(Reader):
         """Read OpenCL's conversions of vectors, and integers' bits as floats: of words, or magnitudes."""
         lanes = word.removeprefix("as_float")
         if lanes != word and self._has(f"as_int{lanes}", "("):
-            value = self._expression()
-            self._take(")", "&", "0x7fffffff", ")")
+            (value,) = self._form("E ) & 0x7fffffff )")
             return self._made("absolute", self._of(value, self._kind(f"float{lanes}"), word))
-        value = self._expression()
         if lanes != word:
-            self._take(")")
-            return Expr("bits", (value,), self._kind(f"float{lanes}"))
+            return Expr("bits", tuple(self._form("E )")), self._kind(f"float{lanes}"))
+        value = self._expression()
         kind = self._kind(
             word.removeprefix("convert_") if word != "CONVERT" else self._take(",") and self._take()
         )
@@ -230,38 +222,23 @@ class Expressions(Reader):
 
     def _texel(self) -> Expr:
         """Read a channel of a texture's pixel."""
-        image = self._take()
-        self._take(",", "ivec2", "(")
-        column = self._expression()
-        self._take(",")
-        row = self._expression()
-        self._take(")", ",", "0", ")")
+        image, column, row = self._form("W , ivec2 ( E , E ) , 0 )")
         if self._has("."):
             part = self._take()
             if part not in ("rg", "rgb", "rgba"):
                 raise Unread(f"part {part!r} of a texel")
             return load(image, row, column, kind=FLOAT.of(len(part)))
-        self._take("[")
-        channel = self._expression()
-        self._take("]")
+        (channel,) = self._form("[ E ]")
         return load(image, row, column, channel)
 
     def _postfix(self, word: str) -> Expr:
         """Read the index or the component behind a name."""
         if word == RESULT and self.language.texels:
-            self._take("[")
-            channel = self._expression()
-            self._take("]")
-            return load(RESULT, name("y"), name("x"), channel)
+            return load(RESULT, name("y"), name("x"), *self._form("[ E ]"))
         if word.startswith(IMAGE) or word == RESULT:
-            self._take("[")
-            place = self._expression()
-            self._take("]")
-            return self._pixel(word, place)
-        if word in (WEIGHTS, "w") and self._has("["):
-            place = self._expression()
-            self._take("]")
-            return load(WEIGHTS, place, kind=self.vector if word == "w" else FLOAT)
+            return self._pixel(word, *self._form("[ E ]"))
+        if word in (WEIGHTS, "w") and self._now() == "[":
+            return load(WEIGHTS, *self._form("[ E ]"), kind=self.vector if word == "w" else FLOAT)
         if word in self.scope.arrays:
             return self._element(word)
         if word not in self.scope.values:
@@ -323,9 +300,8 @@ class Expressions(Reader):
     def _sizes(self) -> list[Expr]:
         """Read the sizes of an array."""
         sizes = []
-        while self._has("["):
-            sizes.append(self._expression())
-            self._take("]")
+        while self._now() == "[":
+            sizes += self._form("[ E ]")
         return sizes
 
     def _of(self, value: Expr, kind: Type, key: str) -> Expr:

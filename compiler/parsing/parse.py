@@ -17,33 +17,8 @@ from typing import Literal
 import numpy as np
 
 from ..core.ir import Image
+from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
-from ..kernel.kernel import (
-    BYTE,
-    FLOAT,
-    INT,
-    Array,
-    Barrier,
-    Block,
-    Body,
-    Call,
-    Constant,
-    Expr,
-    For,
-    Function,
-    If,
-    Kernel,
-    Let,
-    Statement,
-    Store,
-    Type,
-    View,
-    Write,
-    const,
-    load,
-    name,
-)
-from ..kernel.kernel import parts as inner_parts
 from ..kernel.verify import KernelError, verify
 from .canonical import canonical
 from .expressions import Expressions, rounds
@@ -77,7 +52,7 @@ def parse(
     channels: Mapping[str, int] | None = None,
     bounded: bool = False,
     passes: Passes | None = None,
-) -> Kernel:
+) -> tree.Kernel:
     """Return the canonical kernel of a source.
 
     `channels` of the images and of the result by name, where the source does not state them: of textures.
@@ -134,7 +109,7 @@ class Parser(Expressions):
 
     # ---- the whole ---------------------------------------------------------------------------------------
 
-    def kernel(self) -> Kernel:
+    def kernel(self) -> tree.Kernel:
         """Return the kernel, not yet in canonical form."""
         parts = self.parts
         images = self._images(parts["images"])
@@ -148,17 +123,17 @@ class Parser(Expressions):
         self._read(parts.get("functions", ""))
         while self._now():
             self._function()
-        shared: tuple[Statement, ...] = ()
+        shared: tuple[tree.Statement, ...] = ()
         if "shared" in parts:
             kind = self.types[parts["shared"]]
-            shared = (self._array("tile", kind, [name("TILE_NUMBERS")], "var", space="group"),)
+            shared = (self._array("tile", kind, [tree.name("TILE_NUMBERS")], "var", space="group"),)
         self._read(parts.get("body", ""))
         body = (*shared, *self._body(end=""), *launches(self))
         missing = [key for key in (*images, RESULT) if key not in self.channels]
         if missing:
             raise Unread(f"the channels of {missing[0]} are not stated")
         declared = [Image(key.removeprefix(IMAGE), self.channels[key], -np.inf, np.inf) for key in images]
-        return Kernel(
+        return tree.Kernel(
             denoiser(declared, self.channels[RESULT]),
             body,
             constants,
@@ -170,21 +145,21 @@ class Parser(Expressions):
             batch=batch(self.passes) if self.passes else None,
         )
 
-    def _steps(self, shared: bool) -> tuple[Expr, Expr]:
+    def _steps(self, shared: bool) -> tuple[tree.Expr, tree.Expr]:
         """Return how many columns and rows of pixels an item takes: of passes a tile."""
         if self.passes:
-            return name("OUT"), name("OUT")
+            return tree.name("OUT"), tree.name("OUT")
         parts = self.parts
         return self._step("PIXELS" if shared else parts.get("across")), self._step(parts.get("down"))
 
-    def _group(self, known: Mapping[str, Expr]) -> tuple[int, int]:
+    def _group(self, known: Mapping[str, tree.Expr]) -> tuple[int, int]:
         """Return the items of a work group."""
-        width, height = (known.get(key, name(key)) for key in ("GROUP_WIDTH", "GROUP_HEIGHT"))
+        width, height = (known.get(key, tree.name(key)) for key in ("GROUP_WIDTH", "GROUP_HEIGHT"))
         if (width.op, height.op) != ("const", "const"):
             raise Unread("work groups of no stated size")
         return int(width.value), int(height.value)
 
-    def _vectors(self, lanes: Expr | None) -> None:
+    def _vectors(self, lanes: tree.Expr | None) -> None:
         """Note the type of the weights: single values, or vectors."""
         parts = self.parts
         if "vector" in parts:
@@ -192,16 +167,16 @@ class Parser(Expressions):
             if parts.get("lanes", str(self.vector.lanes)) != str(self.vector.lanes):
                 raise Unread(f"words of {parts['lanes']} sums in vectors of {self.vector.lanes}")
         elif "lanes" in parts:  # of C with operators on vectors
-            self.vector = self.types["wamnet_vector"] = FLOAT.of(int(parts["lanes"]))
+            self.vector = self.types["wamnet_vector"] = tree.FLOAT.of(int(parts["lanes"]))
         elif lanes is not None and "wamnet_" in parts.get("body", "") and not self.language.number:
-            kind = INT if "wamnet_sums" in parts["body"] else FLOAT
+            kind = tree.INT if "wamnet_sums" in parts["body"] else tree.FLOAT
             self.vector = kind.of(int(lanes.value))
-            self.types |= {"wamnet_vector": FLOAT.of(int(lanes.value))}
-            self.types |= dict.fromkeys(("wamnet_sums", "wamnet_bytes"), INT.of(int(lanes.value)))
+            self.types |= {"wamnet_vector": tree.FLOAT.of(int(lanes.value))}
+            self.types |= dict.fromkeys(("wamnet_sums", "wamnet_bytes"), tree.INT.of(int(lanes.value)))
         self.by_calls = "lanes" not in parts and "wamnet_sums" in self.types
         self.in_floats = self.by_calls or ("lanes" in parts and "vector" not in parts)
 
-    def _step(self, text: str | None) -> Expr:
+    def _step(self, text: str | None) -> tree.Expr:
         """Return how many pixels an item takes along an axis."""
         self._read(text or "1")
         return self._expression()
@@ -216,7 +191,7 @@ class Parser(Expressions):
         if self._has("void"):
             key, takes, kind = *self._views(), None
         else:
-            kind = FLOAT if lets else self._type()
+            kind = tree.FLOAT if lets else self._type()
             key, takes = self._word(), []
             while self._has("," if takes else "("):
                 takes.append(self._argument())
@@ -232,31 +207,26 @@ class Parser(Expressions):
         if kind:
             self._take("return")
             result = self._of(self._expression(), kind, key)
-            rounded = {each.op for each in inner_parts(result)} & {"add", "subtract", "multiply", "divide"}
+            rounded = {each.op for each in tree.parts(result)} & {"add", "subtract", "multiply", "divide"}
             if self.bounded and self.language.qualifier and rounded and kind.dtype == "float32":
                 raise Unread(f"a result of {key} that is not {self.language.qualifier}")
             self._take(";")
         self._take("}")
         self.scope = outer
-        self.functions[key] = Function(key, tuple(takes), tuple(body), result)
+        self.functions[key] = tree.Function(key, tuple(takes), tuple(body), result)
 
-    def _argument(self) -> tuple[str, Type]:
+    def _argument(self) -> tuple[str, tree.Type]:
         """Read an argument's name and type."""
-        if not self.language.lets:
-            kind = self._type()
-            return self._word(), kind
-        key = self._word()
-        self._take(":")
-        return key, self._type()
+        first, second = self._form("N : K" if self.language.lets else "K N")
+        return (first, second) if self.language.lets else (second, first)
 
-    def _views(self) -> tuple[str, list[tuple[str, Type]]]:
+    def _views(self) -> tuple[str, list[tuple[str, tree.Type]]]:
         """Read the head of a function of views, and return its name and arrays."""
         key, vector = self._take().removeprefix("wamnet_"), self._now(2)
-        self._take("(", "const", vector, "*", "from", ",", "int", "step")
-        self._take(",", vector, "*", "to", ",", "int", "leap", ")")
+        self._form(f"( const {vector} * from , int step , {vector} * to , int leap )")
         takes = [("from", self._kind(vector)), ("to", self._kind(vector))]
         self.scope.arrays = {array: (kind, 1, False) for array, kind in takes}
-        self.scope.values |= {"step": INT, "leap": INT}
+        self.scope.values |= {"step": tree.INT, "leap": tree.INT}
         return key, takes
 
     def _images(self, text: str) -> list[str]:
@@ -274,7 +244,7 @@ class Parser(Expressions):
             raise Unread(f"a size of {first}, which is not the first image")
         return images
 
-    def _constant(self, line: str) -> Constant:
+    def _constant(self, line: str) -> tree.Constant:
         """Return a named integer: of a macro whose text is one number or in parentheses."""
         match = re.fullmatch(
             r"#define (\w+) (\d+|[A-Z_]+|\(.*\))|const (\w+): i32 = (\d+|[A-Z_]+|\(.*\));", line
@@ -289,19 +259,19 @@ class Parser(Expressions):
         self._read(text)
         value = self._expression()
         self._end()
-        self.scope.values[str(key)] = INT
-        return Constant(str(key), value)
+        self.scope.values[str(key)] = tree.INT
+        return tree.Constant(str(key), value)
 
     # ---- statements --------------------------------------------------------------------------------------
 
-    def _body(self, end: str = "}") -> Body:
+    def _body(self, end: str = "}") -> tree.Body:
         """Read statements up to a brace, or to the end; their names end there."""
         outer = self.scope
         self.scope = outer.inner()
         self.depth += 1
         if self.depth > DEEPEST:
             raise Unread(f"more than {DEEPEST} blocks in each other")
-        statements: list[Statement] = []
+        statements: list[tree.Statement] = []
         while self._now() != end:
             statements.append(self._statement())
         if end:
@@ -310,7 +280,7 @@ class Parser(Expressions):
         self.depth -= 1
         return tuple(statements)
 
-    def _statement(self) -> Statement:
+    def _statement(self) -> tree.Statement:
         """Read a statement."""
         if self.at < len(self.tokens) and self.tokens[self.at][0] == "unroll":
             self.at += 1
@@ -319,55 +289,44 @@ class Parser(Expressions):
         if self.at < len(self.tokens) and self.tokens[self.at][0] == "pixel":
             return self._written()
         if self._has("{"):
-            return Block(self._body())
+            return tree.Block(self._body())
         if self._has("for", "("):
             return self._for()
         if self._has("if", "("):
-            condition = self._expression()
-            self._take(")", "{")
+            (condition,) = self._form("E ) {")
             body = self._body()
-            return If(condition, body, self._body() if self._has("else", "{") else ())
+            return tree.If(condition, body, self._body() if self._has("else", "{") else ())
         if self.language.barrier and self._now() == re.split(r"\W", self.language.barrier)[0]:
             words = re.findall(r"[\w:]+|\W", self.language.barrier)
             self._take(*words, ";")
-            return Barrier()
+            return tree.Barrier()
         statement = self._declaration() or self._view_call() or self._vector_call() or self._assignment()
         self._take(";")
         return statement
 
-    def _written(self) -> Write:
+    def _written(self) -> tree.Write:
         """Read how a pixel of the result is written at once."""
         self._take()
-        values: list[Expr] = []
-        while self._has("color", "[", str(len(values)), "]", "="):
-            values.append(self._expression())
+        values: list[tree.Expr] = []
+        while self._now() == "color":
+            values += self._form(f"color [ {len(values)} ] = E ;")
             self._check_order("color", values[-1], "")
-            self._take(";")
-        self._take("imageStore", "(", RESULT, ",", "ivec2", "(")
-        column = self._expression()
-        self._take(",")
-        row = self._expression()
-        self._take(")", ",", "color", ")", ";")
-        return Write(row, column, tuple(values))
+        column, row = self._form("imageStore ( result , ivec2 ( E , E ) , color ) ;")
+        return tree.Write(row, column, tuple(values))
 
-    def _for(self) -> For:
+    def _for(self) -> tree.For:
         """Read a counted loop."""
-        self._take("var" if self.language.lets else "int")
-        counter = self._word()
-        if self.language.lets:
-            self._take(":", "i32")
-        self._take("=")
-        start = self._expression()
+        counter, start = self._form("var N : i32 = E" if self.language.lets else "int N = E")
         outer = self.scope
         self.scope = outer.inner(counter)
         self._take(";")
         condition, until = self._expression(), None
         if condition.op == "logical_and":
             condition, until = condition.args
-        if condition.op != "less" or condition.args[0] != name(counter):
+        if condition.op != "less" or condition.args[0] != tree.name(counter):
             raise Unread(f"the loop over {counter} has another condition")
         self._take(";")
-        step = const(1)
+        step = tree.const(1)
         if self.language.lets and self._now(1) == "++":
             self._take(counter, "++")
         elif self.language.lets or not self._has("++", counter):
@@ -376,9 +335,9 @@ class Parser(Expressions):
         self._take(")", "{")
         body = self._body()
         self.scope = outer
-        return For(counter, condition.args[1], body, start=start, step=step, until=until)
+        return tree.For(counter, condition.args[1], body, start=start, step=step, until=until)
 
-    def _declaration(self) -> Statement | None:
+    def _declaration(self) -> tree.Statement | None:
         """Read a declaration, if there is one."""
         if self.language.lets:
             return self._declaration_of_wgsl()
@@ -401,15 +360,15 @@ class Parser(Expressions):
         self._check_order(key, value, word)
         word = WEIGHTS if re.fullmatch(r"m|w\d+", key) and self._is_weight(value) else word
         self.scope.declare(key, value.type, word)
-        return Let(key, value)
+        return tree.Let(key, value)
 
-    def _check_order(self, key: str, value: Expr, word: str, add: bool = False) -> None:
+    def _check_order(self, key: str, value: tree.Expr, word: str, add: bool = False) -> None:
         """Refuse a sum, or another value, of which GLSL may change the order of operations."""
         qualifier = self.bounded and self.language.qualifier
         if qualifier and word != qualifier and ((add and value.type.dtype == "float32") or rounds(value)):
             raise Unread(f"{key} is not declared {qualifier}")
 
-    def _is_weight(self, value: Expr) -> bool:
+    def _is_weight(self, value: tree.Expr) -> bool:
         """Return whether a value is of the weights, whose products are added in any order [PRO-6b]."""
         if value.op == "stack" and len(set(value.args)) > 1:  # a column of weights in the source itself
             return {each.op for each in value.args} <= {"const", "negative"}
@@ -418,20 +377,26 @@ class Parser(Expressions):
         return value.op == "load" and value.value == WEIGHTS
 
     def _array(
-        self, key: str, kind: Type, sizes: list[Expr], word: str, mixed: bool = False, space: Space = "item"
-    ) -> Array:
+        self,
+        key: str,
+        kind: tree.Type,
+        sizes: list[tree.Expr],
+        word: str,
+        mixed: bool = False,
+        space: Space = "item",
+    ) -> tree.Array:
         """Return an array; in C one of floats of LANES times a count holds vectors."""
-        if self.in_floats and len(sizes) == 1 and kind == FLOAT:
+        if self.in_floats and len(sizes) == 1 and kind == tree.FLOAT:
             size = sizes[0]
-            if size.op == "multiply" and size.args[1] == name("LANES"):
+            if size.op == "multiply" and size.args[1] == tree.name("LANES"):
                 kind, sizes, mixed = self.types["wamnet_vector"], [size.args[0]], True
         if len(sizes) > 1 and self.language.texels and "shared" not in self.parts:
             raise Unread("an array of arrays")
         self.scope.declare(key, kind, word)
         self.scope.arrays[key] = (self.scope.values.pop(key), len(sizes), mixed)
-        return Array(key, kind, tuple(sizes), space)
+        return tree.Array(key, kind, tuple(sizes), space)
 
-    def _filled(self, key: str, kind: Type, word: str) -> Statement:
+    def _filled(self, key: str, kind: tree.Type, word: str) -> tree.Statement:
         """Read the call that sets a vector of C, or return a variable without a first value."""
         self.at -= 1
         if kind.lanes == 1:
@@ -439,71 +404,61 @@ class Parser(Expressions):
         self._take(";")
         self._array(key, kind, [], word)
         statement = self._vector_call()
-        if not isinstance(statement, Store) or statement.array != key or statement.add:
+        if not isinstance(statement, tree.Store) or statement.array != key or statement.add:
             raise Unread(f"{key} is not set where it is declared")
         self.scope.declare(key, kind, word)
-        return Let(key, statement.value)
+        return tree.Let(key, statement.value)
 
-    def _union(self) -> Array:
+    def _union(self) -> tree.Array:
         """Read an array of vectors of OpenCL whose components are read by their own index."""
-        vector = self.types.get(self._take(), INT)
-        self._take("all", "[")
-        count = self._expression()
-        self._take("]", ";", "float", "number", "[")
-        numbers = self._expression()
-        self._take("]", ";", "}")
-        if numbers != self._made("multiply", count, const(vector.lanes)):
+        vector, count, numbers = self._form("K all [ E ] ; float number [ E ] ; }")
+        if numbers != self._made("multiply", count, tree.const(vector.lanes)):
             raise Unread("a union of two sizes")
         return self._array(self._word(), vector, [count], "union", True)
 
-    def _declaration_of_wgsl(self) -> Statement | None:
+    def _declaration_of_wgsl(self) -> tree.Statement | None:
         """Read a declaration of WGSL, if there is one."""
         if self._now() not in ("let", "var"):
             return None
-        word = self._take()
-        fixed, key = word == "let", self._word()
-        self._take(":")
-        sizes: list[Expr] = []
+        word, key = self._form("W N :")
+        fixed, sizes = word == "let", list[tree.Expr]()
         kind = self._sized(sizes)
         if self._has("="):
             value = self._of(self._expression(), kind, key)
             self.scope.declare(key, kind, word)
-            return Let(key, value) if fixed else Array(key, kind, value=value)
+            return tree.Let(key, value) if fixed else tree.Array(key, kind, value=value)
         if fixed:
             raise Unread(f"{key} has no value")
         return self._array(key, kind, sizes, word)
 
-    def _sized(self, sizes: list[Expr]) -> Type:
+    def _sized(self, sizes: list[tree.Expr]) -> tree.Type:
         """Read a type of WGSL, and collect the sizes of an array."""
         if not self._has("array", "<"):
-            word = self._take()
-            if word not in self.types:
-                raise Unread(f"{word!r} is not a type")
-            return self.types[word]
+            return self._type()
         kind = self._sized(sizes)
         self._take(",")
         sizes.insert(0, self._binary(PRODUCTS - 1))
         self._take(">")
         return kind
 
-    def _assignment(self) -> Store:
+    def _assignment(self) -> tree.Store:
         """Read an assignment."""
         target = self._unary() if self._now() in ("*", "(") else self._postfix(self._take())
         sign = self._take()
         if sign not in ("=", "+=", "-="):
             raise Unread(f"{sign!r} is not an assignment")
         if target.op == "name":
-            target = Expr("load", (), target.type, target.value)
+            target = tree.Expr("load", (), target.type, target.value)
         if target.op != "load" or target.value == WEIGHTS or target.value.startswith(IMAGE):
             raise Unread("an assignment to no element")
         word = self.scope.words.get(target.value, "")
         if word == WEIGHTS or (self.language.lets and word != "var" and target.value != RESULT):
             raise Unread(f"an assignment to {target.value}, which never changes")
         if sign == "=" and (self._has("DOT", "(") or self._has("wamnet_dots", "(")):
-            return Store(target.value, target.args, self._dot(target), True)
+            return tree.Store(target.value, target.args, self._dot(target), True)
         value = self._expression()
-        if target.type == BYTE and value.op == "const":
-            value = const(value.value, BYTE)
+        if target.type == tree.BYTE and value.op == "const":
+            value = tree.const(value.value, tree.BYTE)
         value = self._of(value, target.type, target.value)
         product = sign == "+=" and value.op == "multiply" and any(map(self._is_weight, value.args))
         if not (product and LAYER.fullmatch(target.value)):
@@ -511,33 +466,31 @@ class Parser(Expressions):
         if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
             self._check_vectors(sign, value)
         value = self._made("negative", value) if sign == "-=" else value
-        return Store(target.value, target.args, value, sign != "=")
+        return tree.Store(target.value, target.args, value, sign != "=")
 
-    def _dot(self, total: Expr) -> Expr:
+    def _dot(self, total: tree.Expr) -> tree.Expr:
         """Read the operands of products of bytes that are added to a sum, behind the parenthesis."""
-        if self._expression() not in (total, name(total.value, total.type)):
+        if self._expression() not in (total, tree.name(total.value, total.type)):
             raise Unread(f"products of bytes are added to another sum than {total.value}")
-        self._take(",")
-        weights = self._expression()
-        self._take(",")
-        in_words = not self._has("(", "(", "const", "fours", "*", ")", "(")
-        four = self._expression() if in_words else self._four()
-        if not in_words:
-            self._take(")", ")", "->", "bytes")
-        self._take(")")
-        return Expr("dot4", (weights, four), weights.type)
+        (weights,) = self._form(", E ,")
+        if self._has("(", "(", "const", "fours", "*", ")", "("):
+            four = self._four()
+            self._form(") ) -> bytes )")
+        else:
+            (four,) = self._form("E )")
+        return tree.Expr("dot4", (weights, four), weights.type)
 
-    def _four(self) -> Expr:
+    def _four(self) -> tree.Expr:
         """Read the address of four bytes."""
         array = self._word()
-        if self.scope.arrays.get(array) != (BYTE, 1, False):
+        if self.scope.arrays.get(array) != (tree.BYTE, 1, False):
             raise Unread(f"{array} holds no bytes")
         self._take("+")
-        return load(array, self._binary(PRODUCTS - 1), kind=BYTE.of(4))
+        return tree.load(array, self._binary(PRODUCTS - 1), kind=tree.BYTE.of(4))
 
     # ---- vectors and views --------------------------------------------------------------------------------
 
-    def _view_call(self) -> Call | None:
+    def _view_call(self) -> tree.Call | None:
         """Read a call of a function of views, if there is one."""
         function = self.functions.get(self._now().removeprefix("wamnet_"))
         if function is None or function.result is not None or self._now(1) != "(":
@@ -547,12 +500,11 @@ class Parser(Expressions):
         for sign in ("(", ","):
             self._take(sign)
             array, index = self._view()
-            self._take(",")
-            views.append(View(array, index, self._expression()))
+            views.append(tree.View(array, index, *self._form(", E")))
         self._take(")")
-        return Call(function.name, tuple(views))
+        return tree.Call(function.name, tuple(views))
 
-    def _view(self) -> tuple[str, tuple[Expr, ...]]:
+    def _view(self) -> tuple[str, tuple[tree.Expr, ...]]:
         """Read the address of a view: rows of an array in brackets, and its first element as a sum."""
         if self._has("(", "wamnet_vector", "*", ")", "("):
             vector = self._vector()
@@ -565,12 +517,12 @@ class Parser(Expressions):
         if mixed:
             self._take(".", "all")
         rows = self._sizes()
-        last = self._binary(PRODUCTS - 1) if self._has("+") else const(0)
+        last = self._binary(PRODUCTS - 1) if self._has("+") else tree.const(0)
         if len(rows) != count - 1:
             raise Unread(f"{array} has {count} indices")
         return array, (*rows, last)
 
-    def _vector_call(self) -> Statement | None:
+    def _vector_call(self) -> tree.Statement | None:
         """Read a call of one of C's functions on vectors, if there is one."""
         if not self.by_calls or not self._now().startswith("wamnet_"):
             return None
@@ -580,21 +532,21 @@ class Parser(Expressions):
         if target.op != "load":
             raise Unread("a call that sets a value which never changes")
         add, pointers = call in ("add", "add_product", "dot"), [self.pointer]
-        vectors: list[Expr] = []
+        vectors: list[tree.Expr] = []
         while len(pointers) < len(CALLS.get(call, "").split()) and self._has(","):
             vectors.append(self._vector())
             pointers.append(self.pointer)
         if pointers != CALLS.get(call, "").split():
             raise Unread(f"wamnet_{call} of {', '.join(pointers)}")
         if call == "clear":
-            value = Expr("splat", (const(0.0),), target.type)
+            value = tree.Expr("splat", (tree.const(0.0),), target.type)
         elif call == "add_product":
             self._take(",")
             value = self._made("multiply", *vectors, self._expression())
         elif call == "dot":
             self._take(",")
-            value = Expr("dot4", (*vectors, self._four()), target.type)
+            value = tree.Expr("dot4", (*vectors, self._four()), target.type)
         else:
             value = self._made("convert", *vectors, value="float32") if call == "floats" else vectors[0]
         self._take(")")
-        return Store(target.value, target.args, self._of(value, target.type, target.value), add)
+        return tree.Store(target.value, target.args, self._of(value, target.type, target.value), add)

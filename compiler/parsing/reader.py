@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..kernel.interface import IMAGE
-from ..kernel.kernel import FLOAT, INT, Function, Type
+from ..kernel.kernel import FLOAT, INT, Expr, Function, Type
 from .grammar import FUNCTION, NAME, TOKEN, Language
 
 Passes = tuple[Sequence[tuple[int, int]], Mapping[str, int]]
@@ -84,6 +85,24 @@ class Reader:
                 raise Unread(f"{' '.join(t for _, t in self.tokens[self.at : self.at + 6])!r}: no {text!r}")
             self.at += 1
         return self.tokens[self.at - 1][1]
+
+    def _form(self, form: str) -> list[Any]:
+        """Read tokens as they stand in a form, and return what stands in its open places.
+
+        An E is an expression, an N a name of a value, a K a type, a W any word.
+        """
+        found: list[Any] = []
+        for word in form.split():
+            if word in "ENKW":
+                read = {"E": self._expression, "N": self._word, "K": self._type, "W": self._take}[word]
+                found.append(read())
+            else:
+                self._take(word)
+        return found
+
+    def _expression(self) -> Expr:
+        """Read an expression."""
+        raise NotImplementedError
 
     def _has(self, *texts: str) -> bool:
         """Take these tokens if they are there."""

@@ -23,22 +23,9 @@ from numpy.typing import NDArray
 from ..core import weights
 from ..core.ir import Image, Node, Program
 from ..core.weights import Slot
+from ..kernel import kernel as tree
 from ..kernel.interface import WEIGHTS
-from ..kernel.kernel import (
-    BYTE,
-    INT,
-    Array,
-    Expr,
-    Let,
-    Statement,
-    Store,
-    Type,
-    apply,
-    const,
-    load,
-    name,
-    splat,
-)
+from ..kernel.kernel import apply, const, load, name, splat
 from ..proof import whole
 from .common import kernel_gather, loop, weight
 from .group import MOST_CHANNELS, Group
@@ -97,9 +84,9 @@ def matrix_twice(program: Program) -> str:
     return "a matrix is applied twice" if len(set(names)) < len(names) else ""
 
 
-def dot4(weights: Expr, four: Expr) -> Expr:
+def dot4(weights: tree.Expr, four: tree.Expr) -> tree.Expr:
     """Return the four products of bytes in each lane of words of weights, added up."""
-    return Expr("dot4", (weights, four), weights.type)
+    return tree.Expr("dot4", (weights, four), weights.type)
 
 
 # ---- processors ------------------------------------------------------------------------------------------
@@ -145,40 +132,42 @@ class Bytes(Tiled):
 
     def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
         super().__init__(program, slots, **parameters)
-        self.sum_type = INT.of(self.lanes)
+        self.sum_type = tree.INT.of(self.lanes)
 
-    def weight_type(self) -> Type:
+    def weight_type(self) -> tree.Type:
         """Return the type of an element of the weights."""
         return self.sum_type
 
-    def read(self, index: int) -> Expr:
+    def read(self, index: int) -> tree.Expr:
         """Return element `i` of another group's value; the weights are words, whose bits may be floats."""
         found = super().read(index)
         if found.value != WEIGHTS or not self.wide:
             return found
-        return Expr("bits", (weight(found.args[0], self.sum_type),), self.vector)
+        return tree.Expr("bits", (weight(found.args[0], self.sum_type),), self.vector)
 
-    def patch(self, image: Image, size: Expr) -> Array:
+    def patch(self, image: Image, size: tree.Expr) -> tree.Array:
         """Return the declaration of an image's patch; a last step may read three bytes beyond."""
-        return Array(f"patch_{image.name}", BYTE, (size + (FOUR - 1),))
+        return tree.Array(f"patch_{image.name}", tree.BYTE, (size + (FOUR - 1),))
 
-    def patches(self) -> list[Statement]:
+    def patches(self) -> list[tree.Statement]:
         """Return the copies of the images; what may be read beyond them is 0."""
         found = super().patches()
         for image in self.gather.images:
             end = self.rows * PATCH_WIDTH * image.channels
-            found.append(loop("i", FOUR - 1, Store(f"patch_{image.name}", (end + COUNTER,), const(0, BYTE))))
+            found.append(
+                loop("i", FOUR - 1, tree.Store(f"patch_{image.name}", (end + COUNTER,), const(0, tree.BYTE)))
+            )
         return found
 
-    def copied(self, value: Expr) -> Expr:
+    def copied(self, value: tree.Expr) -> tree.Expr:
         """Return a value of an image as a byte n + 128."""
         return apply("convert", apply("convert", value, value="int32") + MIDDLE, value="uint8")
 
-    def start(self, node: Node, vector: Expr) -> Expr:
+    def start(self, node: Node, vector: tree.Expr) -> tree.Expr:
         """Return what a sum starts with."""
         return weight(self.offset(f"{node['weight']}{START}") // self.lanes + vector, self.sum_type)
 
-    def ended(self, total: Expr) -> Expr:
+    def ended(self, total: tree.Expr) -> tree.Expr:
         """Return a sum as a value of the layer."""
         return apply("convert", total, value="float32")
 
@@ -186,21 +175,21 @@ class Bytes(Tiled):
         """Return the rows of weights of an affine map: fours of inputs."""
         return sum(-(-len(run) // FOUR) for run in runs_of(self.program, str(node["weight"])))
 
-    def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
+    def layer(self, blocks: Blocks, first: tree.Expr, source: int, numbers: int) -> list[tree.Statement]:
         """Return the bytes of a layer's values, and their products."""
         count, held = PIXELS * self.total(source) * LANES, self.total(source)
         byte = self.copied(load(f"v{source}", COUNTER))
-        copy = loop("i", count, Store(f"bytes{source}", (COUNTER,), byte))
+        copy = loop("i", count, tree.Store(f"bytes{source}", (COUNTER,), byte))
         place = P * held * LANES
         return [
-            Array(f"bytes{source}", BYTE, (count,)),
+            tree.Array(f"bytes{source}", tree.BYTE, (count,)),
             copy,
             self.of_fours(blocks, -(-numbers // FOUR), first, f"bytes{source}", place),
         ]
 
-    def windowed(self, blocks: Blocks, first: Expr) -> list[Statement]:
+    def windowed(self, blocks: Blocks, first: tree.Expr) -> list[tree.Statement]:
         """Return the sums over the window, row by row of an image's taps."""
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         rows = 0
         for image in self.gather.images:
             count = -(-self.gather.columns * image.channels // FOUR)
@@ -212,12 +201,16 @@ class Bytes(Tiled):
             rows += self.gather.rows * count
         return found
 
-    def of_fours(self, blocks: Blocks, count: int, first: Expr, array: str, place: Expr) -> Statement:
+    def of_fours(
+        self, blocks: Blocks, count: int, first: tree.Expr, array: str, place: tree.Expr
+    ) -> tree.Statement:
         """Return the loop over fours of inputs: each one's weights, times the bytes at each pixel."""
         each = range(blocks.vectors)
-        row = [Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.sum_type)) for j in each]
-        four = load(array, place + FOUR * COUNTER, kind=BYTE.of(FOUR))
-        adds = [Store("sum", (P, const(j)), dot4(name(f"w{j}", self.sum_type), four), add=True) for j in each]
+        row = [tree.Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.sum_type)) for j in each]
+        four = load(array, place + FOUR * COUNTER, kind=tree.BYTE.of(FOUR))
+        adds = [
+            tree.Store("sum", (P, const(j)), dot4(name(f"w{j}", self.sum_type), four), add=True) for j in each
+        ]
         return loop("i", count, *row, self.each_pixel(*adds))
 
 
@@ -265,24 +258,25 @@ def words_at_once(program: Program) -> list[int]:
 class GroupBytes(Group):
     """Builds the grouped kernel of bytes."""
 
-    element = INT
-    weights = INT.of(FOUR)
+    element = tree.INT
+    weights = tree.INT.of(FOUR)
 
     def planes(self) -> int:
         """Return the most words of a pixel that are in the tile at once."""
         return planes_of(self.program)
 
-    def parameter(self, node: Node, vector: int) -> Expr:
+    def parameter(self, node: Node, vector: int) -> tree.Expr:
         """Return four values of a parameter that is a vector."""
-        return Expr("bits", (weight(self.offset(node["name"]) // 4 + vector, self.weights),), VECTOR)
+        return tree.Expr("bits", (weight(self.offset(node["name"]) // 4 + vector, self.weights),), VECTOR)
 
-    def affine(self, index: int, node: Node) -> list[Statement]:
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x for all pixels: sums of integers, which become floats at the end."""
         source, first = node.args[0], self.offset(node["weight"]) // 4
         zero = splat(const(0), FOUR)
-        found: list[Statement] = [self.mapped(index, node)]
+        found: list[tree.Statement] = [self.mapped(index, node)]
         found += [
-            Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True) for p, j in self.places(index)
+            tree.Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True)
+            for p, j in self.places(index)
         ]
         if self.program.nodes[source].op == "input":
             found += self.of_window(index, first)
@@ -290,22 +284,22 @@ class GroupBytes(Group):
             for k in range(-(-self.program.nodes[source].type.shape[0] // FOUR)):
                 names = [f"b{index}_{p}_{k}" for p in range(self.pixels)]
                 for p, each in enumerate(names):
-                    found.append(Let(each, packed([self.at(source, p, k).lane(c) for c in range(FOUR)])))
+                    found.append(tree.Let(each, packed([self.at(source, p, k).lane(c) for c in range(FOUR)])))
                 sums = self.names(f"s{index}", index)
                 found += self.multiplied(
                     self.weights_row(index, const(first), k), sums, list(map(name, names))
                 )
         for p, j in self.places(index):
             total = apply("convert", name(f"s{index}_{p}_{j}", self.weights), value="float32")
-            found.append(Array(self.variable(index, p, j), VECTOR, value=total))
+            found.append(tree.Array(self.variable(index, p, j), VECTOR, value=total))
         return found
 
-    def of_window(self, index: int, first: int) -> list[Statement]:
+    def of_window(self, index: int, first: int) -> list[tree.Statement]:
         """Return the products of all taps with the weights from vector `first` on."""
         values = [self.pixel(image, c) for image in self.gather.images for c in range(image.channels)]
         values += [const(0.0)] * (-len(values) % FOUR)
         words = [packed(values[i : i + FOUR]) for i in range(0, len(values), FOUR)]
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         for begin in range(0, len(words), MOST_CHANNELS):
             held = words[begin : begin + MOST_CHANNELS]
             found += self.staged(held)
@@ -314,11 +308,11 @@ class GroupBytes(Group):
             first += self.gather.rows * self.gather.columns * len(held) * self.vectors(index)
         return found
 
-    def product(self, weight: Expr, factor: Expr, total: str) -> Expr:
+    def product(self, weight: tree.Expr, factor: tree.Expr, total: str) -> tree.Expr:
         """Return what a word of weights adds to a sum."""
         return dot4(weight, factor)
 
 
-def packed(values: Sequence[Expr]) -> Expr:
+def packed(values: Sequence[tree.Expr]) -> tree.Expr:
     """Return four values as the bytes of a word, the first one the lowest."""
-    return Expr("pack4", tuple(values), INT)
+    return tree.Expr("pack4", tuple(values), tree.INT)

@@ -16,27 +16,9 @@ from ...refimpl.errors import CompileError
 from ..core.ir import Gather, Image, Node, Program, users
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
+from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
-from ..kernel.kernel import (
-    FLOAT,
-    INT,
-    Body,
-    Comment,
-    Constant,
-    Expr,
-    For,
-    Kernel,
-    Let,
-    Statement,
-    Store,
-    Type,
-    apply,
-    const,
-    expr,
-    load,
-    name,
-    splat,
-)
+from ..kernel.kernel import apply, const, expr, load, name, splat
 
 X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
 """An item's first pixel, and the size of the images."""
@@ -85,41 +67,41 @@ def _loops(node: Node) -> bool:
     return OPS[node.op].elementwise or node.op in ("component", "take")
 
 
-def weight(index: Expr | int, kind: Type = FLOAT) -> Expr:
+def weight(index: tree.Expr | int, kind: tree.Type = tree.FLOAT) -> tree.Expr:
     """Return an element of the weights."""
     return load(WEIGHTS, index, kind=kind)
 
 
-def loop(counter: str, count: Expr | int, *body: Statement) -> For:
+def loop(counter: str, count: tree.Expr | int, *body: tree.Statement) -> tree.For:
     """Return a loop."""
-    return For(counter, expr(count), body)
+    return tree.For(counter, expr(count), body)
 
 
 def lets(
-    program: Program, known: Mapping[str, Expr] | None = None, lanes: int = 1, prefix: str = "t"
-) -> tuple[list[Let], dict[str, Expr]]:
+    program: Program, known: Mapping[str, tree.Expr] | None = None, lanes: int = 1, prefix: str = "t"
+) -> tuple[list[tree.Let], dict[str, tree.Expr]]:
     """Return a statement for each operation of a program, and its outputs.
 
     Inputs are values of their names unless `known` has others.
     """
-    values: list[Expr] = []
+    values: list[tree.Expr] = []
     lines = []
     for index, node in enumerate(program.nodes):
-        kind = Type(node.type.dtype)
+        kind = tree.Type(node.type.dtype)
         if node.op == "input":
             key = str(node["name"])
             values.append((known or {}).get(key) or name(key, kind.of(lanes)))
         elif node.op == "constant":
             number: Any = node["value"]
-            values.append(splat(const(float(number) if kind == Type() else number, kind), lanes))
+            values.append(splat(const(float(number) if kind == tree.Type() else number, kind), lanes))
         else:
             value = apply(node.op, *(values[arg] for arg in node.args), value=node.get("dtype"))
-            lines.append(Let(f"{prefix}{index}", value, kept=True))
+            lines.append(tree.Let(f"{prefix}{index}", value, kept=True))
             values.append(name(lines[-1].name, value.type))
     return lines, {key: values[index] for key, index in program.outputs}
 
 
-Read = Callable[[int], Expr]
+Read = Callable[[int], tree.Expr]
 """The expression of a value that another group has computed."""
 
 
@@ -138,7 +120,7 @@ class Nest:
         self.groups, self.readers = groups_of(program), users(program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
 
-    def built(self) -> Kernel:
+    def built(self) -> tree.Kernel:
         """Return the kernel of the program."""
         raise NotImplementedError
 
@@ -147,7 +129,7 @@ class Nest:
         """Return how the window is filled."""
         return kernel_gather(self.program)
 
-    def window(self) -> list[Constant]:
+    def window(self) -> list[tree.Constant]:
         """Return the constants of the window."""
         gather, pixel = self.gather, "the tap that lies on the pixel itself"
         if gather.axes == (0, 1):
@@ -159,13 +141,15 @@ class Nest:
         found = {self.rows.value: (gather.rows, ""), self.columns.value: (gather.columns, "")}
         found |= {self.row.value: (gather.rows // 2, pixel)}
         found.setdefault(self.column.value, (gather.columns // 2, ""))
-        return [Constant(name, const(value), text) for name, (value, text) in found.items()]
+        return [tree.Constant(name, const(value), text) for name, (value, text) in found.items()]
 
-    def kernel(self, body: Sequence[Statement], constants: Sequence[Constant], **more: object) -> Kernel:
+    def kernel(
+        self, body: Sequence[tree.Statement], constants: Sequence[tree.Constant], **more: object
+    ) -> tree.Kernel:
         """Return the kernel of statements; where its weights are is a matter of the language."""
         interface = denoiser(self.gather.images, output_channels(self.program))
         found = tuple(tables(self.program).items())
-        return Kernel(interface, tuple(body), tuple(constants), tables=found, **more)  # type: ignore[arg-type]
+        return tree.Kernel(interface, tuple(body), tuple(constants), tables=found, **more)  # type: ignore[arg-type]
 
     # ---- values ------------------------------------------------------------------------------------------
 
@@ -177,55 +161,55 @@ class Nest:
             readers = [r for r in readers if self.program.nodes[r].op != "affine"]
         return bool(readers) or any(index == output for _, output in self.program.outputs)
 
-    def constant(self, node: Node) -> Expr:
+    def constant(self, node: Node) -> tree.Expr:
         """Return the value of a constant node."""
         dtype = node.type.dtype
         value = node["value"]
-        return const(float(value) if dtype == "float32" else value, Type(dtype))  # type: ignore[arg-type]
+        return const(float(value) if dtype == "float32" else value, tree.Type(dtype))  # type: ignore[arg-type]
 
-    def statements(self, group: Sequence[int], read: Read, lanes: int) -> list[Let]:
+    def statements(self, group: Sequence[int], read: Read, lanes: int) -> list[tree.Let]:
         """Return a statement for each node of an elementwise group; `read`: values of other groups."""
-        found: dict[int, Expr] = {}
+        found: dict[int, tree.Expr] = {}
         lines = []
         for index in group:
             node = self.program.nodes[index]
             value = self._value(node, found, read, lanes if node.type.shape else 1)
             found[index] = value if self.fuses(index) else name(f"t{index}", value.type)
-            lines += [] if self.fuses(index) else [Let(f"t{index}", value, kept=True)]
+            lines += [] if self.fuses(index) else [tree.Let(f"t{index}", value, kept=True)]
         return lines
 
     def fuses(self, index: int) -> bool:
         """Return whether a value has no name: its expression is part of the only one that reads it."""
         return False
 
-    def _value(self, node: Node, own: Mapping[int, Expr], read: Read, lanes: int) -> Expr:
+    def _value(self, node: Node, own: Mapping[int, tree.Expr], read: Read, lanes: int) -> tree.Expr:
         """Return what an elementwise node computes."""
         args = [own[a] if a in own else self.operand(a, read) for a in node.args]
         if node.op == "component":
             return self.component(node)
         if node.op == "take":
-            return Expr("take", tuple(args), Type(node.type.dtype), node["table"])
+            return tree.Expr("take", tuple(args), tree.Type(node.type.dtype), node["table"])
         kind = node.get("dtype")
         return apply(node.op, *(splat(a, lanes) for a in args), value=kind)
 
-    def component(self, node: Node) -> Expr:
+    def component(self, node: Node) -> tree.Expr:
         """Return one component of another group's vector."""
         raise NotImplementedError
 
-    def operand(self, index: int, read: Read) -> Expr:
+    def operand(self, index: int, read: Read) -> tree.Expr:
         """Return a constant, or what another group has computed."""
         node = self.program.nodes[index]
         return self.constant(node) if node.op == "constant" else read(index)
 
-    def span(self, group: Sequence[int]) -> Comment:
+    def span(self, group: Sequence[int]) -> tree.Comment:
         """Return the comment above an elementwise group."""
         nodes = f"%{group[0]}" if len(group) == 1 else f"%{group[0]} to %{group[-1]}"
-        return Comment(f"{nodes}: elementwise on {self.program.nodes[group[0]].type.shape[0]} numbers")
+        return tree.Comment(f"{nodes}: elementwise on {self.program.nodes[group[0]].type.shape[0]} numbers")
 
-    def mapped(self, index: int, node: Node) -> Comment:
+    def mapped(self, index: int, node: Node) -> tree.Comment:
         """Return the comment above an affine map."""
         n_in = self.program.parameters[str(node["weight"])].shape[1]
-        return Comment(f"%{index}: affine map {node['weight']} from {n_in} to {node.type.shape[0]}")
+        return tree.Comment(f"%{index}: affine map {node['weight']} from {n_in} to {node.type.shape[0]}")
 
     def offset(self, parameter: object) -> int:
         """Return the place of a parameter's first weight."""
@@ -233,46 +217,51 @@ class Nest:
 
     # ---- the window --------------------------------------------------------------------------------------
 
-    def tap_row(self) -> Let:
+    def tap_row(self) -> tree.Let:
         """Return the row of a tap, inside the image."""
-        return Let("row", clamp(Y + name("dy") - self.row, HEIGHT))
+        return tree.Let("row", clamp(Y + name("dy") - self.row, HEIGHT))
 
-    def tap_column(self) -> list[Let]:
+    def tap_column(self) -> list[tree.Let]:
         """Return the column of a tap, and whether the tap is inside the image where that matters."""
-        column = Let("column", clamp(X + name("dx") - self.column, WIDTH))
-        if self.gather.window.border == "clamp":
-            return [column]
-        same = apply("equal", name("row"), Y + name("dy") - self.row)
-        along = apply("equal", name("column"), X + name("dx") - self.column)
-        return [column, Let("inside", same & along)]
+        column = X + name("dx") - self.column
+        return [tree.Let("column", clamp(column, WIDTH)), *self.inside(Y + name("dy") - self.row, column)]
 
-    def pixel(self, image: Image, channel: Expr | int) -> Expr:
+    def inside(self, row: tree.Expr, column: tree.Expr) -> list[tree.Let]:
+        """Return whether a tap at this row and column is inside the image, where that matters."""
+        if self.gather.window.border == "clamp":
+            return []
+        same, along = apply("equal", name("row"), row), apply("equal", name("column"), column)
+        return [tree.Let("inside", same & along)]
+
+    def pixel(self, image: Image, channel: tree.Expr | int) -> tree.Expr:
         """Return a channel at `row` and `column` under the border rule; no read leaves the image."""
         value = load(f"{IMAGE}{image.name}", name("row"), name("column"), channel)
         if self.gather.window.border == "clamp":
             return value
-        return apply("select", name("inside", Type("bool")), value, const(0.0))
+        return apply("select", name("inside", tree.Type("bool")), value, const(0.0))
 
-    def texel(self, image: Image) -> Expr:
+    def texel(self, image: Image) -> tree.Expr:
         """Return all channels at `row` and `column` under the border rule."""
-        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), kind=FLOAT.of(image.channels))
+        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), kind=tree.FLOAT.of(image.channels))
         if image.channels == 1:
             return self.pixel(image, 0)
         if self.gather.window.border == "clamp":
             return value
-        return apply("select", name("inside", Type("bool")), value, splat(const(0.0), image.channels))
+        return apply("select", name("inside", tree.Type("bool")), value, splat(const(0.0), image.channels))
 
 
-def clamp(value: Expr, count: Expr) -> Expr:
+def clamp(value: tree.Expr, count: tree.Expr) -> tree.Expr:
     """Return the nearest index below `count`."""
-    return Expr("clamp", (value, const(0), count - 1), INT)
+    return tree.Expr("clamp", (value, const(0), count - 1), tree.INT)
 
 
-def output(program: Program, row: Expr, column: Expr, read: Callable[[Expr], Expr]) -> Body:
+def output(
+    program: Program, row: tree.Expr, column: tree.Expr, read: Callable[[tree.Expr], tree.Expr]
+) -> tree.Body:
     """Return the statements that write the only output of a pixel; `read`: a channel of it."""
     name_of, index = program.outputs[0]
     if not program.nodes[index].type.shape:
-        return Comment(f"output {name_of}"), Store(RESULT, (row, column, const(0)), read(const(0)))
+        return tree.Comment(f"output {name_of}"), tree.Store(RESULT, (row, column, const(0)), read(const(0)))
     i = name("i")
-    write = loop("i", output_channels(program), Store(RESULT, (row, column, i), read(i)))
-    return Comment(f"output {name_of}"), write
+    write = loop("i", output_channels(program), tree.Store(RESULT, (row, column, i), read(i)))
+    return tree.Comment(f"output {name_of}"), write

@@ -27,30 +27,9 @@ from numpy.typing import NDArray
 
 from ..core.ir import Node, Program
 from ..core.weights import Slot
+from ..kernel import kernel as tree
 from ..kernel.interface import RESULT
-from ..kernel.kernel import (
-    FLOAT,
-    Array,
-    Body,
-    Call,
-    Comment,
-    Constant,
-    Expr,
-    For,
-    Function,
-    If,
-    Kernel,
-    Let,
-    Statement,
-    Store,
-    Type,
-    View,
-    apply,
-    const,
-    load,
-    name,
-    splat,
-)
+from ..kernel.kernel import apply, const, load, name, splat
 from . import fourier
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
 from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, readers_of_window
@@ -128,14 +107,14 @@ class Traced:
     """The operations of a transform, in the order in which they are made."""
 
     def __init__(self) -> None:
-        self.made: list[Expr] = []
+        self.made: list[tree.Expr] = []
 
-    def add(self, value: Expr) -> Number:
+    def add(self, value: tree.Expr) -> Number:
         """Return a new value."""
         self.made.append(value)
         return Number(name(f"t{len(self.made) - 1}", value.type), self)
 
-    def needed(self, outputs: list[Expr]) -> list[Let]:
+    def needed(self, outputs: list[tree.Expr]) -> list[tree.Let]:
         """Return what outputs depend on; a sum contains the products that only it reads."""
         readers = Counter(each.value for each in outputs)
         kept = []
@@ -143,7 +122,7 @@ class Traced:
             if readers[f"t{number}"]:
                 readers.update(arg.value for arg in value.args if arg.op == "name" and value.op != "load")
                 kept.append(number)
-        known: dict[str, Expr] = {}
+        known: dict[str, tree.Expr] = {}
         lets = []
         wanted = {each.value for each in outputs}
         for number in kept[::-1]:
@@ -153,7 +132,7 @@ class Traced:
             if value.op == "multiply" and readers[own] == 1 and own not in wanted:
                 known[own] = value
             else:
-                lets.append(Let(own, value))
+                lets.append(tree.Let(own, value))
         return lets
 
 
@@ -161,7 +140,7 @@ class Traced:
 class Number:
     """A value that an operation of a transform makes."""
 
-    value: Expr
+    value: tree.Expr
     traced: Traced
 
     def __add__(self, other: Number) -> Number:
@@ -175,7 +154,9 @@ class Number:
         return self.traced.add(apply("multiply", self.value, wide))
 
 
-def line(inputs: Sequence[tuple[Expr, Expr]], kept: int, sign: int) -> tuple[list[Let], list[list[Expr]]]:
+def line(
+    inputs: Sequence[tuple[tree.Expr, tree.Expr]], kept: int, sign: int
+) -> tuple[list[tree.Let], list[list[tree.Expr]]]:
     """Return the statements that transform complex values, and the first `kept` of what they give."""
     traced = Traced()
     found = fourier.transform([tuple(map(traced.add, each)) for each in inputs], sign)[:kept]  # type: ignore[misc]
@@ -183,18 +164,18 @@ def line(inputs: Sequence[tuple[Expr, Expr]], kept: int, sign: int) -> tuple[lis
     return traced.needed([part for number in outputs for part in number]), outputs
 
 
-def codelet(title: str, points: int, kept: int, sign: int, kind: Type) -> Function:
+def codelet(title: str, points: int, kept: int, sign: int, kind: tree.Type) -> tree.Function:
     """Return the function that transforms `points` complex values and keeps the first `kept`."""
     places = [(STEP * (PARTS * k), STEP * (PARTS * k) + 1) for k in range(points)]
     lets, found = line(
         [(load("from", a, kind=kind), load("from", b, kind=kind)) for a, b in places], kept, sign
     )
     stores = [
-        Store("to", (LEAP * (PARTS * k) + i,), part)
+        tree.Store("to", (LEAP * (PARTS * k) + i,), part)
         for k, number in enumerate(found)
         for i, part in enumerate(number)
     ]
-    return Function(title, (("from", kind), ("to", kind)), (*lets, *stores))
+    return tree.Function(title, (("from", kind), ("to", kind)), (*lets, *stores))
 
 
 # ---- statements ------------------------------------------------------------------------------------------
@@ -211,27 +192,33 @@ class Spectral(Tiled):
         self.sizes = sizes_of(program, self.lanes, self.points, self.tiles)
         self.centres = fourier.arrangement(program, self.lanes).centres
 
-    def constants(self) -> list[Constant]:
+    def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
         s = self.sizes
         return [
             *self.window(),
-            Constant("POINTS", const(self.points), "rows and columns of a tile with what its windows reach"),
-            Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
-            Constant("TILES", const(self.tiles), "neighbours in a row that a work item computes"),
-            Constant("PIXELS", const(self.pixels), "pixels of a row that go through the layers together"),
-            Constant("LANES", const(self.lanes), "components of a vector"),
-            Constant("PAIRS", const(s.pairs), "of channels"),
-            Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
-            Constant("INPUTS", const(s.inputs), "vectors that hold the pairs of all tiles"),
-            Constant("NEURONS", const(s.neurons), "pairs of vectors of neurons"),
-            Constant("STRIDE", 2 * (POINTS + 1), "vectors from row to row: not a multiple of 4096 bytes"),
+            tree.Constant(
+                "POINTS", const(self.points), "rows and columns of a tile with what its windows reach"
+            ),
+            tree.Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            tree.Constant("TILES", const(self.tiles), "neighbours in a row that a work item computes"),
+            tree.Constant(
+                "PIXELS", const(self.pixels), "pixels of a row that go through the layers together"
+            ),
+            tree.Constant("LANES", const(self.lanes), "components of a vector"),
+            tree.Constant("PAIRS", const(s.pairs), "of channels"),
+            tree.Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
+            tree.Constant("INPUTS", const(s.inputs), "vectors that hold the pairs of all tiles"),
+            tree.Constant("NEURONS", const(s.neurons), "pairs of vectors of neurons"),
+            tree.Constant(
+                "STRIDE", 2 * (POINTS + 1), "vectors from row to row: not a multiple of 4096 bytes"
+            ),
         ]
 
-    def built(self) -> Kernel:
+    def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.constants()
-        body: list[Statement] = [*self.rows_forward(), *self.columns_of_frequencies(), *self.layers()]
+        body: list[tree.Statement] = [*self.rows_forward(), *self.columns_of_frequencies(), *self.layers()]
         functions = (
             codelet("forward", self.points, self.points, -1, self.vector),
             codelet("backward", self.points, self.sizes.out, 1, self.vector),
@@ -245,19 +232,18 @@ class Spectral(Tiled):
             weights=self.vector,
         )
 
-    def transform(self, function: str, source: View, into: View) -> Call:
+    def transform(self, function: str, source: tree.View, into: tree.View) -> tree.Call:
         """Return a call of a transform."""
-        return Call(function, (source, into))
+        return tree.Call(function, (source, into))
 
-    def rows_forward(self) -> list[Statement]:
+    def rows_forward(self) -> list[tree.Statement]:
         """Return the gathering and transformation of rows."""
-        top, left, row, column = map(name, ("top", "left", "row", "column"))
-        lines: list[Statement] = [
-            Let("left", TILE_X + TILE * OUT + name("dx") - self.column),
-            Let("column", clamp(left, WIDTH)),
+        top, left = map(name, ("top", "left"))
+        lines: list[tree.Statement] = [
+            tree.Let("left", TILE_X + TILE * OUT + name("dx") - self.column),
+            tree.Let("column", clamp(left, WIDTH)),
+            *self.inside(top, left),
         ]
-        if self.gather.window.border == "zero":
-            lines.append(Let("inside", apply("equal", row, top) & apply("equal", column, left)))
         first = 0
         for image in self.gather.images:
             for c in range(image.channels):
@@ -267,108 +253,108 @@ class Spectral(Tiled):
                     value = apply("subtract", value, const(centre))
                 lane, at = TILE * PAIRS + pair, name("dx") * 2 + part
                 place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
-                lines.append(Store("gathered", (place,), value))
+                lines.append(tree.Store("gathered", (place,), value))
             first += image.channels
         start, count = COUNTER * POINTS * 2, INPUTS * POINTS * 2
-        to = View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,), const(1))
-        call = self.transform("forward", View("gathered", (start,), const(1)), to)
+        to = tree.View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,), const(1))
+        call = self.transform("forward", tree.View("gathered", (start,), const(1)), to)
         gather = loop("tile", TILES, loop("dx", POINTS, *lines))
         return [
-            Comment("rows of the images around the tiles, transformed"),
-            Array("gathered", self.vector, (count,)),
-            Array("rows", self.vector, (INPUTS * POINTS * STRIDE,)),
-            loop("i", count, Store("gathered", (COUNTER,), self.zero)),
+            tree.Comment("rows of the images around the tiles, transformed"),
+            tree.Array("gathered", self.vector, (count,)),
+            tree.Array("rows", self.vector, (INPUTS * POINTS * STRIDE,)),
+            loop("i", count, tree.Store("gathered", (COUNTER,), self.zero)),
             loop(
                 "dy",
                 POINTS,
-                Let("top", TILE_Y + name("dy") - self.row),
-                Let("row", clamp(top, HEIGHT)),
+                tree.Let("top", TILE_Y + name("dy") - self.row),
+                tree.Let("row", clamp(top, HEIGHT)),
                 gather,
                 loop("i", INPUTS, call),
             ),
         ]
 
-    def columns_of_frequencies(self) -> list[Statement]:
+    def columns_of_frequencies(self) -> list[tree.Statement]:
         """Return the loop over columns of frequencies: forward, products with the weights, back."""
         vector, opposite = self.vector, name("opposite")
         row, one = COUNTER * POINTS * STRIDE, const(1)
         forward = [
             self.transform(
                 "forward",
-                View("rows", (row + 2 * k,), POINTS + 1),
-                View("columns", (const(n), const(0)), one),
+                tree.View("rows", (row + 2 * k,), POINTS + 1),
+                tree.View("columns", (const(n), const(0)), one),
             )
             for n, k in enumerate((K, opposite))
         ]
         a, b = (load("columns", const(0), 2 * F + part, kind=vector) for part in (0, 1))
         c, d = (load("columns", APART, 2 * G + part, kind=vector) for part in (0, 1))
-        lets = [Let(n, value) for n, value in zip("abcd", (a, b, c, d), strict=True)]
+        lets = [tree.Let(n, value) for n, value in zip("abcd", (a, b, c, d), strict=True)]
         a, b, c, d = (name(n, vector) for n in "abcd")
         both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
         place = (COUNTER * POINTS + F) * 4
-        stores = [Store("spectra", (place + n,), value) for n, value in enumerate(both)]
-        unpack = loop("f", POINTS, Let("g", (POINTS - F) % POINTS), *lets, *stores)
+        stores = [tree.Store("spectra", (place + n,), value) for n, value in enumerate(both)]
+        unpack = loop("f", POINTS, tree.Let("g", (POINTS - F) % POINTS), *lets, *stores)
         mirrored = apply("not_equal", opposite, K)
         back = (TILE * NEURONS + Q) * OUT * STRIDE
         backward = [
             self.transform(
                 "backward",
-                View("product", (TILE * 2 + n, const(0)), one),
-                View("back", (back + 2 * k,), POINTS + 1),
+                tree.View("product", (TILE * 2 + n, const(0)), one),
+                tree.View("back", (back + 2 * k,), POINTS + 1),
             )
             for n, k in enumerate((K, opposite))
         ]
         # A column that is its own mirror image is mirrored, not computed twice: both parts of each complex
         # image stay apart to the bit.
         return [
-            Comment("columns: transformed, multiplied with the weights' spectra, transformed back"),
-            Array("columns", vector, (2, POINTS * 2)),
-            Array("spectra", vector, (INPUTS * POINTS * 4,)),
-            Array("product", vector, (TILES * 2, POINTS * 2)),
-            Array("back", vector, (TILES * NEURONS * OUT * STRIDE,)),
+            tree.Comment("columns: transformed, multiplied with the weights' spectra, transformed back"),
+            tree.Array("columns", vector, (2, POINTS * 2)),
+            tree.Array("spectra", vector, (INPUTS * POINTS * 4,)),
+            tree.Array("product", vector, (TILES * 2, POINTS * 2)),
+            tree.Array("back", vector, (TILES * NEURONS * OUT * STRIDE,)),
             loop(
                 "k",
                 POINTS // 2 + 1,
-                Let("opposite", (POINTS - K) % POINTS),
-                Let("apart", apply("select", mirrored, const(1), const(0))),
-                loop("i", INPUTS, forward[0], If(mirrored, (forward[1],)), unpack),
+                tree.Let("opposite", (POINTS - K) % POINTS),
+                tree.Let("apart", apply("select", mirrored, const(1), const(0))),
+                loop("i", INPUTS, forward[0], tree.If(mirrored, (forward[1],)), unpack),
                 loop(
                     "q",
                     NEURONS,
                     loop("f", POINTS, *self.products()),
-                    loop("tile", TILES, backward[0], If(mirrored, (backward[1],))),
+                    loop("tile", TILES, backward[0], tree.If(mirrored, (backward[1],))),
                 ),
             ),
         ]
 
-    def products(self) -> list[Statement]:
+    def products(self) -> list[tree.Statement]:
         """Return the products of a column of frequencies for all tiles."""
         split = self.sizes.block < self.sizes.pairs
         pair = BLOCK * OF_BLOCK + name("pair") if split else name("pair")
         (layer,) = readers_of_window(self.program)
         first = self.offset(layer["weight"]) // self.lanes
         at = first + (((K * NEURONS + Q) * POINTS + F) * PAIRS + pair) * 8
-        weights = [Let(f"w{j}", weight(at + j, self.vector)) for j in range(8)]
+        weights = [tree.Let(f"w{j}", weight(at + j, self.vector)) for j in range(8)]
         lane = T * PAIRS + pair
         place = (lane // LANES * POINTS + F) * 4 * LANES + lane % LANES
-        lines: list[Statement] = [
-            Let("at", place),
-            *(Let(n, load("spectra", name("at") + LANES * k)) for k, n in enumerate("abcd")),
+        lines: list[tree.Statement] = [
+            tree.Let("at", place),
+            *(tree.Let(n, load("spectra", name("at") + LANES * k)) for k, n in enumerate("abcd")),
         ]
         for v in range(2):
             for part, terms in PRODUCTS.items():
                 for sign, number, value in terms:
-                    factor = splat(name(value, FLOAT), self.lanes)
+                    factor = splat(name(value, tree.FLOAT), self.lanes)
                     product = apply("multiply", name(f"w{2 * number + v}", self.vector), factor)
                     product = product if sign == "+" else apply("negative", product)
-                    lines.append(Store(part, (T, const(v)), product, add=True))
+                    lines.append(tree.Store(part, (T, const(v)), product, add=True))
         names = ("real", "imaginary")
-        sums: list[Statement] = [loop("pair", OF_BLOCK, *weights, self.each_tile(lines))]
+        sums: list[tree.Statement] = [loop("pair", OF_BLOCK, *weights, self.each_tile(lines))]
         whole = names
         if split:
             whole = ("whole_real", "whole_imaginary")
-            adds: list[Statement] = [
-                Store(total, (T, const(v)), load(part, T, const(v), kind=self.vector), add=True)
+            adds: list[tree.Statement] = [
+                tree.Store(total, (T, const(v)), load(part, T, const(v), kind=self.vector), add=True)
                 for total, part in zip(whole, names, strict=True)
                 for v in range(2)
             ]
@@ -380,47 +366,53 @@ class Spectral(Tiled):
             (T * 2 + APART, 2 * G, apply("add", a, d)),
             (T * 2 + APART, 2 * G + 1, apply("subtract", c, b)),
         )
-        stores = self.each_tile([Store("product", (image, place), value) for image, place, value in ends])
-        return [*self.zeros(whole), *sums, Let("g", (POINTS - F) % POINTS), stores]
+        stores = self.each_tile(
+            [tree.Store("product", (image, place), value) for image, place, value in ends]
+        )
+        return [*self.zeros(whole), *sums, tree.Let("g", (POINTS - F) % POINTS), stores]
 
-    def zeros(self, names: tuple[str, ...]) -> list[Statement]:
+    def zeros(self, names: tuple[str, ...]) -> list[tree.Statement]:
         """Return the sums of all tiles, which start with zeros."""
-        arrays = [Array(part, self.vector, (TILES, 2), register=True) for part in names]
+        arrays = [tree.Array(part, self.vector, (TILES, 2), register=True) for part in names]
         return [
             *arrays,
-            self.each_tile([Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]),
+            self.each_tile([tree.Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]),
         ]
 
-    def each_tile(self, lines: list[Statement]) -> For:
+    def each_tile(self, lines: list[tree.Statement]) -> tree.For:
         """Return a loop over tiles that keeps each tile's sums in registers of their own."""
-        return For("t", TILES, tuple(lines), "unroll")
+        return tree.For("t", TILES, tuple(lines), "unroll")
 
-    def layers(self) -> list[Statement]:
+    def layers(self) -> list[tree.Statement]:
         """Return the rows back, and the other layers for blocks of pixels."""
         of_row = self.tiles * self.sizes.out
         blocks = -(-of_row // self.pixels)
-        found: list[Statement] = [
-            Comment("rows back, and the other layers"),
-            Array("sums", self.vector, (blocks * PIXELS * NEURONS * 2,)),
+        found: list[tree.Statement] = [
+            tree.Comment("rows back, and the other layers"),
+            tree.Array("sums", self.vector, (blocks * PIXELS * NEURONS * 2,)),
         ]
         if blocks * self.pixels > of_row:
             # The last block reaches beyond the tiles: its values there are read, and none is written.
             beyond = (blocks * PIXELS - TILES * OUT) * NEURONS * 2
-            found.append(loop("i", beyond, Store("sums", (TILES * OUT * NEURONS * 2 + COUNTER,), self.zero)))
+            found.append(
+                loop("i", beyond, tree.Store("sums", (TILES * OUT * NEURONS * 2 + COUNTER,), self.zero))
+            )
         at = (TILE // NEURONS * OUT * NEURONS + TILE % NEURONS) * 2
-        source = View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
-        rows = loop("tile", TILES * NEURONS, self.transform("backward", source, View("sums", (at,), NEURONS)))
-        lines: list[Statement] = [
-            Let("x", TILE_X + PIXEL_BLOCK * PIXELS),
-            Let("last", apply("minimum", TILE_X + TILES * OUT, WIDTH)),
+        source = tree.View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
+        rows = loop(
+            "tile", TILES * NEURONS, self.transform("backward", source, tree.View("sums", (at,), NEURONS))
+        )
+        lines: list[tree.Statement] = [
+            tree.Let("x", TILE_X + PIXEL_BLOCK * PIXELS),
+            tree.Let("last", apply("minimum", TILE_X + TILES * OUT, WIDTH)),
         ]
         for group in self.groups:
             lines += self.of_group(group)
         lines += self.outputs()
-        body = (rows, Let("y", TILE_Y + LINE), loop("b", blocks, *lines))
-        return [*found, For("line", OUT, body, until=TILE_Y + LINE < HEIGHT)]
+        body = (rows, tree.Let("y", TILE_Y + LINE), loop("b", blocks, *lines))
+        return [*found, tree.For("line", OUT, body, until=TILE_Y + LINE < HEIGHT)]
 
-    def affine(self, index: int, node: Node) -> list[Statement]:
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return the copy of the sums of a block of pixels, or what the tiled schedule does."""
         if self.program.nodes[node.args[0]].op != "input":
             return super().affine(index, node)
@@ -430,12 +422,18 @@ class Spectral(Tiled):
             value = load("sums", (PIXEL_BLOCK * PIXELS + P) * NEURONS * 2 + j, kind=self.vector)
             if bias:
                 value = apply("add", value, weight(self.offset(bias) // self.lanes + j, self.vector))
-            lines.append(Store(f"v{index}", (P * total + j,), value))
-        return [Comment(f"%{index}: the sums, and their bias"), self.array(index), loop("p", PIXELS, *lines)]
+            lines.append(tree.Store(f"v{index}", (P * total + j,), value))
+        return [
+            tree.Comment(f"%{index}: the sums, and their bias"),
+            self.array(index),
+            loop("p", PIXELS, *lines),
+        ]
 
-    def outputs(self) -> Body:
+    def outputs(self) -> tree.Body:
         """Return the statements that write the output of each pixel of the block in tiles and image."""
         output, index = self.program.outputs[0]
         value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
-        write = loop("i", self.program.nodes[index].type.shape[0], Store(RESULT, (Y, X + P, COUNTER), value))
-        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=name("last") > X + P)
+        write = loop(
+            "i", self.program.nodes[index].type.shape[0], tree.Store(RESULT, (Y, X + P, COUNTER), value)
+        )
+        return tree.Comment(f"output {output}"), tree.For("p", PIXELS, (write,), until=name("last") > X + P)

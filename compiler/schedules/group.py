@@ -18,23 +18,8 @@ from collections.abc import Sequence
 from itertools import accumulate
 
 from ..core.ir import Gather, Node, Program
-from ..kernel.kernel import (
-    FLOAT,
-    Array,
-    Barrier,
-    Constant,
-    Expr,
-    For,
-    If,
-    Kernel,
-    Let,
-    Statement,
-    Store,
-    apply,
-    const,
-    load,
-    name,
-)
+from ..kernel import kernel as tree
+from ..kernel.kernel import const, load, name
 from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
 from .straight import VECTOR, ZERO, Straight, variables
 
@@ -99,41 +84,41 @@ class Group(Straight):
 
     group: tuple[int, int]
     pixel_names = True
-    element = FLOAT
+    element = tree.FLOAT
     is_filled = False
 
     def planes(self) -> int:
         """Return the most values of a pixel that are in the tile at once."""
         return max(image.channels for image in self.gather.images)
 
-    def constants(self) -> list[Constant]:
+    def constants(self) -> list[tree.Constant]:
         """Return the sizes of window, group and tile."""
         window = self.window()
         across = GROUP_WIDTH * PIXELS + self.columns - 1
         return [
             *window,
-            Constant("GROUP_WIDTH", const(self.group[0]), "items of a group along a row"),
-            Constant("GROUP_HEIGHT", const(self.group[1])),
-            Constant("PIXELS", const(self.pixels), "pixels of an item, GROUP_WIDTH columns apart"),
-            Constant("TILE_WIDTH", across, "all that windows touch"),
-            Constant("TILE_HEIGHT", GROUP_HEIGHT + self.rows - 1),
-            Constant("PLANE", TILE_WIDTH * TILE_HEIGHT, "values of a channel"),
-            Constant("TILE_NUMBERS", PLANE * self.planes()),
+            tree.Constant("GROUP_WIDTH", const(self.group[0]), "items of a group along a row"),
+            tree.Constant("GROUP_HEIGHT", const(self.group[1])),
+            tree.Constant("PIXELS", const(self.pixels), "pixels of an item, GROUP_WIDTH columns apart"),
+            tree.Constant("TILE_WIDTH", across, "all that windows touch"),
+            tree.Constant("TILE_HEIGHT", GROUP_HEIGHT + self.rows - 1),
+            tree.Constant("PLANE", TILE_WIDTH * TILE_HEIGHT, "values of a channel"),
+            tree.Constant("TILE_NUMBERS", PLANE * self.planes()),
         ]
 
-    def built(self) -> Kernel:
+    def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.constants()
-        body: list[Statement] = [
-            Array(TILE, self.element, (TILE_NUMBERS,), "group"),
-            Let("left", X - LOCAL_X - self.column),
-            Let("top", Y - LOCAL_Y - self.row),
+        body: list[tree.Statement] = [
+            tree.Array(TILE, self.element, (TILE_NUMBERS,), "group"),
+            tree.Let("left", X - LOCAL_X - self.column),
+            tree.Let("top", Y - LOCAL_Y - self.row),
         ]
         body += [*self.all_groups(), self.output_comment()]
         for p in range(self.pixels):
             column = X + const(p) * GROUP_WIDTH
             inside = (column < WIDTH) & (Y < HEIGHT)
-            body.append(If(inside, (self.written(Y, column, p),)))
+            body.append(tree.If(inside, (self.written(Y, column, p),)))
         functions = tuple(self.functions())
         step = (PIXELS, const(1))
         more = {"functions": functions, "step": step, "group": self.group, "weights": self.weights}
@@ -141,19 +126,21 @@ class Group(Straight):
 
     weights = VECTOR
 
-    def parameter(self, node: Node, vector: int) -> Expr:
+    def parameter(self, node: Node, vector: int) -> tree.Expr:
         """Return four values of a parameter that is a vector."""
         return weight(self.offset(node["name"]) // 4 + vector, VECTOR)
 
     # ---- affine maps -------------------------------------------------------------------------------------
 
-    def affine(self, index: int, node: Node) -> list[Statement]:
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x + b for all pixels."""
         source, bias = self.program.nodes[node.args[0]], node.get("bias")
-        found: list[Statement] = [self.mapped(index, node)]
+        found: list[tree.Statement] = [self.mapped(index, node)]
         for p, j in self.places(index):
             start = weight(self.offset(bias) // 4 + j, VECTOR) if bias else ZERO
-            found.append(Array(self.variable(index, p, j), VECTOR, kept=source.op == "input", value=start))
+            found.append(
+                tree.Array(self.variable(index, p, j), VECTOR, kept=source.op == "input", value=start)
+            )
         first = self.offset(node["weight"]) // 4
         if source.op == "input":
             return [*found, *self.of_window(index, first)]
@@ -167,14 +154,14 @@ class Group(Straight):
         """Return the names of sums, by vector and pixel."""
         return [[f"{sums}_{p}_{j}" for p in range(self.pixels)] for j in range(self.vectors(index))]
 
-    def weights_row(self, index: int, first: Expr, row: int) -> list[Expr]:
+    def weights_row(self, index: int, first: tree.Expr, row: int) -> list[tree.Expr]:
         """Return a row of weights."""
         count = self.vectors(index)
         return [weight(first + (row * count + j), self.weights) for j in range(count)]
 
-    def of_window(self, index: int, first: int) -> list[Statement]:
+    def of_window(self, index: int, first: int) -> list[tree.Statement]:
         """Return the products of all taps with the weights from vector `first` on."""
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         taps = self.gather.rows * self.gather.columns * self.vectors(index)
         sizes = [image.channels * taps for image in self.gather.images]
         for image, at in zip(self.gather.images, accumulate([first, *sizes]), strict=False):
@@ -182,48 +169,48 @@ class Group(Straight):
             found += self.of_taps(index, at, image.channels)
         return found
 
-    def staged(self, values: Sequence[Expr]) -> list[Statement]:
+    def staged(self, values: Sequence[tree.Expr]) -> list[tree.Statement]:
         """Return the copy of a pixel's values for all that the group's windows touch, by all its items.
 
         A tile that holds others is filled again when all items have read it.
         """
         tile_row, tile_column = name("tile_row"), name("tile_column")
-        lines: list[Statement] = [
-            Let("tile_row", name("top") + COUNTER // TILE_WIDTH),
-            Let("tile_column", name("left") + COUNTER % TILE_WIDTH),
-            Let("row", clamp(tile_row, HEIGHT)),
-            Let("column", clamp(tile_column, WIDTH)),
+        lines: list[tree.Statement] = [
+            tree.Let("tile_row", name("top") + COUNTER // TILE_WIDTH),
+            tree.Let("tile_column", name("left") + COUNTER % TILE_WIDTH),
+            tree.Let("row", clamp(tile_row, HEIGHT)),
+            tree.Let("column", clamp(tile_column, WIDTH)),
+            *self.inside(tile_row, tile_column),
         ]
-        if self.gather.window.border == "zero":
-            same = apply("equal", name("row"), tile_row) & apply("equal", name("column"), tile_column)
-            lines.append(Let("inside", same))
-        lines += [Store(TILE, (const(plane) * PLANE + COUNTER,), value) for plane, value in enumerate(values)]
-        share = For("i", PLANE, tuple(lines), start=name("item"), step=GROUP_WIDTH * GROUP_HEIGHT)
+        lines += [
+            tree.Store(TILE, (const(plane) * PLANE + COUNTER,), value) for plane, value in enumerate(values)
+        ]
+        share = tree.For("i", PLANE, tuple(lines), start=name("item"), step=GROUP_WIDTH * GROUP_HEIGHT)
         again, self.is_filled = self.is_filled, True
-        return [*([Barrier()] if again else []), share, Barrier()]
+        return [*([tree.Barrier()] if again else []), share, tree.Barrier()]
 
-    def of_taps(self, index: int, first: int, planes: int) -> list[Statement]:
+    def of_taps(self, index: int, first: int, planes: int) -> list[tree.Statement]:
         """Return the products of the tile's taps: a partial sum for each row of taps [core/sums.py]."""
         parts = self.names("part", index)
         zero = variables([each for names in zip(*parts, strict=True) for each in names], ZERO)
         adds = [
-            Store(self.variable(index, p, j), (), name(f"part_{p}_{j}", VECTOR), add=True)
+            tree.Store(self.variable(index, p, j), (), name(f"part_{p}_{j}", VECTOR), add=True)
             for p, j in self.places(index)
         ]
         return [loop("dy", self.rows, *zero, self.row_of_taps(index, first, planes, parts), *adds)]
 
-    def row_of_taps(self, index: int, first: int, planes: int, sums: list[list[str]]) -> Statement:
+    def row_of_taps(self, index: int, first: int, planes: int, sums: list[list[str]]) -> tree.Statement:
         """Return the products of a row of taps, which are added to sums of these names."""
         step = planes * self.vectors(index)
-        lines: list[Statement] = [
-            Let("at", (LOCAL_Y + DY) * TILE_WIDTH + LOCAL_X + DX),
-            Let("first", first + (DY * self.columns + DX) * step),
+        lines: list[tree.Statement] = [
+            tree.Let("at", (LOCAL_Y + DY) * TILE_WIDTH + LOCAL_X + DX),
+            tree.Let("first", first + (DY * self.columns + DX) * step),
         ]
         for c in range(planes):
             names = [f"x{c}_{p}" for p in range(self.pixels)]
             for p, each in enumerate(names):
                 place = const(c) * PLANE + AT + const(p) * GROUP_WIDTH
-                lines.append(Let(each, load(TILE, place, kind=self.element)))
+                lines.append(tree.Let(each, load(TILE, place, kind=self.element)))
             lines += self.multiplied(
                 self.weights_row(index, FIRST, c), sums, [name(n, self.element) for n in names]
             )

@@ -16,21 +16,8 @@ from numpy.typing import NDArray
 from ..core import weights
 from ..core.ir import Image, Node, Program
 from ..core.sums import is_split
-from ..kernel.kernel import (
-    Array,
-    Body,
-    Comment,
-    Expr,
-    Let,
-    Statement,
-    Store,
-    Write,
-    apply,
-    const,
-    load,
-    name,
-    splat,
-)
+from ..kernel import kernel as tree
+from ..kernel.kernel import apply, const, load, name, splat
 from .common import X, Y, loop, weight
 from .plain import Plainly
 from .straight import VECTOR, ZERO
@@ -60,11 +47,11 @@ class Packed(Plainly):
         """Return the vectors of four that hold a value."""
         return -(-self.program.nodes[index].type.shape[0] // 4)
 
-    def array(self, index: int) -> Array:
+    def array(self, index: int) -> tree.Array:
         """Return the declaration of a value's array."""
-        return Array(f"v{index}", VECTOR, (self.vectors(index),))
+        return tree.Array(f"v{index}", VECTOR, (self.vectors(index),))
 
-    def read(self, index: int, lane: Expr | None = None) -> Expr:
+    def read(self, index: int, lane: tree.Expr | None = None) -> tree.Expr:
         """Return vector `lane` of a value."""
         node = self.program.nodes[index]
         assert lane is not None
@@ -72,27 +59,27 @@ class Packed(Plainly):
             return weight(self.offset(node["name"]) // 4 + lane, VECTOR)
         return load(f"v{index}", lane, kind=VECTOR)
 
-    def outputs(self) -> Body:
+    def outputs(self) -> tree.Body:
         """Return the statements that write the output."""
         index = self.program.outputs[0][1]
         values = [
             self.read(index, const(i // 4)).lane(i % 4)
             for i in range(self.program.nodes[index].type.shape[0])
         ]
-        return Comment(f"output {self.program.outputs[0][0]}"), Write(Y, X, tuple(values))
+        return tree.Comment(f"output {self.program.outputs[0][0]}"), tree.Write(Y, X, tuple(values))
 
     def count(self, index: int) -> int:
         """Return the elements of a value's array."""
         return self.vectors(index)
 
-    def affine(self, index: int, node: Node) -> list[Statement]:
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x + b."""
         count, bias, source = self.vectors(index), node.get("bias"), self.program.nodes[node.args[0]]
         v, first = f"v{index}", self.offset(node["weight"]) // 4
         start = weight(self.offset(bias) // 4 + J, VECTOR) if bias else ZERO
-        starts = loop("j", count, Store(v, (J,), start))
+        starts = loop("j", count, tree.Store(v, (J,), start))
         sums = replace(self.array(index), kept=source.op == "input")
-        found: list[Statement] = [self.mapped(index, node), sums, starts]
+        found: list[tree.Statement] = [self.mapped(index, node), sums, starts]
         if source.op == "input":
             return [*found, *self.of_window(index, count, first)]
         whole, rest = divmod(source.type.shape[0], 4)
@@ -106,12 +93,12 @@ class Packed(Plainly):
             found.append(self.products(v, first, const(4 * whole), last, rest, count))
         return found
 
-    def of_window(self, index: int, count: int, first: int) -> list[Statement]:
+    def of_window(self, index: int, count: int, first: int) -> list[tree.Statement]:
         """Return the products of all taps: a partial sum for each row of taps of an image."""
         split, v, part = is_split(self.gather), f"v{index}", f"part{index}"
-        zero = (loop("j", count, Store(part, (J,), ZERO)),) if split else ()
-        add = (loop("j", count, Store(v, (J,), load(part, J, kind=VECTOR), add=True)),) if split else ()
-        found: list[Statement] = [Array(part, VECTOR, (count,), kept=True)] if split else []
+        zero = (loop("j", count, tree.Store(part, (J,), ZERO)),) if split else ()
+        add = (loop("j", count, tree.Store(v, (J,), load(part, J, kind=VECTOR), add=True)),) if split else ()
+        found: list[tree.Statement] = [tree.Array(part, VECTOR, (count,), kept=True)] if split else []
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
             inner = [
@@ -119,24 +106,26 @@ class Packed(Plainly):
                 for image, at in group
                 for line in self.channels(image, at, part if split else v, first, count)
             ]
-            row = loop("dx", self.columns, *self.tap_column(), Let("tap", tap), *inner)
+            row = loop("dx", self.columns, *self.tap_column(), tree.Let("tap", tap), *inner)
             found.append(loop("dy", self.rows, self.tap_row(), *zero, row, *add))
         return found
 
-    def channels(self, image: Image, at: int, sums: str, first: int, count: int) -> list[Statement]:
+    def channels(self, image: Image, at: int, sums: str, first: int, count: int) -> list[tree.Statement]:
         """Return the products of a tap's channels of an image."""
         value = self.texel(image)
         texel = name(image.name, value.type)
         return [
-            Let(image.name, value),
+            tree.Let(image.name, value),
             self.products(sums, first, name("tap") + at, texel, image.channels, count),
         ]
 
-    def products(self, sums: str, first: int, row: Expr, value: Expr, inputs: int, count: int) -> Statement:
+    def products(
+        self, sums: str, first: int, row: tree.Expr, value: tree.Expr, inputs: int, count: int
+    ) -> tree.Statement:
         """Return the additions of rows of weights times each component of a value."""
-        lines: list[Statement] = []
+        lines: list[tree.Statement] = []
         for c in range(inputs):
             factor = value.lane(c) if value.type.lanes > 1 else value
             product = apply("multiply", weight(first + (row + c) * count + J, VECTOR), splat(factor, 4))
-            lines.append(Store(sums, (J,), product, add=True))
+            lines.append(tree.Store(sums, (J,), product, add=True))
         return loop("j", count, *lines)

@@ -26,32 +26,9 @@ from numpy.typing import NDArray
 
 from ..core.ir import Program
 from ..core.weights import Slot, weights
+from ..kernel import kernel as tree
 from ..kernel.interface import ITEMS, RESULT
-from ..kernel.kernel import (
-    BATCH,
-    FLOAT,
-    Array,
-    Block,
-    Comment,
-    Constant,
-    Expr,
-    If,
-    Kernel,
-    Launch,
-    Let,
-    Statement,
-    Store,
-    Write,
-    apply,
-    const,
-    load,
-    name,
-    parts,
-    splat,
-    stack,
-    values,
-    walk,
-)
+from ..kernel.kernel import BATCH, apply, const, load, name, parts, splat, stack, values, walk
 from ..kernel.sizes import handed_on, of_tile
 from . import fourier
 from .common import HEIGHT, WIDTH, clamp, loop, weight
@@ -67,10 +44,10 @@ HALF = 16
 TILES, IMAGES = 4, 8
 """Tiles, and complex images of two neurons each, whose products an item computes: 32 sums of four numbers."""
 
-COMPLEX = FLOAT.of(2)
+COMPLEX = tree.FLOAT.of(2)
 """A complex number in memory of the device."""
 
-Path = tuple[str, Expr, Expr]
+Path = tuple[str, tree.Expr, tree.Expr]
 """A line of an array: its name, the first place, and how far places are apart."""
 
 FIRST_TILE, TILE_COUNT = map(name, BATCH)
@@ -85,11 +62,11 @@ def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
     return {key: a for key, a in spectra_stored(program, HALF, points, 1).items() if key in own}
 
 
-def used(kernel: Kernel, launch: Launch) -> list[str]:
+def used(kernel: tree.Kernel, launch: tree.Launch) -> list[str]:
     """Return the arrays that a launch reads or writes, those of the kernel first."""
     statements = walk(launch.body)
-    found = {s.array for s in statements if isinstance(s, Store)}
-    found |= {RESULT for s in statements if isinstance(s, Write)}
+    found = {s.array for s in statements if isinstance(s, tree.Store)}
+    found |= {RESULT for s in statements if isinstance(s, tree.Write)}
     found |= {e.value for s in statements for v in values(s) for e in parts(v) if e.op == "load"}
     return [
         name for name in (*(a.name for a in kernel.interface.arrays), *handed_on(kernel)) if name in found
@@ -106,23 +83,25 @@ class Passes(Inlined):
         self.sizes = sizes_of(program, HALF, self.points, 1)
         self.centres = fourier.arrangement(program, HALF).centres
 
-    def constants(self) -> list[Constant]:
+    def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
         s = self.sizes
         return [
             *self.window(),
-            Constant("POINTS", const(self.points), "rows and columns of a tile with what its windows reach"),
-            Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
-            Constant("PAIRS", const(s.pairs), "of channels"),
-            Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
-            Constant("IMAGES", const(s.neurons * HALF), "complex ones, of two neurons each"),
-            Constant(
+            tree.Constant(
+                "POINTS", const(self.points), "rows and columns of a tile with what its windows reach"
+            ),
+            tree.Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            tree.Constant("PAIRS", const(s.pairs), "of channels"),
+            tree.Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
+            tree.Constant("IMAGES", const(s.neurons * HALF), "complex ones, of two neurons each"),
+            tree.Constant(
                 "FREQUENCIES", (POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"
             ),
-            Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
+            tree.Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
         ]
 
-    def built(self) -> Kernel:
+    def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants, images = self.constants(), name("IMAGES")
         spectrum, back = PAIRS * POINTS * POINTS, images * POINTS * POINTS
@@ -132,25 +111,25 @@ class Passes(Inlined):
         ]  # fmt: skip
         own, kept = (ITEM // POINTS * (lines * POINTS) + ITEM % POINTS for lines in (POINTS, OUT))
         row = ITEM % OUT * OUT * images + ITEM // OUT
-        body: list[Statement] = [
-            *(Array(key, COMPLEX, (TILE_COUNT * count,), "device") for key, count in arrays),
-            Comment("rows of the images around the tiles, transformed"),
+        body: list[tree.Statement] = [
+            *(tree.Array(key, COMPLEX, (TILE_COUNT * count,), "device") for key, count in arrays),
+            tree.Comment("rows of the images around the tiles, transformed"),
             self.launch(POINTS, *self.forward_rows()),
-            Comment("columns, transformed"),
+            tree.Comment("columns, transformed"),
             self.launch(PAIRS * POINTS, *self.turned(("rows", own, POINTS), ("columns", own, POINTS), -1)),
-            Comment("products with the weights' spectra, at each frequency and at its mirror image"),
-            Launch(
+            tree.Comment("products with the weights' spectra, at each frequency and at its mirror image"),
+            tree.Launch(
                 ("tile", "line"),
                 (TILE_COUNT // TILES, (FREQUENCIES + 2 * MIRRORED) * (self.sizes.neurons * HALF // IMAGES)),
                 tuple(self.products()),
             ),
-            Comment("columns, transformed back"),
+            tree.Comment("columns, transformed back"),
             self.launch(images * POINTS, *self.turned(("products", own, POINTS), ("back", kept, POINTS), 1)),
-            Comment("rows, transformed back"),
+            tree.Comment("rows, transformed back"),
             self.launch(
                 images * OUT, *self.turned(("back", ITEM * POINTS, const(1)), ("sums", row, images), 1)
             ),
-            Comment("the other layers, pixel by pixel"),
+            tree.Comment("the other layers, pixel by pixel"),
             self.launch(OUT * OUT, *self.layers()),
         ]
         across, down = ((size + OUT - 1) // OUT for size in (WIDTH, HEIGHT))
@@ -158,42 +137,39 @@ class Passes(Inlined):
         functions = tuple(self.functions())
         return self.kernel(body, constants, functions=functions, step=(OUT, OUT), weights=VECTOR, batch=tiles)
 
-    def launch(self, count: Expr, *body: Statement) -> Launch:
+    def launch(self, count: tree.Expr, *body: tree.Statement) -> tree.Launch:
         """Return a launch of so many items for each tile."""
-        return Launch(("tile", "line"), (TILE_COUNT, count), body)
+        return tree.Launch(("tile", "line"), (TILE_COUNT, count), body)
 
-    def corner(self) -> list[Statement]:
+    def corner(self) -> list[tree.Statement]:
         """Return the first pixel of a tile."""
         return [
-            Let("number", FIRST_TILE + TILE),
-            Let("across", (WIDTH + OUT - 1) // OUT),
-            Let("tile_x", name("number") % ACROSS * OUT),
-            Let("tile_y", name("number") // ACROSS * OUT),
+            tree.Let("number", FIRST_TILE + TILE),
+            tree.Let("across", (WIDTH + OUT - 1) // OUT),
+            tree.Let("tile_x", name("number") % ACROSS * OUT),
+            tree.Let("tile_y", name("number") // ACROSS * OUT),
         ]
 
-    def put(self, array: str, place: Expr, parts: Sequence[Expr]) -> Store:
+    def put(self, array: str, place: tree.Expr, parts: Sequence[tree.Expr]) -> tree.Store:
         """Return the statement that writes a complex number."""
-        return Store(array, (place * TILE_COUNT + TILE,), stack(list(parts)))
+        return tree.Store(array, (place * TILE_COUNT + TILE,), stack(list(parts)))
 
     # ---- transforms --------------------------------------------------------------------------------------
 
-    def forward_rows(self) -> list[Statement]:
+    def forward_rows(self) -> list[tree.Statement]:
         """Return the gathering of a row of all channels, and its transformation pair by pair."""
-        column, row = name("column"), name("row")
-        lines: list[Statement] = [
-            Let("left", name("tile_x") + name("dx") - self.column),
-            Let("column", clamp(name("left"), WIDTH)),
+        lines: list[tree.Statement] = [
+            tree.Let("left", name("tile_x") + name("dx") - self.column),
+            tree.Let("column", clamp(name("left"), WIDTH)),
+            *self.inside(name("top"), name("left")),
         ]
-        if self.gather.window.border == "zero":
-            same = apply("equal", row, name("top")) & apply("equal", column, name("left"))
-            lines.append(Let("inside", same))
         values = [self.pixel(image, c) for image in self.gather.images for c in range(image.channels)]
         for channel in range(2 * self.sizes.pairs):
             part, pair = divmod(channel, self.sizes.pairs)
             value = values[channel] if channel < len(values) else const(0.0)
             if channel < len(values) and (centre := self.centres[channel]):
                 value = apply("subtract", value, const(centre))
-            lines.append(Store("gathered", ((pair * POINTS + name("dx")) * 2 + part,), value))
+            lines.append(tree.Store("gathered", ((pair * POINTS + name("dx")) * 2 + part,), value))
         inputs = [
             tuple(load("gathered", (PAIR * POINTS + dx) * 2 + part) for part in (0, 1))
             for dx in range(self.points)
@@ -202,48 +178,50 @@ class Passes(Inlined):
         puts = [self.put("rows", (PAIR * POINTS + ITEM) * POINTS + k, parts) for k, parts in enumerate(found)]
         return [
             *self.corner(),
-            Let("top", name("tile_y") + ITEM - self.row),
-            Let("row", clamp(name("top"), HEIGHT)),
-            Array("gathered", FLOAT, (PAIRS * POINTS * 2,), kept=True),
+            tree.Let("top", name("tile_y") + ITEM - self.row),
+            tree.Let("row", clamp(name("top"), HEIGHT)),
+            tree.Array("gathered", tree.FLOAT, (PAIRS * POINTS * 2,), kept=True),
             loop("dx", POINTS, *lines),
             loop("pair", PAIRS, *kept(lets), *puts),
         ]
 
-    def turned(self, source: Path, result: Path, sign: int) -> list[Statement]:
+    def turned(self, source: Path, result: Path, sign: int) -> list[tree.Statement]:
         """Return the transformation of a line: arrays, first place and step of what is read and written."""
         (array, start, step), (into, to, leap) = source, result
-        reads: list[Statement] = [Let("first", start), Let("to", to)]
+        reads: list[tree.Statement] = [tree.Let("first", start), tree.Let("to", to)]
         parts = []
         for n in range(self.points):
             at = (name("first") + step * n) * TILE_COUNT + TILE
-            reads.append(Let(f"z{n}", load(array, at, kind=COMPLEX)))
+            reads.append(tree.Let(f"z{n}", load(array, at, kind=COMPLEX)))
             parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
         lets, found = line(parts, self.points if sign < 0 else self.sizes.out, sign)
         return [*reads, *kept(lets), *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
 
     # ---- products ----------------------------------------------------------------------------------------
 
-    def products(self) -> list[Statement]:
+    def products(self) -> list[tree.Statement]:
         """Return the products of one frequency, and of its mirror image: some neurons of some tiles.
 
         A weight is read once for all tiles, a number of a spectrum once for all neurons.
         """
         number, of = name("number"), self.sizes.neurons * HALF // IMAGES
         own = apply("less", number, FREQUENCIES)
-        found: list[Statement] = [
-            Let("number", ITEM // of),
-            Let("group", ITEM % of),
-            Let("rest", apply("maximum", number - FREQUENCIES, const(0))),
-            Let("k", apply("select", own, number // POINTS + 1, name("rest") // MIRRORED * (POINTS // 2))),
-            Let("f", apply("select", own, number % POINTS, name("rest") % MIRRORED)),
-            Let("here", F * POINTS + K),
-            Let("there", (POINTS - F) % POINTS * POINTS + (POINTS - K) % POINTS),
+        found: list[tree.Statement] = [
+            tree.Let("number", ITEM // of),
+            tree.Let("group", ITEM % of),
+            tree.Let("rest", apply("maximum", number - FREQUENCIES, const(0))),
+            tree.Let(
+                "k", apply("select", own, number // POINTS + 1, name("rest") // MIRRORED * (POINTS // 2))
+            ),
+            tree.Let("f", apply("select", own, number % POINTS, name("rest") % MIRRORED)),
+            tree.Let("here", F * POINTS + K),
+            tree.Let("there", (POINTS - F) % POINTS * POINTS + (POINTS - K) % POINTS),
         ]
         sums = [f"{part}_{t}_{v}" for part in PRODUCTS for t in range(TILES) for v in range(IMAGES // 2)]
         zero = variables(sums, ZERO)
-        lines = [Let("own", BLOCK * name("block") + PAIR), *self.spectra()]
-        lines += [Block(tuple(self.weighted(v))) for v in range(IMAGES // 2)]
-        adds = [Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
+        lines = [tree.Let("own", BLOCK * name("block") + PAIR), *self.spectra()]
+        lines += [tree.Block(tuple(self.weighted(v))) for v in range(IMAGES // 2)]
+        adds = [tree.Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
         found += variables([f"whole_{each}" for each in sums], ZERO)
         found.append(loop("block", PAIRS // BLOCK, *zero, loop("pair", BLOCK, *lines), *adds))
         for t, n in product(range(TILES), range(IMAGES)):
@@ -258,72 +236,77 @@ class Passes(Inlined):
             }
             for place, pair in both.items():
                 at = (image + name(place)) * TILE_COUNT + self.tile(t)
-                found.append(Store("products", (at,), stack(pair)))
+                found.append(tree.Store("products", (at,), stack(pair)))
         return found
 
-    def tile(self, t: int) -> Expr:
+    def tile(self, t: int) -> tree.Expr:
         """Return the tile with this number of an item's: those of neighbouring items are neighbours."""
         return TILE + TILE_COUNT // TILES * t
 
-    def spectra(self) -> list[Statement]:
+    def spectra(self) -> list[tree.Statement]:
         """Return the spectra of both channels of a pair, of all tiles."""
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         for t in range(TILES):
             z = []
             for place in ("here", "there"):
                 at = (name("own") * (POINTS * POINTS) + name(place)) * TILE_COUNT + self.tile(t)
-                found.append(Let(f"{place}_{t}", load("columns", at, kind=COMPLEX)))
+                found.append(tree.Let(f"{place}_{t}", load("columns", at, kind=COMPLEX)))
                 z.append(name(f"{place}_{t}", COMPLEX))
             (a, b), (c, d) = ([each.lane(0), each.lane(1)] for each in z)
             both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
-            found += [Let(f"{n}_{t}", value, kept=True) for n, value in zip("abcd", both, strict=True)]
+            found += [tree.Let(f"{n}_{t}", value, kept=True) for n, value in zip("abcd", both, strict=True)]
         (layer,) = readers_of_window(self.program)
         first = self.offset(layer["weight"]) // 4
         at = ((K * self.sizes.neurons + name("group") // (HALF // IMAGES)) * POINTS + F) * PAIRS + name("own")
-        return [*found, Let("at", first + at * (2 * HALF) + name("group") % (HALF // IMAGES) * (IMAGES // 4))]
+        return [
+            *found,
+            tree.Let("at", first + at * (2 * HALF) + name("group") % (HALF // IMAGES) * (IMAGES // 4)),
+        ]
 
-    def weighted(self, v: int) -> list[Statement]:
+    def weighted(self, v: int) -> list[tree.Statement]:
         """Return the products of four neurons' weights with each tile's spectra."""
         half, own = divmod(v, IMAGES // 4)
         at = name("at") + (half * (HALF // 4) + own)
-        lines: list[Statement] = [Let(f"w{j}", weight(at + j * (2 * HALF // 4), VECTOR)) for j in range(4)]
+        lines: list[tree.Statement] = [
+            tree.Let(f"w{j}", weight(at + j * (2 * HALF // 4), VECTOR)) for j in range(4)
+        ]
         for t, (part, terms) in product(range(TILES), PRODUCTS.items()):
             for sign, j, value in terms:
-                found = apply("multiply", name(f"w{j}", VECTOR), splat(name(f"{value}_{t}", FLOAT), 4))
+                found = apply("multiply", name(f"w{j}", VECTOR), splat(name(f"{value}_{t}", tree.FLOAT), 4))
                 found = found if sign == "+" else apply("negative", found)
-                lines.append(Store(f"{part}_{t}_{v}", (), found, add=True))
+                lines.append(tree.Store(f"{part}_{t}_{v}", (), found, add=True))
         return lines
 
     # ---- layers ------------------------------------------------------------------------------------------
 
-    def layers(self) -> list[Statement]:
+    def layers(self) -> list[tree.Statement]:
         """Return the layers after the first one's sums, for one pixel."""
         x, y = name("tile_x") + ITEM % OUT, name("tile_y") + ITEM // OUT
-        found: list[Statement] = [*self.corner(), Let("column", x), Let("row", y)]
+        found: list[tree.Statement] = [*self.corner(), tree.Let("column", x), tree.Let("row", y)]
         write = self.written(name("row"), name("column"), 0)
         inside = (name("column") < WIDTH) & (name("row") < HEIGHT)
-        return [*found, *self.all_groups(), self.output_comment(), If(inside, (write,))]
+        return [*found, *self.all_groups(), self.output_comment(), tree.If(inside, (write,))]
 
-    def start(self, bias: str, vector: int) -> Expr:
+    def start(self, bias: str, vector: int) -> tree.Expr:
         """Return four values of a bias; that of the first layer, with the centres' sums, is in memory."""
         if bias in self.slots:
             return weight(self.offset(bias) // 4 + vector, VECTOR)
         return super().start(bias, vector)
 
-    def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[Statement]:
+    def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[tree.Statement]:
         """Return the sums over the window, which are in memory."""
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         start = ITEM * name("IMAGES")
         for j in range(self.vectors(index)):
             group, of = divmod(j, 2 * HALF // 4)
             part, vector = divmod(of, HALF // 4)
             numbers = [group * HALF + vector * 4 + n for n in range(4)]
             reads = [load("sums", (start + n) * TILE_COUNT + TILE, kind=COMPLEX).lane(part) for n in numbers]
-            found.append(Store(self.variable(index, 0, j), (), stack(reads), add=True))
+            found.append(tree.Store(self.variable(index, 0, j), (), stack(reads), add=True))
         return found
 
 
-def kept(lets: Sequence[Let]) -> list[Let]:
+def kept(lets: Sequence[tree.Let]) -> list[tree.Let]:
     """Return values whose operations stay in order, which the bound is one of (FOU-6)."""
     return [replace(each, kept=True) for each in lets]
 
@@ -351,7 +334,7 @@ class FourierPasses(Fourier):
             return f"its layers have {count} weights, of at most {LARGEST_WEIGHTS}"
         return ""
 
-    def build(self, program: Program) -> Kernel:
+    def build(self, program: Program) -> tree.Kernel:
         """Return the kernel of a program."""
         return super().build(self.held(program))
 

@@ -26,28 +26,9 @@ from ..core import weights
 from ..core.ir import DTYPES, Image, Node, Program
 from ..core.sums import is_split
 from ..core.weights import Slot
+from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT
-from ..kernel.kernel import (
-    FLOAT,
-    Array,
-    Block,
-    Body,
-    Comment,
-    Constant,
-    Expr,
-    For,
-    If,
-    Kernel,
-    Let,
-    Statement,
-    Store,
-    Type,
-    apply,
-    const,
-    load,
-    name,
-    splat,
-)
+from ..kernel.kernel import apply, const, load, name, splat
 from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, groups_of, kernel_gather, loop, output_channels, weight
 
 PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
@@ -182,8 +163,8 @@ class Tiled(Nest):
 
     def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
         super().__init__(program, slots, **parameters)
-        self.vector = self.sum_type = FLOAT.of(self.lanes)
-        self.element = self.vector if self.wide else FLOAT
+        self.vector = self.sum_type = tree.FLOAT.of(self.lanes)
+        self.element = self.vector if self.wide else tree.FLOAT
 
     def blocks(self, neurons: int) -> Blocks:
         """Return how neurons fill blocks."""
@@ -193,16 +174,16 @@ class Tiled(Nest):
         """Return the vectors of a value."""
         return self.blocks(self.program.nodes[index].type.shape[0]).total
 
-    def constants(self) -> list[Constant]:
+    def constants(self) -> list[tree.Constant]:
         """Return the sizes of the window, the tile and the patch."""
         return [
             *self.window(),
-            Constant("PIXELS", const(self.pixels), "neighbours in a row that a work item computes"),
-            Constant("LANES", const(self.lanes), "components of a vector"),
-            Constant("PATCH_WIDTH", self.columns + PIXELS - 1, "columns that all windows touch"),
+            tree.Constant("PIXELS", const(self.pixels), "neighbours in a row that a work item computes"),
+            tree.Constant("LANES", const(self.lanes), "components of a vector"),
+            tree.Constant("PATCH_WIDTH", self.columns + PIXELS - 1, "columns that all windows touch"),
         ]
 
-    def built(self) -> Kernel:
+    def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.constants()
         body = self.patches()
@@ -211,81 +192,78 @@ class Tiled(Nest):
         body += self.outputs()
         return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weight_type())
 
-    def weight_type(self) -> Type:
+    def weight_type(self) -> tree.Type:
         """Return the type of an element of the weights."""
         return self.vector
 
     # ---- the images around the pixels --------------------------------------------------------------------
 
-    def patches(self) -> list[Statement]:
+    def patches(self) -> list[tree.Statement]:
         """Return the copies of the images around the pixels, under the border rule."""
         images = self.gather.images
         size = self.rows * PATCH_WIDTH
         arrays = [self.patch(image, size * image.channels) for image in images]
         within = apply("less_equal", const(0), LEFT) & (LEFT + PATCH_WIDTH <= WIDTH)
         within = within & apply("less_equal", const(0), TOP) & (TOP + self.rows <= HEIGHT)
-        row = Let("row", clamp(TOP + DY, HEIGHT))
+        row = tree.Let("row", clamp(TOP + DY, HEIGHT))
         return [
-            Comment("the images around the pixels: what lies beyond the border is filled in here"),
+            tree.Comment("the images around the pixels: what lies beyond the border is filled in here"),
             *arrays,
-            Let("left", X - self.column),
-            Let("top", Y - self.row),
-            Let("within", within),
+            tree.Let("left", X - self.column),
+            tree.Let("top", Y - self.row),
+            tree.Let("within", within),
             loop("dy", self.rows, row, *map(self.copy, images)),
         ]
 
-    def patch(self, image: Image, size: Expr) -> Array:
+    def patch(self, image: Image, size: tree.Expr) -> tree.Array:
         """Return the declaration of an image's patch."""
-        return Array(f"patch_{image.name}", FLOAT, (size,))
+        return tree.Array(f"patch_{image.name}", tree.FLOAT, (size,))
 
-    def copied(self, value: Expr) -> Expr:
+    def copied(self, value: tree.Expr) -> tree.Expr:
         """Return a value of an image as a patch holds it."""
         return value
 
-    def copy(self, image: Image) -> Statement:
+    def copy(self, image: Image) -> tree.Statement:
         """Return the copy of a row of the patch: at once inside the image, else pixel by pixel."""
         patch, channels, row = f"patch_{image.name}", image.channels, name("row")
         first = DY * PATCH_WIDTH * channels
         at_once = load(f"{IMAGE}{image.name}", row, LEFT * channels + COUNTER)
-        fast = loop("i", PATCH_WIDTH * channels, Store(patch, (first + COUNTER,), self.copied(at_once)))
-        column = [Let("column", clamp(LEFT + DX, WIDTH))]
-        if self.gather.window.border == "zero":
-            same = apply("equal", row, TOP + DY) & apply("equal", name("column"), LEFT + DX)
-            column.append(Let("inside", same))
+        fast = loop("i", PATCH_WIDTH * channels, tree.Store(patch, (first + COUNTER,), self.copied(at_once)))
+        column = [tree.Let("column", clamp(LEFT + DX, WIDTH)), *self.inside(TOP + DY, LEFT + DX)]
         c = name("c")
-        put = Store(patch, (first + DX * channels + c,), self.copied(self.pixel(image, c)))
+        put = tree.Store(patch, (first + DX * channels + c,), self.copied(self.pixel(image, c)))
         slow = loop("dx", PATCH_WIDTH, *column, loop("c", channels, put))
-        return If(name("within", Type("bool")), (fast,), (slow,))
+        return tree.If(name("within", tree.Type("bool")), (fast,), (slow,))
 
     # ---- groups ------------------------------------------------------------------------------------------
 
-    def of_group(self, group: tuple[int, ...]) -> list[Statement]:
+    def of_group(self, group: tuple[int, ...]) -> list[tree.Statement]:
         """Return the statements of an affine map, or of elementwise operations."""
         index, node = group[0], self.program.nodes[group[0]]
         if node.op == "input":
             return []
         return self.affine(index, node) if node.op == "affine" else self.elementwise(group)
 
-    def array(self, index: int) -> Array:
+    def array(self, index: int) -> tree.Array:
         """Return the declaration of a value's array: vectors of all pixels."""
-        return Array(f"v{index}", self.vector, (PIXELS * self.total(index),))
+        return tree.Array(f"v{index}", self.vector, (PIXELS * self.total(index),))
 
-    def elementwise(self, group: tuple[int, ...]) -> list[Statement]:
+    def elementwise(self, group: tuple[int, ...]) -> list[tree.Statement]:
         """Return the loop of a group over all pixels' vectors, or their components."""
         kept = [k for k in group if self.is_array(k)]
         count = PIXELS * self.total(group[0])
-        lines: list[Statement] = []
+        lines: list[tree.Statement] = []
         for let in self.statements(group, self.read, self.element.lanes):
             lines.append(let)
             if int(let.name[1:]) in kept:
-                lines.append(Store(f"v{let.name[1:]}", (COUNTER,), name(let.name, self.element)))
+                lines.append(tree.Store(f"v{let.name[1:]}", (COUNTER,), name(let.name, self.element)))
         return [
             self.span(group),
             *map(self.array, kept),
             loop("i", count if self.wide else count * LANES, *lines),
         ]
 
-    def read(self, index: int) -> Expr:
+    def read(self, index: int) -> tree.Expr:
         """Return element `i` of another group's value."""
         node = self.program.nodes[index]
         if node.op != "parameter":
@@ -305,20 +283,20 @@ class Tiled(Nest):
 
     # ---- affine maps -------------------------------------------------------------------------------------
 
-    def affine(self, index: int, node: Node) -> list[Statement]:
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x + b for all pixels, block by block."""
         source, blocks = self.program.nodes[node.args[0]], self.blocks(node.type.shape[0])
         block = BLOCK if blocks.count > 1 else const(0)
         at, n_in = block * blocks.vectors, source.type.shape[0]
         first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
-        sums = [Array("sum", self.sum_type, (PIXELS, blocks.vectors), kept=True, register=True)]
-        starts = [Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
+        sums = [tree.Array("sum", self.sum_type, (PIXELS, blocks.vectors), kept=True, register=True)]
+        starts = [tree.Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
         if source.op == "input":
             products = self.windowed(blocks, first)
         else:
             products = self.layer(blocks, first, node.args[0], n_in)
         ends = [
-            Store(
+            tree.Store(
                 f"v{index}",
                 (P * blocks.total + at + j,),
                 self.ended(load("sum", P, const(j), kind=self.sum_type)),
@@ -326,35 +304,35 @@ class Tiled(Nest):
             for j in range(blocks.vectors)
         ]
         body = (*sums, self.each_pixel(*starts), *products, self.each_pixel(*ends))
-        nest = loop("block", blocks.count, *body) if blocks.count > 1 else Block(body)
+        nest = loop("block", blocks.count, *body) if blocks.count > 1 else tree.Block(body)
         return [self.mapped(index, node), self.array(index), nest]
 
     def inputs(self, node: Node) -> int:
         """Return the rows of weights of an affine map."""
         return int(self.program.parameters[str(node["weight"])].shape[1])
 
-    def layer(self, blocks: Blocks, first: Expr, source: int, numbers: int) -> list[Statement]:
+    def layer(self, blocks: Blocks, first: tree.Expr, source: int, numbers: int) -> list[tree.Statement]:
         """Return the products of a layer's values."""
         value = load(f"v{source}", P * self.total(source) * LANES + COUNTER)
         return [self.multiplied(blocks, const(numbers), first, value, "sum")]
 
     @property
-    def zero(self) -> Expr:
+    def zero(self) -> tree.Expr:
         """Return what a partial sum starts with."""
         return splat(const(0.0), self.lanes)
 
-    def start(self, node: Node, vector: Expr) -> Expr:
+    def start(self, node: Node, vector: tree.Expr) -> tree.Expr:
         """Return what a sum starts with."""
         bias = node.get("bias")
         return weight(self.offset(bias) // self.lanes + vector, self.vector) if bias else self.zero
 
-    def ended(self, total: Expr) -> Expr:
+    def ended(self, total: tree.Expr) -> tree.Expr:
         """Return a sum as a value of the layer."""
         return total
 
-    def windowed(self, blocks: Blocks, first: Expr) -> list[Statement]:
+    def windowed(self, blocks: Blocks, first: tree.Expr) -> list[tree.Statement]:
         """Return the sums over the window: a partial sum for each image and row, which stays in registers."""
-        found: list[Statement] = []
+        found: list[tree.Statement] = []
         split, rows = is_split(self.gather), 0
         each = range(blocks.vectors)
         for image in self.gather.images:
@@ -362,13 +340,15 @@ class Tiled(Nest):
             at = first + (DY * inputs + rows) * blocks.vectors
             value = load(f"patch_{image.name}", (DY * PATCH_WIDTH + P) * image.channels + COUNTER)
             sums = "part" if split else "sum"
-            lines: list[Statement] = [self.multiplied(blocks, self.columns * image.channels, at, value, sums)]
+            lines: list[tree.Statement] = [
+                self.multiplied(blocks, self.columns * image.channels, at, value, sums)
+            ]
             if split:
-                zero = self.each_pixel(*(Store("part", (P, const(j)), self.zero) for j in each))
+                zero = self.each_pixel(*(tree.Store("part", (P, const(j)), self.zero) for j in each))
                 part = [load("part", P, const(j), kind=self.vector) for j in each]
-                add = self.each_pixel(*(Store("sum", (P, const(j)), part[j], add=True) for j in each))
+                add = self.each_pixel(*(tree.Store("sum", (P, const(j)), part[j], add=True) for j in each))
                 lines = [
-                    Array("part", self.vector, (PIXELS, blocks.vectors), kept=True, register=True),
+                    tree.Array("part", self.vector, (PIXELS, blocks.vectors), kept=True, register=True),
                     zero,
                     *lines,
                     add,
@@ -377,25 +357,27 @@ class Tiled(Nest):
             rows += self.gather.rows * inputs
         return found
 
-    def multiplied(self, blocks: Blocks, inputs: Expr, first: Expr, value: Expr, sums: str) -> Statement:
+    def multiplied(
+        self, blocks: Blocks, inputs: tree.Expr, first: tree.Expr, value: tree.Expr, sums: str
+    ) -> tree.Statement:
         """Return the loop over inputs: the row of weights of each, times its value at each pixel."""
         each = range(blocks.vectors)
-        row = [Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.vector)) for j in each]
-        factor = splat(name("value", FLOAT), self.lanes)
+        row = [tree.Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.vector)) for j in each]
+        factor = splat(name("value", tree.FLOAT), self.lanes)
         products = [
-            Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True)
+            tree.Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True)
             for j in each
         ]
-        return loop("i", inputs, *row, self.each_pixel(Let("value", value), *products))
+        return loop("i", inputs, *row, self.each_pixel(tree.Let("value", value), *products))
 
-    def each_pixel(self, *body: Statement) -> For:
+    def each_pixel(self, *body: tree.Statement) -> tree.For:
         """Return a loop over pixels that keeps each pixel's sums in registers of their own."""
-        return For("p", PIXELS, body, "unroll")
+        return tree.For("p", PIXELS, body, "unroll")
 
-    def outputs(self) -> Body:
+    def outputs(self) -> tree.Body:
         """Return the statements that write the output of each pixel that lies in the image."""
         output, index = self.program.outputs[0]
         channels = self.program.nodes[index].type.shape[0]
         value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
-        write = loop("i", channels, Store(RESULT, (Y, X + P, COUNTER), value))
-        return Comment(f"output {output}"), For("p", PIXELS, (write,), until=X + P < WIDTH)
+        write = loop("i", channels, tree.Store(RESULT, (Y, X + P, COUNTER), value))
+        return tree.Comment(f"output {output}"), tree.For("p", PIXELS, (write,), until=X + P < WIDTH)

@@ -119,7 +119,7 @@ WRONG = {
     "a type that does not exist": (small(Array("v", Type("float16"), (2,))), "which does not exist"),
     "bits of no words": (
         small(Let("t", Expr("bits", (ZERO,), FLOAT))),
-        "words that are read as floats has",
+        "an operand of bits has type",
     ),
     "products of other values": (
         small(Let("t", Expr("dot4", (X, ZERO), INT))),
@@ -127,7 +127,7 @@ WRONG = {
     ),
     "a word of integers": (
         small(Let("t", Expr("pack4", (X, X, X, X), INT))),
-        "a byte of a word has type",
+        "an operand of pack4 has type",
     ),
     "a pixel without its channels": (small(Write(Y, X, ())), "a pixel is written with 0 channels"),
     "a written image": (
@@ -153,7 +153,7 @@ WRONG = {
         small(looped(Break(X < 1), Barrier()), group=(2, 2)),
         "a barrier inside a branch",
     ),
-    "any lane of numbers": (small(Let("t", any_lane(X))), "what may hold in any lane has type int32"),
+    "any lane of numbers": (small(Let("t", any_lane(X))), "an operand of any has type int32"),
     "entries at one index": (
         small(Let("t", Expr("take", (X,), FOUR, "table")), tables=TABLES),
         "the index of table has type int32 instead of int32 x 4",

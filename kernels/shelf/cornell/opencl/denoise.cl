@@ -12,8 +12,13 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 0.00197 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
+ * arguments image_color: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_albedo: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_position: width * height * 3 floats, rows from the top, channels interleaved;
+ *           weights: 58595 floats;
+ *           result: width * height * 3 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
  *           width; height.
  *           Global size: at least (width, height)
  * weights   W0 (1728 x 32) at 0, b0 (32) at 55296, W1 (32 x 32) at 55328, b1 (32) at 56352, W2 (32 x

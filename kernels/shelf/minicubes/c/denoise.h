@@ -13,11 +13,17 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 0.00271 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * arguments each image: width * height * channels floats, rows from the top, channels interleaved;
- *           weights; result: width * height * 3 floats in the same order, encoded as `output` says;
- *           width; height: fewer than 2^31 numbers an image.
- *           wamnet_image does the whole picture, wamnet_pixel one pixel: call that from your own loops
- *           stack: 9956 bytes at most, without optimisation too
+ * arguments image_color: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_albedo: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_position: width * height * 3 floats, rows from the top, channels interleaved;
+ *           image_unshadowed: width * height * 3 floats, rows from the top, channels interleaved;
+ *           weights: 72419 floats;
+ *           result: width * height * 3 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
+ *           width; height.
+ *           wamnet_image does all pixels, wamnet_pixel one: call that from your own loops
+ *           fewer than 2^31 floats an image; stack: 9956 bytes at most, without optimisation too
  * weights   W0 (2160 x 32) at 0, b0 (32) at 69120, W1 (32 x 32) at 69152, b1 (32) at 70176, W2 (32 x
  *           32) at 70208, b2 (32) at 71232, W3 (32 x 32) at 71264, b3 (32) at 72288, W4 (32 x 3) at
  *           72320, b4 (3) at 72416; matrices input-major: D_in x D_out, in C order

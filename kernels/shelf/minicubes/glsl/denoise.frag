@@ -13,13 +13,17 @@
  * sine      emitted, odd polynomial of degree 11
  * bound     |output - float64 reference| <= 0.00271 for all images in these ranges
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * arguments each image: a texture of 32-bit floats (half floats void the bound), width x height. Texel
- *           row 0 is the TOP row of the picture: flip what OpenGL has rendered, whose row 0 is the
- *           bottom, or the window stands on its head;
- *           weight_texture: R32F, 1024 texels wide, as many rows as weights fill (the last
- *           padded), row by row; it is read with texelFetch alone, so filters do not matter;
- *           result: a float colour buffer of width x height, row 0 again the top row; no sRGB conversion by
- *           the target, the values are encoded already. Draw one triangle that covers it
+ * arguments image_color: a texture of 32-bit floats;
+ *           image_normal: a texture of 32-bit floats;
+ *           image_albedo: a texture of 32-bit floats;
+ *           image_position: a texture of 32-bit floats;
+ *           image_unshadowed: a texture of 32-bit floats;
+ *           weight_texture: R32F, 1024 texels wide, as many rows as weights fill, row by row, the last row
+ *           padded;
+ *           result: a float colour buffer, RGBA, of which 3 components are written, encoded as `output` says.
+ *           Draw one triangle that covers what is written: row 0 is the TOP row of all images.
+ *           OpenGL's own row 0 is the bottom: flip what it has rendered. Half floats in images void the
+ *           bound, and a target that encodes sRGB encodes once more
  * weights   W0 (2160 x 32) at 0, b0 (32) at 69120, W1 (32 x 32) at 69152, b1 (32) at 70176, W2 (32 x
  *           32) at 70208, b2 (32) at 71232, W3 (32 x 32) at 71264, b3 (32) at 72288, W4 (32 x 3) at
  *           72320, b4 (3) at 72416; matrices input-major: D_in x D_out, in C order

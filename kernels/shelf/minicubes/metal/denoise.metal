@@ -17,9 +17,15 @@
  *           be fused with sums. The device rounds to nearest, which the language leaves open (MSL
  *           8.2)
  * sums      over the window: a partial sum for each image and row of taps, in any order; then these
- * arguments Buffer 0 are the sizes, 32-bit integers: width, height; then buffers of floats, rows from the top,
- *           channels interleaved: 1 the weights, 2 the result (width *
- *           height * 3 floats, encoded as `output` says), 3 and on the images in this order.
+ * arguments 0 32-bit integers: width, height;
+ *           1 weights: 72419 floats;
+ *           2 result: width * height * 3 floats, rows from the top, channels interleaved, encoded as `output`
+ *           says;
+ *           3 image_color: width * height * 3 floats, rows from the top, channels interleaved;
+ *           4 image_normal: width * height * 3 floats, rows from the top, channels interleaved;
+ *           5 image_albedo: width * height * 3 floats, rows from the top, channels interleaved;
+ *           6 image_position: width * height * 3 floats, rows from the top, channels interleaved;
+ *           7 image_unshadowed: width * height * 3 floats, rows from the top, channels interleaved.
  *           Dispatch width x height threads, or more, in groups of any size
  * weights   W0 (2160 x 32) at 0, b0 (32) at 69120, W1 (32 x 32) at 69152, b1 (32) at 70176, W2 (32 x
  *           32) at 70208, b2 (32) at 71232, W3 (32 x 32) at 71264, b3 (32) at 72288, W4 (32 x 3) at

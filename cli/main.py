@@ -1,23 +1,27 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
 1. Commands are registered with typer in the order of a first session [`COMMANDS`], then those of other
-   distributions [`_join`]; the module of a command is imported when it is the one that runs, or all are
-   listed [`application`].
+   distributions [`_join`]; the module of a command is imported when it is the one that runs
+   [`application`].
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
-Modules that compute are imported when a command runs, so that a help text appears at once.
+A list of all commands appears at once: no module of a command is imported for it.
 """
 
 from __future__ import annotations
 
+import ast
+import inspect
+import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -42,40 +46,40 @@ AGAIN_S = 0.01
 VERSION = "--version"
 """The option that runs no command."""
 
-COMMANDS: Mapping[str, tuple[str, str, str]] = {
-    "render": ("render", "render", "RENDER_EXAMPLES"),
-    "scene": ("render", "scene", "SCENE_EXAMPLES"),
-    "dataset": ("dataset", "dataset", "EXAMPLES"),
-    "train": ("train", "train", "EXAMPLES"),
-    "import": ("networks.importing", "import_model", "EXAMPLES"),
-    "compile": ("compile", "compile_model", "EXAMPLES"),
-    "listing": ("listing", "listing", "EXAMPLES"),
-    "export": ("export", "export", "EXAMPLES"),
-    "certify": ("certify", "certify", "EXAMPLES"),
-    "denoise": ("denoise", "denoise", "DENOISE_EXAMPLES"),
-    "compare": ("compare", "compare", "EXAMPLES"),
-    "triage": ("triage", "triage", "EXAMPLES"),
-    "animate": ("animate", "animate", "EXAMPLES"),
-    "view": ("view", "view", "EXAMPLES"),
-    "tune": ("tune", "tune", "EXAMPLES"),
-    "executors": ("denoise", "executors", "EXECUTORS_EXAMPLES"),
-    "conformance": ("conformance", "conformance", "EXAMPLES"),
-    "demo": ("demo", "demo", "EXAMPLES"),
-    "bench": ("bench", "bench", "EXAMPLES"),
-    "bench render": ("measure.paths", "render", "RENDER_EXAMPLES"),
-    "bench train": ("measure.train", "train", "EXAMPLES"),
-    "bench pipeline": ("measure.pipeline", "pipeline", "EXAMPLES"),
-    "bench exports": ("measure.exports", "exports", "EXAMPLES"),
-    "bench primitives": ("measure.paths", "primitives", "PRIMITIVES_EXAMPLES"),
+COMMANDS: Mapping[str, tuple[str, str]] = {
+    "render": ("render", "render"),
+    "scene": ("render", "scene"),
+    "dataset": ("dataset", "dataset"),
+    "train": ("train", "train"),
+    "import": ("networks.importing", "import_model"),
+    "compile": ("compile", "compile_model"),
+    "listing": ("listing", "listing"),
+    "export": ("export", "export"),
+    "certify": ("certify", "certify"),
+    "denoise": ("denoise", "denoise"),
+    "compare": ("compare", "compare"),
+    "triage": ("triage", "triage"),
+    "animate": ("animate", "animate"),
+    "view": ("view", "view"),
+    "tune": ("tune", "tune"),
+    "executors": ("denoise", "executors"),
+    "conformance": ("conformance", "conformance"),
+    "demo": ("demo", "demo"),
+    "bench": ("bench", "bench"),
+    "bench render": ("measure.paths", "render"),
+    "bench train": ("measure.train", "train"),
+    "bench pipeline": ("measure.pipeline", "pipeline"),
+    "bench exports": ("measure.exports", "exports"),
+    "bench primitives": ("measure.paths", "primitives"),
 }
-"""Each command's module in `commands`, function and examples; one of a group follows the group."""
+"""Each command's module in `commands`, and function; one of a group follows the group."""
 
 DISTRIBUTIONS: Mapping[str, str] = {"verify-renderer": "wamnet-verify", "course": "wamnet-course"}
 """Distribution of each command that joins through an entry point of the group `ENTRY_POINTS`."""
 
 ENTRY_POINTS = "wamnet.commands"
-"""Group of entry points: a name is a command's, its value a module with a table `COMMANDS`: function and
-examples of each command, and of those in its group."""
+"""Group of entry points: a name is a command's, its value a module with a table `COMMANDS`: the function
+of each command, and of those in its group."""
 
 GROUPS: Mapping[str, Mapping[str, Any]] = {
     "course": {},
@@ -85,7 +89,7 @@ GROUPS: Mapping[str, Mapping[str, Any]] = {
 
 
 def application(arguments: Sequence[str] = ()) -> typer.Typer:
-    """Return the command line, with only the command that `arguments` begin with, or else with all.
+    """Return the command line, with only the command that `arguments` begin with, or else a list of all.
 
     Importing all commands takes longer than denoising a frame.
     """
@@ -99,12 +103,23 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
     app.callback(invoke_without_command=True)(root)
     first = arguments[0] if arguments and arguments[0] in (*COMMANDS, *DISTRIBUTIONS, VERSION) else None
     groups = {"": app}
-    for path, (module, function, examples) in COMMANDS.items():
-        if first in (None, path.partition(" ")[0]):
-            _register(groups, path, import_module(f".commands.{module}", __package__), function, examples)
+    for path, (module, function) in COMMANDS.items():
+        if first == path.partition(" ")[0]:
+            imported = import_module(f".commands.{module}", __package__)
+            _register(groups, path, getattr(imported, function))
+        elif first is None and " " not in path:
+            app.command(path, help=_help_of(_docstring(module, function))[0])(lambda: None)
     if first is None or first in DISTRIBUTIONS:
         _join(groups, first)
     return app
+
+
+def _docstring(module: str, function: str) -> str:
+    """Return the docstring of a command without importing its module: a list of commands appears at once."""
+    path = Path(__file__).parent / "commands" / f"{module.replace('.', '/')}.py"
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    named = (each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name == function)
+    return ast.get_docstring(next(named)) or ""
 
 
 def _join(groups: dict[str, typer.Typer], name: str | None) -> None:
@@ -115,27 +130,28 @@ def _join(groups: dict[str, typer.Typer], name: str | None) -> None:
         raise InputError("command", name, f"distribution {DISTRIBUTIONS[name]} is not installed", remedy)
     for entry in (installed[name],) if name else installed.values():
         module = entry.load()
-        for path, (function, examples) in module.COMMANDS.items():
-            _register(groups, path, module, function, examples)
+        for path, function in module.COMMANDS.items():
+            _register(groups, path, getattr(module, function))
 
 
-def _register(groups: dict[str, typer.Typer], path: str, module: Any, function: str, examples: str) -> None:
-    """Add a command, whose help is its docstring, to its group; a group joins the others."""
-    command = spread(getattr(module, function))
-    # Each paragraph on one line, as typer wants it.
-    shown = "\n\n".join(
-        " ".join(part.split()) for part in (getattr(module, function).__doc__ or "").split("\n\n")
-    )
+def _register(groups: dict[str, typer.Typer], path: str, function: Callable[..., None]) -> None:
+    """Add a command to its group; a group joins the others."""
     group, _, name = path.rpartition(" ")
-    # And each example as a paragraph.
-    epilog = getattr(module, examples).replace("\n", "\n\n") if examples else None
+    shown, epilog = _help_of(inspect.getdoc(function) or "")
     how: dict[str, Any] = {"help": shown, "epilog": epilog}
     if path in GROUPS:
         groups[path] = typer.Typer(invoke_without_command=True, **GROUPS[path])
-        groups[path].callback(**how)(command)
+        groups[path].callback(**how)(spread(function))
         groups[group].add_typer(groups[path], name=name)
     else:
-        groups[group].command(name, **how)(command)
+        groups[group].command(name, **how)(spread(function))
+
+
+def _help_of(docstring: str) -> tuple[str, str | None]:
+    """Return the help text of a command, a line for each paragraph as typer wants it, and its examples."""
+    text, mark, examples = docstring.partition("\n\nExample")
+    shown = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+    return shown, f"Example{examples}".replace("\n", "\n\n") if mark else None
 
 
 def root(
@@ -210,7 +226,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run the command line and return its exit status."""
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
-        status = application(words)(words, prog_name="wamnet", standalone_mode=False)
+        # A shell that completes a line has it in a variable.
+        typed = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", ""))
+        status = application(words or typed.split()[1:])(words, prog_name="wamnet", standalone_mode=False)
     except WamnetError as error:
         return _fail(str(error))
     except MemoryError:

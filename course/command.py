@@ -18,28 +18,13 @@ if TYPE_CHECKING:
     from .labs import Lab
     from .sandbox import Limits
 
-START_EXAMPLES = """Examples:
-wamnet course start mycourse"""
-"""Shown below the help of `wamnet course start`."""
-
-CHECK_EXAMPLES = """Examples:
-wamnet course check 1
-wamnet course check sampling mycourse --every
-wamnet course check all mycourse"""
-"""Shown below the help of `wamnet course check`."""
-
-GRADE_EXAMPLES = """Examples:
-wamnet course grade students -o grades
-wamnet course grade students -o grades --lab 3 --lab 4 --seconds 20"""
-"""Shown below the help of `wamnet course grade`."""
-
 COMMANDS = {
-    "course": ("course", ""),
-    "course start": ("start", "START_EXAMPLES"),
-    "course check": ("check", "CHECK_EXAMPLES"),
-    "course grade": ("grade", "GRADE_EXAMPLES"),
+    "course": "course",
+    "course start": "start",
+    "course check": "check",
+    "course grade": "grade",
 }
-"""Function and examples of each command, which `wamnet` registers."""
+"""Function of each command, which `wamnet` registers."""
 
 STATUS_NOT_YET = 1
 """Exit status of a check when a lab is not right; grading a class ends with 0."""
@@ -68,7 +53,11 @@ def start(
         Path, typer.Argument(metavar="DIR", help="Folder to make: a new one, or an empty one.")
     ],
 ) -> None:
-    """Write the skeletons of all labs, a Makefile and a README to a new folder."""
+    """Write the skeletons of all labs, a Makefile and a README to a new folder.
+
+    Examples:
+    wamnet course start mycourse
+    """
     from .start import begin
 
     if folder.is_dir() and any(folder.iterdir()):
@@ -93,6 +82,11 @@ def check(
     """Grade a lab. Ends with status 1 if it is not right yet.
 
     Your code runs as yours, in your folder, in a separate process with limits on time and memory.
+
+    Examples:
+    wamnet course check 1
+    wamnet course check sampling mycourse --every
+    wamnet course check all mycourse
     """
     from .grading import grade
     from .labs import LABS, lab_named
@@ -152,6 +146,10 @@ def grade(
     Each lab of each student runs in a separate process under Bubblewrap: it sees Python and its own files,
     has no network, and has limits on time and memory. It returns data, which the grader compares. Endless
     loops and the like are named in the tables, and stop nobody else.
+
+    Examples:
+    wamnet course grade students -o grades
+    wamnet course grade students -o grades --lab 3 --lab 4 --seconds 20
     """
     from . import table as tables
     from .grading import files_of, grade_class

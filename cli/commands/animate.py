@@ -18,9 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...models.writing import remove_temporaries
 from ...refimpl.errors import InputError
@@ -44,15 +42,6 @@ if TYPE_CHECKING:
     from ...refimpl.light.scene import Scene
     from ...refimpl.network.denoise import Model
 
-EXAMPLES = """Examples:
-wamnet animate model.safetensors -o turning.mp4
-wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
-wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
-wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
-wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
-wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4"""
-"""Shown below the help of `wamnet animate`."""
-
 
 @dataclass(frozen=True)
 class Shot:
@@ -69,32 +58,25 @@ class Shot:
 class Film:
     """What is rendered: times, a size, samples of the reference (0: none), and rays of the features."""
 
-    start: float = option(0.0, "Start time of the animation, in seconds.")
-    seconds: float = option(8.0, "Duration in seconds; minicubes rotate in 8 s.")
-    fps: float = option(10.0, "Frames per second.")
-    size: int = option(128, "Width and height of each image, in pixels.")
-    reference_spp: int = option(0, "Paths per pixel of a reference image shown alongside; 0 for none.")
+    start: float = option("Start time of the animation, in seconds.", 0.0)
+    seconds: float = option("Duration in seconds; minicubes rotate in 8 s.", 8.0)
+    fps: float = option("Frames per second.", 10.0)
+    size: int = option("Width and height of each image, in pixels.", 128)
+    reference_spp: int = option("Paths per pixel of a reference image shown alongside; 0 for none.", 0)
     seed: options.Seed = 0
     feature_spp: int | None = option(
-        None,
-        "Stratified camera rays per pixel for the features.",
-        metavar="N",
-        show_default="equivalent to those in training",
+        "N  Stratified camera rays per pixel for the features. [default: equivalent to those in training]"
     )
 
 
 def animate(
     model: options.ModelFile,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            help="Canonical scene, or scene file (.json), which is static.",
-            show_default="the model's training scene",
-        ),
-    ] = None,
-    output: Annotated[
-        Path, options.output("PATH", "Output: animation (.mp4, .gif) or folder of images.")
-    ] = Path("animation"),
+    scene: str | None = option(
+        "Canonical scene, or scene file (.json), which is static. [default: the model's training scene]"
+    ),
+    output: Path = option(
+        "-o --output PATH  Output: animation (.mp4, .gif) or folder of images.", Path("animation")
+    ),
     *,
     wanted: Film,
     parameters: options.Parameters = None,
@@ -107,6 +89,14 @@ def animate(
     """Render and denoise an animation: noisy, denoised and reference images side by side.
 
     After an interruption, the same command resumes where it stopped.
+
+    Examples:
+    wamnet animate model.safetensors -o turning.mp4
+    wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
+    wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
+    wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
+    wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
+    wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4
     """
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output

@@ -8,16 +8,14 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import NO_VALUE, InputError
-from ..common import options, packages
+from ..common import packages
 from ..common.effort import said_of_measuring
 from ..common.executors import fastest
 from ..common.inputs import load_model, trained_scene
-from ..common.options import ExecutorName, parse_names
+from ..common.options import ExecutorName, argument, option, parse_names
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files.alone import working_in
 from ..files.outputs import check_output, replacing, unwritable, write_text
@@ -29,14 +27,6 @@ if TYPE_CHECKING:
     from ...kernels.bench.contenders import Variant
     from ...kernels.bench.contest import Contest, Request
     from ...refimpl.network.denoise import Model
-
-EXAMPLES = """Examples:
-wamnet bench -o speed
-wamnet bench --train-variants --size 512 -o speed
-wamnet bench model.safetensors --dataset cubes -o speed
-wamnet bench --quick --only 'opencl:*,torch.compile' -o speed
-wamnet bench --synthetic --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed"""
-"""Shown below the help of `wamnet bench`."""
 
 PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "openvino", "tinygrad", "halide", "pyoidn")
 """Packages of peers whose versions the result names."""
@@ -64,88 +54,47 @@ JSON_NAME, TEXT_NAME = "bench.json", "bench.md"
 class Wanted:
     """What a caller wants measured; a number that is not given is that of `QUICK` or `USUAL`."""
 
-    model: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="MODEL",
-            help="Trained model (.safetensors) or bundled model; paper: the paper's network, untrained, "
-            "on noise.",
-            show_default=SHIPPED,
-        ),
-    ] = None
-    output: Annotated[Path, options.output("FOLDER", "Output folder.")] = Path("wamnet-bench")
-    dataset: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Data set to measure on (its test frames).",
-            show_default="frames of the model's scene, rendered into the output folder",
-        ),
-    ] = None
-    size: Annotated[
-        int | None,
-        typer.Option(help="Width and height of the image, in pixels.", show_default="1024; quick: 256"),
-    ] = None
-    sizes: Annotated[
-        str, options.names("Further image sizes, to show how the cost scales.", "none", metavar="N,N,...")
-    ] = ""
-    only: Annotated[str, options.names("Run only these; * matches any characters.", "all available")] = ""
-    executor: Annotated[
-        list[ExecutorName] | None,
-        typer.Option(
-            help="Run only this backend's kernels, and the baselines. Repeatable.", show_default="all"
-        ),
-    ] = None
-    features: Annotated[
-        str,
-        options.names(
-            "Input features of the untrained network of --synthetic.", "color,normal, as in the paper"
-        ),
-    ] = ""
-    repeats: Annotated[
-        int | None, typer.Option(help="Number of interleaved rounds.", show_default="5; quick: 3")
-    ] = None
-    budget: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            help="Time budget per program and size, in seconds; slower ones get fewer repetitions, or none.",
-            show_default="30; quick: 4",
-        ),
-    ] = None
-    synthetic: Annotated[
-        bool,
-        typer.Option(
-            "--synthetic",
-            help="Use noise instead of frames, to measure times only; without MODEL, with the paper's "
-            "untrained network.",
-        ),
-    ] = False
-    train_variants: Annotated[
-        bool,
-        typer.Option(
-            "--train-variants",
-            help="Also benchmark low-rank and small-window variants, fine-tuned from the model and "
-            "cached in the folder.",
-        ),
-    ] = False
-    steps: Annotated[
-        int | None, typer.Option(help="Fine-tuning steps per variant.", show_default="3000; quick: 500")
-    ] = None
-    frames: Annotated[
-        int | None,
-        typer.Option("--frames", help="Number of test frames to render.", show_default="4; quick: 2"),
-    ] = None
-    reference_spp: Annotated[
-        int | None,
-        typer.Option(help="Paths per pixel of the reference images.", show_default="256; quick: 64"),
-    ] = None
-    first_runs: Annotated[
-        bool, typer.Option("--first-runs", help="Also measure compilation with empty disk caches.")
-    ] = False
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Reduced run: one schedule per device and few baselines.")
-    ] = False
+    model: Path | None = argument(
+        "MODEL  Trained model (.safetensors) or bundled model; paper: the paper's network, untrained, on "
+        f"noise. [default: {SHIPPED}]",
+        None,
+    )
+    output: Path = option("-o --output FOLDER  Output folder.", Path("wamnet-bench"))
+    dataset: Path | None = option(
+        "FOLDER  Data set to measure on (its test frames). [default: frames of the model's scene, rendered "
+        "into the output folder]"
+    )
+    size: int | None = option("Width and height of the image, in pixels. [default: 1024; quick: 256]")
+    sizes: str = option("N,N,...  Further image sizes, to show how the cost scales. [default: none]", "")
+    only: str = option("NAME,...  Run only these; * matches any characters. [default: all available]", "")
+    executor: list[ExecutorName] | None = option(
+        "Run only this backend's kernels, and the baselines. Repeatable. [default: all]"
+    )
+    features: str = option(
+        "NAME,...  Input features of the untrained network of --synthetic. [default: color,normal, as in "
+        "the paper]",
+        "",
+    )
+    repeats: int | None = option("Number of interleaved rounds. [default: 5; quick: 3]")
+    budget: float | None = option(
+        "S  Time budget per program and size, in seconds; slower ones get fewer repetitions, or none. "
+        "[default: 30; quick: 4]"
+    )
+    synthetic: bool = option(
+        "--synthetic  Use noise instead of frames, to measure times only; without MODEL, with the paper's "
+        "untrained network.",
+        False,
+    )
+    train_variants: bool = option(
+        "--train-variants  Also benchmark low-rank and small-window variants, fine-tuned from the model and "
+        "cached in the folder.",
+        False,
+    )
+    steps: int | None = option("Fine-tuning steps per variant. [default: 3000; quick: 500]")
+    frames: int | None = option("--frames  Number of test frames to render. [default: 4; quick: 2]")
+    reference_spp: int | None = option("Paths per pixel of the reference images. [default: 256; quick: 64]")
+    first_runs: bool = option("--first-runs  Also measure compilation with empty disk caches.", False)
+    quick: bool = option("--quick  Reduced run: one schedule per device and few baselines.", False)
 
     def number(self, name: str) -> Any:
         """Return a number that is given, or the usual one."""
@@ -268,6 +217,13 @@ def bench(wanted: Wanted) -> None:
     tinygrad, and Open Image Denoise: [bold]pip install torch onnxruntime openvino halide tinygrad
     pyoidn[/]. Errors are measured against float64, PSNR against the references. Predicted times follow from
     measured rates.
+
+    Examples:
+    wamnet bench -o speed
+    wamnet bench --train-variants --size 512 -o speed
+    wamnet bench model.safetensors --dataset cubes -o speed
+    wamnet bench --quick --only 'opencl:*,torch.compile' -o speed
+    wamnet bench --synthetic --size 512 --sizes 256,512,1024,2048,4096 --repeats 3 -o speed
     """
     packages.need("matplotlib", "for the plots")
     output = wanted.output

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
+from ..common.options import argument, option
 from ..common.terminal import progress, say, table
-
-EXAMPLES = """Examples:
-wamnet certify kernel-opencl/denoise.certificate.json
-wamnet certify kernel-opencl
-wamnet certify kernel-c --source denoise-mine.h"""
-"""Shown below the help of `wamnet certify`."""
 
 STATUS_REFUSED = 1
 """Exit status when a step of a certificate does not hold, or a source computes another program."""
@@ -29,26 +24,11 @@ ASSUMED = (
 )
 """What a verified source rests on."""
 
-Source = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Check this source file instead, for example one edited by hand.",
-    ),
-]
-
 
 def certify(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="Certificate (denoise.certificate.json), or the kernel's folder."
-        ),
-    ],
-    source: Source = None,
-    text: Annotated[
-        bool, typer.Option(help="Also check that the kernel's source computes the certified program.")
-    ] = True,
+    file: Path = argument("FILE  Certificate (denoise.certificate.json), or the kernel's folder."),
+    source: Path | None = option("FILE  Check this source file instead, for example one edited by hand."),
+    text: bool = option("Also check that the kernel's source computes the certified program.", True),
 ) -> None:
     """Check the proof of a kernel's error bound, and that its source computes the certified program.
 
@@ -60,6 +40,11 @@ def certify(
     that the host calls the kernel as the manifest states, with finite values in the stated ranges. Exit
     status 0: the proof holds, and the source computes the program; 1: a step fails, and is named; 2: the file
     is not a certificate; 3: the source was not checked, and the reason is printed.
+
+    Examples:
+    wamnet certify kernel-opencl/denoise.certificate.json
+    wamnet certify kernel-opencl
+    wamnet certify kernel-c --source denoise-mine.h
     """
     from ...compiler.artifact import CERTIFICATE_NAME
     from ...compiler.proof.checker import check

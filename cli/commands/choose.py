@@ -31,34 +31,22 @@ class Request:
     """What a choice is asked to keep, and where its curve comes from; None for what is not given."""
 
     max_error: float | None = option(
-        None,
-        "Choose the fastest variant whose measured error is at most E: the largest difference "
-        "in display-encoded colour (0 to 1) from the full float64 network, over the frames.",
-        metavar="E",
-        show_default="no limit",
+        "E  Choose the fastest variant whose measured error is at most E: the largest difference in "
+        "display-encoded colour (0 to 1) from the full float64 network, over the frames. [default: no limit]"
     )
     max_ms: float | None = option(
-        None,
-        "Choose the most accurate variant that takes at most T milliseconds on this machine.",
-        metavar="T",
-        show_default="no limit",
+        "T  Choose the most accurate variant that takes at most T milliseconds on this machine. [default: no "
+        "limit]"
     )
     max_loss_db: float | None = option(
-        None,
-        "Choose the fastest variant whose PSNR over the frames is at most D dB below the full network's.",
-        metavar="D",
-        show_default="no limit",
+        "D  Choose the fastest variant whose PSNR over the frames is at most D dB below the full network's. "
+        "[default: no limit]"
     )
     curve: Path | None = option(
-        None,
-        "Choose from the measured points in this file (.json).",
-        metavar="FILE",
-        show_default="measured and cached",
+        "FILE  Choose from the measured points in this file (.json). [default: measured and cached]"
     )
-    frames: Path | None = option(None, "Data set; errors are measured on its test frames.", metavar="FOLDER")
-    size: int | None = option(
-        None, "Frame size for the times: N x N pixels.", metavar="N", show_default="1024"
-    )
+    frames: Path | None = option("FOLDER  Data set; errors are measured on its test frames.")
+    size: int | None = option("N  Frame size for the times: N x N pixels. [default: 1024]")
 
     @property
     def limited(self) -> bool:

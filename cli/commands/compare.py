@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
-from ..common.options import ExecutorName
+from ..common.options import ExecutorName, argument, option
 from ..common.terminal import table, tell
-
-EXAMPLES = """Examples:
-wamnet compare denoised.png reference.png
-wamnet compare noisy.exr reference.exr --json
-wamnet compare --paths minicubes
-wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3"""
-"""Shown below the help of `wamnet compare`."""
 
 PANEL = "Paths"
 """Title of the options that go with `--paths`."""
@@ -35,31 +27,21 @@ OF_PICTURES = ("image", "reference", "exposure")
 
 def compare(
     context: typer.Context,
-    image: Annotated[
-        Path | None, typer.Argument(metavar="IMAGE", help="Image to compare (.exr or .png).")
-    ] = None,
-    reference: Annotated[Path | None, typer.Argument(metavar="REFERENCE", help="Reference image.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    image: Path | None = argument("IMAGE  Image to compare (.exr or .png).", None),
+    reference: Path | None = argument("REFERENCE  Reference image.", None),
+    as_json: bool = option("--json  Print JSON instead of a table.", False),
     exposure: options.Exposure = 0.0,
-    paths: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SCENE",
-            help="Compare a kernel's paths in this scene with the reference's, instead of two images.",
-            rich_help_panel=PANEL,
-        ),
-    ] = None,
-    executor: Annotated[ExecutorName, typer.Option(rich_help_panel=PANEL)] = ExecutorName.opencl,
-    width: Annotated[int, typer.Option(help="Width in pixels.", rich_help_panel=PANEL)] = 64,
-    height: Annotated[int, typer.Option(help="Height in pixels.", rich_help_panel=PANEL)] = 64,
-    sample: Annotated[int, typer.Option(help="Index of the sample to compare.", rich_help_panel=PANEL)] = 0,
-    spp: Annotated[
-        int, typer.Option(help="Paths per pixel of the reference image.", rich_help_panel=PANEL)
-    ] = 64,
-    seed: Annotated[int, typer.Option(help="Random seed.", rich_help_panel=PANEL)] = 0,
-    max_depth: Annotated[
-        int, typer.Option(help="Maximum number of bounces per path.", rich_help_panel=PANEL)
-    ] = 5,
+    paths: str | None = option(
+        "SCENE  Compare a kernel's paths in this scene with the reference's, instead of two images.",
+        rich_help_panel=PANEL,
+    ),
+    executor: ExecutorName = option("", ExecutorName.opencl, rich_help_panel=PANEL),
+    width: int = option("Width in pixels.", 64, rich_help_panel=PANEL),
+    height: int = option("Height in pixels.", 64, rich_help_panel=PANEL),
+    sample: int = option("Index of the sample to compare.", 0, rich_help_panel=PANEL),
+    spp: int = option("Paths per pixel of the reference image.", 64, rich_help_panel=PANEL),
+    seed: int = option("Random seed.", 0, rich_help_panel=PANEL),
+    max_depth: int = option("Maximum number of bounces per path.", 5, rich_help_panel=PANEL),
     time: options.Time = None,
     parameters: options.Parameters = None,
 ) -> None:
@@ -73,6 +55,12 @@ def compare(
     [bold]undecided[/], and [bold]different[/] if the reference decides otherwise. [bold]parted[/] counts the
     paths that have diverged; [bold]moved[/] is the largest change of the others' vertices. Welch's test
     compares the images. The exit status is 1 if a difference is unexplained or the test fails.
+
+    Examples:
+    wamnet compare denoised.png reference.png
+    wamnet compare noisy.exr reference.exr --json
+    wamnet compare --paths minicubes
+    wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3
     """
     if paths is None:
         options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")

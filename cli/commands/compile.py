@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...refimpl.reading import parse_json, read_file
 from ..common import options
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
-from ..common.options import Sampler, Target, option
+from ..common.options import Sampler, Target, argument, option
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_parent, unwritable
@@ -29,17 +27,6 @@ if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
     from ...compiler.targets import Language
     from ...refimpl.network.denoise import Model
-
-EXAMPLES = """Examples:
-wamnet compile model.safetensors --target glsl -o kernel-glsl
-wamnet compile model:minicubes --target opencl -o kernel-minicubes
-wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
-wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
-wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
-wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
-wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
-wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl"""
-"""Shown below the help of `wamnet compile`."""
 
 HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 """What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
@@ -51,13 +38,9 @@ class OfScene:
 
     time: options.Time = None
     parameters: options.Parameters = None
-    max_depth: int | None = option(
-        None, "Maximum number of bounces per path (scenes only).", show_default="5"
-    )
-    sampler: Sampler | None = option(None, "Sampler (scenes only).", show_default="pcg4d")
-    lanes: int | None = option(
-        None, "Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs.", show_default="1"
-    )
+    max_depth: int | None = option("Maximum number of bounces per path (scenes only). [default: 5]")
+    sampler: Sampler | None = option("Sampler (scenes only). [default: pcg4d]")
+    lanes: int | None = option("Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs. [default: 1]")
 
     def compiled(self, name: str, language: Language, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
@@ -76,15 +59,11 @@ class OfScene:
 
 
 def compile_model(
-    model: Annotated[
-        str,
-        typer.Argument(
-            metavar="MODEL",
-            help="Trained model (.safetensors), model:NAME, canonical scene or scene file (.json).",
-        ),
-    ],
-    target: Annotated[Target, typer.Option(help="Target language (export has more).")],
-    output: Annotated[Path | None, options.output("FOLDER", "Output folder.", "TARGET")] = None,
+    model: str = argument(
+        "MODEL  Trained model (.safetensors), model:NAME, canonical scene or scene file (.json)."
+    ),
+    target: Target = option("Target language (export has more).", ...),
+    output: Path | None = option("-o --output FOLDER  Output folder. [default: TARGET]"),
     *,
     of_scene: OfScene,
     network: KernelRequest,
@@ -97,6 +76,16 @@ def compile_model(
     proven error bound; a scene's kernel traces paths. No device is needed, except for --here and for
     limits (--max-error, --max-ms, --max-loss-db): they choose the variant from a speed-error curve that
     is measured once per device.
+
+    Examples:
+    wamnet compile model.safetensors --target glsl -o kernel-glsl
+    wamnet compile model:minicubes --target opencl -o kernel-minicubes
+    wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
+    wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
+    wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
+    wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
+    wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
+    wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl
     """
     from ...compiler.targets import language_named
 

@@ -23,12 +23,6 @@ if TYPE_CHECKING:
     from ...spec.conformance.case import Case
     from ...spec.conformance.run import Verdict
 
-EXAMPLES = """Examples:
-wamnet conformance --executor numpy -k random -k camera
-wamnet conformance --program "./mine --fast" --junit report.xml
-wamnet conformance --program ./mine --track mine.json"""
-"""Shown below the help of `wamnet conformance`."""
-
 STATUS_FAILED = 1
 """Exit status when a case fails."""
 
@@ -43,29 +37,20 @@ REFERENCE = "reference"
 class Tested:
     """The program under test, and what it is asked."""
 
-    program: str | None = option(None, "Command that runs the program under test.", metavar="CMD")
+    program: str | None = option("CMD  Command that runs the program under test.")
     executor: str | None = option(
-        None,
-        "Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/].",
-        metavar="NAME",
+        "NAME  Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/]."
     )
     profile: options.Profile = "ieee"
     words: list[str] | None = option(
-        None,
-        "Run only cases whose ID contains this word, or that have this clause or flag. Repeatable.",
-        "-k",
-        metavar="WORD",
+        "-k WORD  Run only cases whose ID contains this word, or that have this clause or flag. Repeatable."
     )
-    vectors: Path | None = option(
-        None, "Folder with the test vectors.", metavar="DIR", show_default="the bundled vectors"
-    )
+    vectors: Path | None = option("DIR  Folder with the test vectors. [default: the bundled vectors]")
     track: Path | None = option(
-        None,
-        "Store the verdicts in this file, show the differences from the last run, and fail "
-        "only on regressions.",
-        metavar="FILE",
+        "FILE  Store the verdicts in this file, show the differences from the last run, and fail only on "
+        "regressions."
     )
-    timeout: float = option(60.0, "Timeout per answer, in seconds.")
+    timeout: float = option("Timeout per answer, in seconds.", 60.0)
 
     @property
     def again(self) -> str:
@@ -81,9 +66,9 @@ class Tested:
 class Reports:
     """What is written of it."""
 
-    as_json: Path | None = option(None, "Write a JSON report.", "--json", metavar="FILE")
-    junit: Path | None = option(None, "Write a JUnit report.", metavar="FILE")
-    write: Path | None = option(None, "Regenerate the vectors from the reference and exit.", metavar="DIR")
+    as_json: Path | None = option("--json FILE  Write a JSON report.")
+    junit: Path | None = option("FILE  Write a JUnit report.")
+    write: Path | None = option("DIR  Regenerate the vectors from the reference and exit.")
 
 
 def conformance(*, tested: Tested, reports: Reports) -> None:
@@ -91,6 +76,11 @@ def conformance(*, tested: Tested, reports: Reports) -> None:
 
     The program reads one JSON request per line and writes one answer per line; spec/conformance.md has
     the protocol and a working program of forty lines. The exit status is 1 if a case fails.
+
+    Examples:
+    wamnet conformance --executor numpy -k random -k camera
+    wamnet conformance --program "./mine --fast" --junit report.xml
+    wamnet conformance --program ./mine --track mine.json
     """
     from ...compiler.core.profiles import profile_named
     from ...spec.conformance import report, run

@@ -17,7 +17,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -25,7 +25,7 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
-from ..common.options import option
+from ..common.options import argument, option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
 
@@ -33,58 +33,27 @@ if TYPE_CHECKING:
     from ...models.data.frame_plan import FramePlan, Request, Task
     from ...models.data.scene_source import SceneSource
 
-EXAMPLES = """Examples:
-wamnet dataset minicubes -o cubes
-wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor opencl -o cubes
-wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
-wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
-wamnet dataset minicubes --frames 64 --before 8 -o film
-wamnet dataset mine.json --frames 60 --yaw -24:24 --pitch -5:10 --distance 0.9:1.15 -o mine
-wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
-wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
-wamnet dataset --from-blender hall.blend --frames 12 --percent 50 --spp 256 -o hall
-wamnet dataset --check -o cubes"""
-"""Shown below the help of `wamnet dataset`."""
-
 LIMITS = "LOW:HIGH"
 """How a range is written."""
 
 LEAST_SAMPLES = 1 << 20
 """Samples below which one process is sooner done than a cluster has started (about five seconds)."""
 
-SceneOrNone = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="SCENE", help=f"Canonical scene ({options.SCENES}) or scene file (.json); --check needs none."
-    ),
-]
-Workers = Annotated[int | None, typer.Option(help="Number of worker processes.", show_default="one per core")]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Address of a running Dask scheduler; its workers are used."),
-]
-FromBlender = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Render frames of this Blender file instead of a scene.")
-]
-
 
 @dataclass(frozen=True)
 class Frames:
     """The fields of a request that mean the same for a scene and for a Blender file."""
 
-    frames: int = option(8, "Number of training frames.")
-    test_frames: int = option(
-        2, "Number of test frames, sampled separately within the same ranges.", "--test"
-    )
+    frames: int = option("Number of training frames.", 8)
+    test_frames: int = option("--test  Number of test frames, sampled separately within the same ranges.", 2)
     outside_frames: int = option(
-        0,
-        "Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
+        "--outside  Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
         "--yaw, or beyond --saturation.",
-        "--outside",
+        0,
     )
-    spp: int = option(64, "Paths per pixel of each target; noisy frames have 1.")
-    test_spp: int = option(0, "Paths per pixel of each test target.", show_default="same as --spp")
-    arc_s: float = option(0.0, "Seconds at the end of the animation to hold out from training.", "--arc")
+    spp: int = option("Paths per pixel of each target; noisy frames have 1.", 64)
+    test_spp: int = option("Paths per pixel of each test target. [default: same as --spp]", 0)
+    arc_s: float = option("--arc  Seconds at the end of the animation to hold out from training.", 0.0)
     seed: options.Seed = 0
 
 
@@ -92,20 +61,15 @@ class Frames:
 class Ranges:
     """What frames of a scene draw their cameras and lights from, as texts."""
 
-    yaw_deg: str = option("0:0", "Range of camera orbit angles, in degrees.", "--yaw", metavar=LIMITS)
-    pitch_deg: str = option("0:0", "Range of camera elevation angles, in degrees.", "--pitch", metavar=LIMITS)
-    distance: str = option("1:1", "Range of factors applied to the camera distance.", metavar=LIMITS)
+    yaw_deg: str = option(f"--yaw {LIMITS}  Range of camera orbit angles, in degrees.", "0:0")
+    pitch_deg: str = option(f"--pitch {LIMITS}  Range of camera elevation angles, in degrees.", "0:0")
+    distance: str = option(f"{LIMITS}  Range of factors applied to the camera distance.", "1:1")
     saturation: str | None = option(
-        None,
-        "Randomise the hue of each light, with a saturation in this range (brightness unchanged).",
-        metavar=LIMITS,
-        show_default="the scene's colours",
+        f"{LIMITS}  Randomise the hue of each light, with a saturation in this range (brightness unchanged). "
+        "[default: the scene's colours]"
     )
     power: str | None = option(
-        None,
-        "Range of factors applied to each light's power.",
-        metavar=LIMITS,
-        show_default="the scene's powers",
+        f"{LIMITS}  Range of factors applied to each light's power. [default: the scene's powers]"
     )
 
     def limits(self) -> dict[str, tuple[float, float] | None]:
@@ -120,18 +84,16 @@ class Ranges:
 class OfScene:
     """Further fields of a request that only a scene has."""
 
-    size_px: int = option(64, "Width and height in pixels.", "--size")
+    size_px: int = option("--size  Width and height in pixels.", 64)
     feature_spp: options.FeatureSpp = 0
     seen: options.Seen = False
     shadow_rays: options.ShadowRays = 0
-    start_s: float = option(0.0, "Start time of the animation, in seconds.", "--start")
-    seconds: float = option(8.0, "Duration of the animation, in seconds; minicubes rotate in 8 s.")
+    start_s: float = option("--start  Start time of the animation, in seconds.", 0.0)
+    seconds: float = option("Duration of the animation, in seconds; minicubes rotate in 8 s.", 8.0)
     before: int = option(
-        0,
-        "Earlier frames (24 per second) to accumulate into history layers of each noisy frame.",
-        metavar="N",
+        "N  Earlier frames (24 per second) to accumulate into history layers of each noisy frame.", 0
     )
-    max_depth: int = option(5, "Maximum number of bounces per path.")
+    max_depth: int = option("Maximum number of bounces per path.", 5)
     executor: options.Renderer = "auto"
     sampler: options.SamplerName = "pcg4d"
 
@@ -140,16 +102,11 @@ class OfScene:
 class OfBlender:
     """What means nothing without --from-blender."""
 
-    noisy_spp: int = option(1, "Paths per pixel of a noisy Blender frame.")
-    percent: int = option(100, "Percentage of the Blender file's render resolution.")
-    view_layer: str = option(
-        "", "View layer of the Blender file to render.", metavar="NAME", show_default="the only one"
-    )
+    noisy_spp: int = option("Paths per pixel of a noisy Blender frame.", 1)
+    percent: int = option("Percentage of the Blender file's render resolution.", 100)
+    view_layer: str = option("NAME  View layer of the Blender file to render. [default: the only one]", "")
     blender: str | None = option(
-        None,
-        "Path of the Blender program.",
-        metavar="PROGRAM",
-        show_default="the bpy package, or blender on the PATH",
+        "PROGRAM  Path of the Blender program. [default: the bpy package, or blender on the PATH]"
     )
 
 
@@ -162,21 +119,21 @@ OF_TIMES = ("start_s", "seconds", "arc_s")
 
 def dataset(
     command: typer.Context,
-    scene: SceneOrNone = None,
-    output: Annotated[Path, options.output("FOLDER", "Data set folder.")] = Path("dataset"),
+    scene: str | None = argument(
+        f"SCENE  Canonical scene ({options.SCENES}) or scene file (.json); --check needs none.", None
+    ),
+    output: Path = option("-o --output FOLDER  Data set folder.", Path("dataset")),
     *,
     frames: Frames,
     of_scene: OfScene,
     ranges: Ranges,
     parameters: options.Parameters = None,
     context: options.OpenGLContext = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    from_blender: FromBlender = None,
+    workers: int | None = option("Number of worker processes. [default: one per core]"),
+    scheduler: str | None = option("ADDRESS  Address of a running Dask scheduler; its workers are used."),
+    from_blender: Path | None = option("FILE  Render frames of this Blender file instead of a scene."),
     of_blender: OfBlender,
-    only_check: Annotated[
-        bool, typer.Option("--check", help="Verify the files' checksums without changing anything.")
-    ] = False,
+    only_check: bool = option("--check  Verify the files' checksums without changing anything.", False),
 ) -> None:
     """Render a data set: noisy frames and their targets over an animation.
 
@@ -184,6 +141,18 @@ def dataset(
     another frame's view is rejected. The manifest in the folder lists the samples, seeds and checksums.
     After an interruption, the same command resumes, and replaces damaged files. The files do not depend
     on the number of workers.
+
+    Examples:
+    wamnet dataset minicubes -o cubes
+    wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor opencl -o cubes
+    wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
+    wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
+    wamnet dataset minicubes --frames 64 --before 8 -o film
+    wamnet dataset mine.json --frames 60 --yaw -24:24 --pitch -5:10 --distance 0.9:1.15 -o mine
+    wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
+    wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
+    wamnet dataset --from-blender hall.blend --frames 12 --percent 50 --spp 256 -o hall
+    wamnet dataset --check -o cubes
     """
     from ...models.data.scene_source import scene_source
     from .blender.dataset import make as make_from_blender

@@ -22,14 +22,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
-
-import typer
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
 from ..common import options
 from ..common.effort import said_of_learning
+from ..common.options import option
 from ..common.packages import need
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files import dataset_files
@@ -48,12 +47,6 @@ if TYPE_CHECKING:
     from ...refimpl.network.train import TrainState
 
     Pair = tuple[Frame, Frame]
-
-EXAMPLES = """Examples:
-wamnet demo
-wamnet demo --size 384 -o out/large
-wamnet demo --scene mine.json -o out/mine"""
-"""Shown below the help of `wamnet demo`."""
 
 FOLDER = "out/demo"
 """Folder of the results, unless another is given."""
@@ -95,29 +88,26 @@ TRAIN_FRAMES_OF_NUMPY = 12
 
 
 def demo(
-    scene: Annotated[
-        str, typer.Option(help=f"Canonical scene ({options.SCENES}) or scene file (.json).")
-    ] = Plan.scene,
-    output: Annotated[
-        Path | None, options.output("FOLDER", "Output folder.", f"{FOLDER}, or {QUICK_FOLDER} with --quick")
-    ] = None,
-    size: Annotated[
-        int | None,
-        typer.Option(
-            help="Width and height of the frames, in pixels; cannot be combined with --quick.",
-            show_default=str(Plan.size_px),
-        ),
-    ] = None,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick", help="Use tiny frames, as a quick check that everything works (one to two minutes)."
-        ),
-    ] = False,
+    scene: str = option(f"Canonical scene ({options.SCENES}) or scene file (.json).", Plan.scene),
+    output: Path | None = option(
+        f"-o --output FOLDER  Output folder. [default: {FOLDER}, or {QUICK_FOLDER} with --quick]"
+    ),
+    size: int | None = option(
+        "Width and height of the frames, in pixels; cannot be combined with --quick. [default: "
+        f"{Plan.size_px}]"
+    ),
+    quick: bool = option(
+        "--quick  Use tiny frames, as a quick check that everything works (one to two minutes).", False
+    ),
 ) -> None:
     """Render, train, compile, denoise unseen frames and write a report, in about five minutes.
 
     Then open FOLDER/report.html. After Ctrl-C, the same command resumes where it stopped.
+
+    Examples:
+    wamnet demo
+    wamnet demo --size 384 -o out/large
+    wamnet demo --scene mine.json -o out/mine
     """
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report")

@@ -14,16 +14,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
-from ..common.options import ExecutorName, option
+from ..common.options import ExecutorName, argument, option
 from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
@@ -35,35 +33,19 @@ if TYPE_CHECKING:
     from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
 
-DENOISE_EXAMPLES = """Examples:
-wamnet denoise model.safetensors noisy.exr -o denoised.png
-wamnet denoise minicubes noisy.exr -o denoised.png
-wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
-wamnet denoise model.safetensors 'shot.%04d.exr' --executor opencl -o denoised
-wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.png
-wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
-wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
-wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
-wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16"""
-"""Shown below the help of `wamnet denoise`."""
-
-EXECUTORS_EXAMPLES = """Example:
-wamnet executors"""
-"""Shown below the help of `wamnet executors`."""
-
 
 @dataclass(frozen=True)
 class Layers:
     """What of a frame is read and kept."""
 
     anyway: bool = option(
-        False, "Denoise frames of other programs even if they lie outside the training domain.", "--anyway"
+        "--anyway  Denoise frames of other programs even if they lie outside the training domain.", False
     )
     keep_layers: bool = option(
-        False, "Also copy all layers of FRAME, and write the result as layer wamnet.", "--keep-layers"
+        "--keep-layers  Also copy all layers of FRAME, and write the result as layer wamnet.", False
     )
     view_layer: str = option(
-        "", "View, part or view layer of FRAME to denoise.", metavar="NAME", show_default="the first view"
+        "NAME  View, part or view layer of FRAME to denoise. [default: the first view]", ""
     )
 
 
@@ -124,22 +106,15 @@ class Job:
 
 def denoise(
     model: options.ModelFile,
-    frames: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FRAME...",
-            help="Noisy frames with the layers that the model reads (.exr); shot.*.exr and "
-            "shot.%04d.exr are sequences.",
-        ),
-    ],
-    output: Annotated[
-        Path,
-        options.output(
-            "FILE",
-            "Output: linear colour (.exr) or display-encoded image (.png); for several frames, a "
-            "folder or a pattern with %04d for the frame number.",
-        ),
-    ] = Path("denoised.png"),
+    frames: list[Path] = argument(
+        "FRAME...  Noisy frames with the layers that the model reads (.exr); shot.*.exr and shot.%04d.exr "
+        "are sequences."
+    ),
+    output: Path = option(
+        "-o --output FILE  Output: linear colour (.exr) or display-encoded image (.png); for several "
+        "frames, a folder or a pattern with %04d for the frame number.",
+        Path("denoised.png"),
+    ),
     executor: options.Executor = "auto",
     *,
     kernel: KernelRequest,
@@ -153,6 +128,17 @@ def denoise(
     (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for
     comparison. Kernels are cached: a second run compiles nothing. In a sequence, existing results are not
     computed again.
+
+    Examples:
+    wamnet denoise model.safetensors noisy.exr -o denoised.png
+    wamnet denoise minicubes noisy.exr -o denoised.png
+    wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
+    wamnet denoise model.safetensors 'shot.%04d.exr' --executor opencl -o denoised
+    wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.png
+    wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
+    wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
+    wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
+    wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16
     """
     from ...kernels import open_executor
     from ...kernels.run.denoise_on import Denoiser
@@ -269,7 +255,11 @@ def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes
 
 
 def executors() -> None:
-    """List the available backends, and what the others need."""
+    """List the available backends, and what the others need.
+
+    Example:
+    wamnet executors
+    """
     found = [probe(name.value) for name in ExecutorName]
     heads = ("name", "state", "schedule", "device, or what is missing")
     table("Executors", heads, found, texts=4)

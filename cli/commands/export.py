@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     from ...kernels.export.motion import Motion
     from ...kernels.export.package import Export
     from ...refimpl.light.scene import Scene
-
-EXAMPLES = """Examples:
-wamnet export model.safetensors --target wgsl -o for-webgpu
-wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
-wamnet export model.safetensors --scene minicubes --host c -o program
-wamnet export model.safetensors --target c --weights inline --check -o header
-wamnet export model.safetensors --target opencl --measure -o timed
-wamnet export model.safetensors --target cuda --schedule plain -o to-read
-wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
-wamnet export model.safetensors --scene minicubes --moving time,camera --target c -o turning
-wamnet export model.safetensors --scene minicubes --target html -o page"""
-"""Shown below the help of `wamnet export`."""
 
 TARGETS = (
     "opencl, glsl, glsl-compute, glsl-es, glsl-vulkan, wgsl, hlsl, metal, spirv, c, cuda, shadertoy, godot, "
@@ -61,16 +49,12 @@ class Kernel(KernelRequest):
     """How the denoiser is compiled, for another machine than this one."""
 
     schedule: str | None = option(
-        None,
-        "Kernel schedule of the denoiser: plain is human-readable, the others are faster.",
-        metavar="NAME",
-        show_default="the fastest for this target and model",
+        "NAME  Kernel schedule of the denoiser: plain is human-readable, the others are faster. [default: "
+        "the fastest for this target and model]"
     )
     weights: str | None = option(
-        None,
-        "Storage of the weights: inline, uniform, texture or buffer, depending on the target.",
-        metavar="PLACE",
-        show_default="the target's default",
+        "PLACE  Storage of the weights: inline, uniform, texture or buffer, depending on the target. "
+        "[default: the target's default]"
     )
 
 
@@ -79,25 +63,21 @@ class Shown:
     """The scene whose path tracer comes along, and what of it moves."""
 
     scene: str | None = option(
-        None,
-        "Also export the path tracer for this scene: a canonical scene or a file (.json).",
-        metavar="SCENE",
-        show_default="denoiser only",
+        "SCENE  Also export the path tracer for this scene: a canonical scene or a file (.json). [default: "
+        "denoiser only]"
     )
     time: options.Time = None
     parameters: options.Parameters = None
-    max_depth: int = option(5, "Maximum number of bounces per path.")
+    max_depth: int = option("Maximum number of bounces per path.", 5)
     sampler: options.SamplerName = "pcg4d"
     moving: str | None = option(
-        None,
-        "Scene parameters to pass at run time instead of baking in: time, camera, lights, positions.",
-        metavar="LIST",
-        show_default="none: the scene is baked in",
+        "LIST  Scene parameters to pass at run time instead of baking in: time, camera, lights, positions. "
+        "[default: none: the scene is baked in]"
     )
     seconds: float | None = option(
-        None, "Duration covered by the animation table, in seconds.", show_default=f"{SECONDS:g}"
+        f"Duration covered by the animation table, in seconds. [default: {SECONDS:g}]"
     )
-    fps: float | None = option(None, "Table entries per second.", show_default=f"{FPS:g}")
+    fps: float | None = option(f"Table entries per second. [default: {FPS:g}]")
 
     def check(self) -> None:
         """Refuse options that mean nothing without others."""
@@ -137,12 +117,8 @@ class Shown:
 class Into:
     """What is exported for; one of the two is needed."""
 
-    target: str | None = option(
-        None, f"Target language or format: {TARGETS}.", metavar="NAME", show_default="the host's target"
-    )
-    host: str | None = option(
-        None, f"Complete host program to generate: {HOSTS}.", metavar="NAME", show_default="none"
-    )
+    target: str | None = option(f"NAME  Target language or format: {TARGETS}. [default: the host's target]")
+    host: str | None = option(f"NAME  Complete host program to generate: {HOSTS}. [default: none]")
 
     @property
     def language(self) -> str:
@@ -162,10 +138,10 @@ class Tried:
     """What is done with an export here."""
 
     check: bool = option(
-        False, "Compile and run the export here, and compare its output with the reference.", "--check"
+        "--check  Compile and run the export here, and compare its output with the reference.", False
     )
     measure: bool = option(
-        False, "Measure the time per frame on this machine and report it in the README.", "--measure"
+        "--measure  Measure the time per frame on this machine and report it in the README.", False
     )
 
 
@@ -173,7 +149,7 @@ def export(
     model: options.ModelFile,
     *,
     into: Into,
-    output: Annotated[Path | None, options.output("FOLDER", "New output folder.", "HOST or TARGET")] = None,
+    output: Path | None = option("-o --output FOLDER  New output folder. [default: HOST or TARGET]"),
     shown: Shown,
     kernel: Kernel,
     tried: Tried,
@@ -185,6 +161,17 @@ def export(
     Every target's files have been compiled by the target's own tools, run, and checked against the bound
     in the manifest. --scene also exports the path tracer and its feature encoding; --target html writes
     a web page with all of them.
+
+    Examples:
+    wamnet export model.safetensors --target wgsl -o for-webgpu
+    wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
+    wamnet export model.safetensors --scene minicubes --host c -o program
+    wamnet export model.safetensors --target c --weights inline --check -o header
+    wamnet export model.safetensors --target opencl --measure -o timed
+    wamnet export model.safetensors --target cuda --schedule plain -o to-read
+    wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
+    wamnet export model.safetensors --scene minicubes --moving time,camera --target c -o turning
+    wamnet export model.safetensors --scene minicubes --target html -o page
     """
     target, host = into.language, into.host
     folder = output or Path(host or target)

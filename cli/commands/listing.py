@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ..common import options
 from ..common.inputs import load_model, load_scene
-from ..common.options import Target
+from ..common.options import Target, argument, option
 from ..common.terminal import say
 from ..files.outputs import check_output, write_text
 from .compile import is_scene
@@ -18,26 +16,20 @@ if TYPE_CHECKING:
     from ...compiler.core.listing import Line
     from ...compiler.targets import Language
 
-EXAMPLES = """Examples:
-wamnet listing model.safetensors --target glsl
-wamnet listing minicubes --target opencl --profile native -o minicubes.txt"""
-"""Shown below the help of `wamnet listing`."""
-
 
 def listing(
-    model: Annotated[
-        str,
-        typer.Argument(
-            metavar="MODEL", help="Trained model (.safetensors), canonical scene or scene file (.json)."
-        ),
-    ],
-    target: Annotated[Target, typer.Option(help="Target language.")],
-    output: Annotated[Path | None, options.output("FILE", "Output file.", "the terminal")] = None,
+    model: str = argument("MODEL  Trained model (.safetensors), canonical scene or scene file (.json)."),
+    target: Target = option("Target language.", ...),
+    output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
     profile: options.Profile = "ieee",
 ) -> None:
     """Print a kernel interleaved with the lines of the reference that it came from.
 
     Denoisers use the plain schedule; scenes trace one path at a time. Only -o writes a file.
+
+    Examples:
+    wamnet listing model.safetensors --target glsl
+    wamnet listing minicubes --target opencl --profile native -o minicubes.txt
     """
     from ...compiler.core.listing import as_text
     from ...compiler.targets import language_named

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -13,39 +13,20 @@ from ..common import options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_scene
-from ..common.options import FloatType
+from ..common.options import FloatType, option
 from ..common.terminal import progress, say
 from ..files.outputs import check_output, write_text
-
-RENDER_EXAMPLES = """Examples:
-wamnet render minicubes
-wamnet render minicubes --feature-spp 4 -o noisy.exr
-wamnet render glossy --seen -o mirrors.exr
-wamnet render minicubes --feature-spp 4 --shadow-rays 4 -o shadows.exr
-wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
-wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
-wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
-wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png"""
-"""Shown below the help of `wamnet render`."""
-
-SCENE_EXAMPLES = """Examples:
-wamnet scene minicubes
-wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
-wamnet render mine.json"""
-"""Shown below the help of `wamnet scene`."""
 
 
 def render(
     scene: options.SceneName,
-    output: Annotated[
-        Path | None,
-        options.output(
-            "FILE", "Output: frame with all layers (.exr), or its colour only (.png).", "SCENE.exr"
-        ),
-    ] = None,
-    width: Annotated[int, typer.Option(help="Width in pixels.")] = 256,
-    height: Annotated[int, typer.Option(help="Height in pixels.")] = 256,
-    spp: Annotated[int, typer.Option(help="Paths per pixel: 1 is noisy, 1024 is smooth.")] = 1,
+    output: Path | None = option(
+        "-o --output FILE  Output: frame with all layers (.exr), or its colour only (.png). [default: "
+        "SCENE.exr]"
+    ),
+    width: int = option("Width in pixels.", 256),
+    height: int = option("Height in pixels.", 256),
+    spp: int = option("Paths per pixel: 1 is noisy, 1024 is smooth.", 1),
     feature_spp: options.FeatureSpp = 0,
     seen: options.Seen = False,
     shadow_rays: options.ShadowRays = 0,
@@ -54,22 +35,28 @@ def render(
     parameters: options.Parameters = None,
     *,
     view: options.View,
-    max_depth: Annotated[int, typer.Option(help="Maximum number of bounces per path.")] = 5,
+    max_depth: int = option("Maximum number of bounces per path.", 5),
     sampler: options.SamplerName = "pcg4d",
-    dtype: Annotated[
-        FloatType, typer.Option(help="Floating-point type of the computation; files store float32.")
-    ] = "float32",
+    dtype: FloatType = option("Floating-point type of the computation; files store float32.", "float32"),
     executor: options.Renderer = "auto",
     context: options.OpenGLContext = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Number of worker processes (NumPy only).", show_default="one per core")
-    ] = None,
+    workers: int | None = option("Number of worker processes (NumPy only). [default: one per core]"),
     exposure: options.Exposure = 0.0,
 ) -> None:
     """Path-trace a scene: colour, albedo, normal, depth, position and ray direction.
 
     The same scene, size, samples and seed give the same frame, whatever the number of workers. Compiled
     backends (OpenCL, OpenGL, C) give the same frame up to rounding, and are much faster.
+
+    Examples:
+    wamnet render minicubes
+    wamnet render minicubes --feature-spp 4 -o noisy.exr
+    wamnet render glossy --seen -o mirrors.exr
+    wamnet render minicubes --feature-spp 4 --shadow-rays 4 -o shadows.exr
+    wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
+    wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
+    wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
+    wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png
     """
     from ...kernels.run.render_frame import render_frame
     from ...refimpl.light.render import Job
@@ -116,13 +103,19 @@ def write_picture(path: Path, frame: Any, exposure: float) -> None:
 
 def scene(
     name: options.SceneName,
-    output: Annotated[Path | None, options.output("FILE", "Output file.", "the terminal")] = None,
+    output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
     time: options.Time = None,
     parameters: options.Parameters = None,
     *,
     view: options.View,
 ) -> None:
-    """Write a scene as a JSON file that you can edit and render."""
+    """Write a scene as a JSON file that you can edit and render.
+
+    Examples:
+    wamnet scene minicubes
+    wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
+    wamnet render mine.json
+    """
     from ...refimpl.light.scene import to_json
 
     text = to_json(load_scene(name, time, parameters or [], view))

@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ...refimpl.errors import NO_VALUE, InputError
 from ..common import options
@@ -28,16 +26,6 @@ if TYPE_CHECKING:
     from ...refimpl.network.siren import Siren
     from ...refimpl.network.train import Recipe, TrainState
 
-EXAMPLES = """Examples:
-wamnet train -i noisy.exr -t reference.exr -o model.safetensors
-wamnet train --dataset cubes --steps 20000 --executor opencl
-wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
-wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
-wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
-wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
-wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors"""
-"""Shown below the help of `wamnet train`."""
-
 WHOLE = "whole8"
 """The variant that --whole is short for."""
 
@@ -49,17 +37,11 @@ CHECKPOINT_INTERVAL_S = 30.0
 class Pairs:
     """What is trained on: single frames, or a data set."""
 
-    inputs: list[Path] | None = option(
-        None, "Noisy frame (.exr). Repeatable.", "-i", "--input", metavar="FILE"
-    )
+    inputs: list[Path] | None = option("-i --input FILE  Noisy frame (.exr). Repeatable.")
     targets: list[Path] | None = option(
-        None,
-        "Reference of each noisy frame, in the same order. Repeatable.",
-        "-t",
-        "--target",
-        metavar="FILE",
+        "-t --target FILE  Reference of each noisy frame, in the same order. Repeatable."
     )
-    dataset: Path | None = option(None, "Data set to train on, instead of single frames.", metavar="FOLDER")
+    dataset: Path | None = option("FOLDER  Data set to train on, instead of single frames.")
 
 
 @dataclass(frozen=True)
@@ -67,38 +49,28 @@ class Wanted:
     """The recipe; None for what the preset, or the checkpoint, has."""
 
     preset: Preset | None = option(
-        None,
-        "Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or "
-        "sky (under an environment).",
-        show_default="best",
+        "Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or sky (under an "
+        "environment). [default: best]"
     )
     features: str | None = option(
-        None,
-        "Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ...",
-        show_default="the preset's",
+        "Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ... [default: "
+        "the preset's]"
     )
     rank: int | None = option(
-        None,
-        "Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank.",
-        show_default="the preset's",
+        "Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank. [default: the preset's]"
     )
     begin: Path | None = option(
-        None,
-        "Start from this model's weights, reduced to --rank or --variant, instead of random ones.",
-        "--from",
-        metavar="MODEL",
+        "--from MODEL  Start from this model's weights, reduced to --rank or --variant, instead of random "
+        "ones."
     )
     variant: str | None = option(
-        None,
-        "Fine-tune this variant of the model given by --from, for example window8+rank16. "
-        "whole8 and whole10 round the weights to integers at the end; with --from and without "
-        "--steps they only round.",
-        metavar="NAME",
+        "NAME  Fine-tune this variant of the model given by --from, for example window8+rank16. whole8 and "
+        "whole10 round the weights to integers at the end; with --from and without --steps they only round."
     )
-    whole: bool = option(False, "Short for --variant whole8: an 8-bit integer network.", "--whole")
+    whole: bool = option("--whole  Short for --variant whole8: an 8-bit integer network.", False)
     activation: options.ActivationName = None
-    steps: int | None = option(None, "Number of training steps.", show_default="the preset's")
-    seed: int | None = option(None, "Random seed of the initial weights and of sampling.")
+    steps: int | None = option("Number of training steps. [default: the preset's]")
+    seed: int | None = option("Random seed of the initial weights and of sampling.")
 
     def recipe(self, state: TrainState | None) -> Recipe:
         """Return the recipe, checked."""
@@ -125,19 +97,12 @@ class Wanted:
 def train(
     *,
     pairs: Pairs,
-    output: Annotated[Path, options.output("FILE", "Model to write (.safetensors).")] = Path(
-        "model.safetensors"
-    ),
+    output: Path = option("-o --output FILE  Model to write (.safetensors).", Path("model.safetensors")),
     wanted: Wanted,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Resume from the checkpoint next to the model, with the checkpoint's recipe."
-        ),
-    ] = False,
-    restart: Annotated[
-        bool, typer.Option("--restart", help="Start again and overwrite the checkpoint of an earlier run.")
-    ] = False,
+    resume: bool = option(
+        "--resume  Resume from the checkpoint next to the model, with the checkpoint's recipe.", False
+    ),
+    restart: bool = option("--restart  Start again and overwrite the checkpoint of an earlier run.", False),
     executor: options.Trainer = "auto",
 ) -> None:
     """Train a network on noisy frames and their references, or on a data set.
@@ -145,6 +110,15 @@ def train(
     A checkpoint is kept next to the model. After Ctrl-C, --resume continues from it with bit-identical
     results. With more --steps it continues past the end; the learning rate, which decays over the run,
     then jumps back up, so the model differs from one trained for this many steps from the start.
+
+    Examples:
+    wamnet train -i noisy.exr -t reference.exr -o model.safetensors
+    wamnet train --dataset cubes --steps 20000 --executor opencl
+    wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
+    wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
+    wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
+    wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
+    wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors
     """
     from ...models.model_file import load_checkpoint
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -24,7 +24,7 @@ from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
 from ..common.inputs import load_model, model_path
-from ..common.options import option
+from ..common.options import argument, option
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
@@ -38,12 +38,6 @@ if TYPE_CHECKING:
     from ...kernels.judge.triage import Compile, Kernel, Verdict
     from ...refimpl.frame import Frame
     from ...refimpl.network.denoise import Model
-
-EXAMPLES = """Examples:
-wamnet triage model.safetensors noisy.exr
-wamnet triage model.safetensors noisy.exr --schedules all
-wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd"""
-"""Shown below the help of `wamnet triage`."""
 
 STATUS_DEVIATES = 1
 """Exit status when a kernel is beyond its bound."""
@@ -60,40 +54,38 @@ class Chosen:
     """The kernels that run."""
 
     executor: list[str] | None = option(
-        None,
-        "Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable.",
-        metavar="NAME",
-        show_default="all available",
+        "NAME  Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable. [default: all "
+        "available]"
     )
     profile: options.Profile = "ieee"
     schedules: str = option(
+        "NAME  Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
         "picked",
-        "Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
-        metavar="NAME",
     )
     kernel: Path | None = option(
-        None,
-        "Run this kernel's files instead of compiling for its target and schedule.",
-        metavar="FOLDER",
+        "FOLDER  Run this kernel's files instead of compiling for its target and schedule."
     )
 
 
 def triage(
     model: options.ModelFile,
-    frame: Annotated[
-        Path, typer.Argument(metavar="FRAME", help="Frame with the layers that the model reads (.exr).")
-    ],
+    frame: Path = argument("FRAME  Frame with the layers that the model reads (.exr)."),
     *,
     chosen: Chosen,
-    output: Annotated[
-        Path, options.output("FOLDER", "Output folder for the reproducer, if a kernel deviates.")
-    ] = Path("triage"),
+    output: Path = option(
+        "-o --output FOLDER  Output folder for the reproducer, if a kernel deviates.", Path("triage")
+    ),
 ) -> None:
     """Run a model on every backend, and find the one that exceeds its error bound.
 
     Each kernel is compared with the float64 reference, within its schedule's bound for this frame. If
     one deviates, FOLDER gets the first deviating stage and the smallest part of the frame that
     reproduces it, with the kernel's source. The exit status is 1 if a kernel deviates.
+
+    Examples:
+    wamnet triage model.safetensors noisy.exr
+    wamnet triage model.safetensors noisy.exr --schedules all
+    wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd
     """
     from ...compiler.core.profiles import profile_named
     from ...kernels.run.denoise_on import images_of

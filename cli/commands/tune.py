@@ -6,24 +6,17 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.inputs import load_model
-from ..common.options import ExecutorName
+from ..common.options import ExecutorName, argument, option
 from ..common.terminal import say, table
 from ..files.alone import alone_in
 
 if TYPE_CHECKING:
     from ...kernels.run.tune import Table
-
-EXAMPLES = """Examples:
-wamnet tune
-wamnet tune model.safetensors --executor opengl --size 512 --force"""
-"""Shown below the help of `wamnet tune`."""
 
 LARGEST_SIZE = 2**13
 """Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
@@ -33,34 +26,26 @@ MANY = 1000
 
 
 def tune(
-    model: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="MODEL",
-            help="Trained model (.safetensors).",
-            show_default="a network of the paper's size",
-        ),
-    ] = None,
-    executor: Annotated[
-        ExecutorName, typer.Option(help="Backend that runs the kernel.")
-    ] = ExecutorName.opencl,
-    size: Annotated[int, typer.Option(help="Width and height of the image, in pixels.")] = 512,
+    model: Path | None = argument(
+        "MODEL  Trained model (.safetensors). [default: a network of the paper's size]", None
+    ),
+    executor: ExecutorName = option("Backend that runs the kernel.", ExecutorName.opencl),
+    size: int = option("Width and height of the image, in pixels.", 512),
     rank: options.CutRank = 0,
     context: options.OpenGLContext = None,
-    force: Annotated[bool, typer.Option("--force", help="Ignore cached measurements.")] = False,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            "--cache",
-            metavar="DIR",
-            help="Folder for the measurements; other commands use it if WAMNET_CACHE names it.",
-            show_default="~/.cache/wamnet",
-        ),
-    ] = None,
+    force: bool = option("--force  Ignore cached measurements.", False),
+    cache: Path | None = option(
+        "--cache DIR  Folder for the measurements; other commands use it if WAMNET_CACHE names it. [default: "
+        "~/.cache/wamnet]"
+    ),
 ) -> None:
     """Measure which schedule of the denoiser is fastest on this machine, and cache the result.
 
     Schedules are checked against the reference first. Other commands use the result for similar networks.
+
+    Examples:
+    wamnet tune
+    wamnet tune model.safetensors --executor opengl --size 512 --force
     """
     from ...compiler.variants import FULL, plan_model, with_rank
     from ...kernels import open_executor

@@ -16,21 +16,14 @@ from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ...refimpl.errors import InputError
 from ..common import options
+from ..common.options import option
 from ..common.terminal import say
 from ..files.outputs import check_output, write_text
 from ..reports.webpage import page_of
-
-EXAMPLES = """Examples:
-wamnet view model.safetensors
-wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
-wamnet view model.safetensors -o page.html"""
-"""Shown below the help of `wamnet view`."""
 
 HOST = "127.0.0.1"
 """Where the page is served: only to this machine."""
@@ -51,32 +44,29 @@ LARGEST_PORT = 65535
 
 def view(
     model: options.ModelFile,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SCENE",
-            help=f"Canonical scene ({options.SCENES}) or scene file (.json).",
-            show_default="the model's training scene",
-        ),
-    ] = None,
-    fast: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MODEL",
-            help="Model for the fast variant, fine-tuned at rank 16; its first layer is reduced to rank 16.",
-            show_default="same as MODEL",
-        ),
-    ] = None,
+    scene: str | None = option(
+        f"SCENE  Canonical scene ({options.SCENES}) or scene file (.json). [default: the model's training "
+        "scene]"
+    ),
+    fast: Path | None = option(
+        "MODEL  Model for the fast variant, fine-tuned at rank 16; its first layer is reduced to rank 16. "
+        "[default: same as MODEL]"
+    ),
     parameters: options.Parameters = None,
-    port: Annotated[int, typer.Option(help="Port to serve the page on; 0 picks a free one.")] = 0,
-    browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
-    output: Annotated[
-        Path | None, options.output("FILE", "Write the page (.html) instead of serving it.", "serve the page")
-    ] = None,
+    port: int = option("Port to serve the page on; 0 picks a free one.", 0),
+    browser: bool = option("Open a browser.", True),
+    output: Path | None = option(
+        "-o --output FILE  Write the page (.html) instead of serving it. [default: serve the page]"
+    ),
 ) -> None:
     """Show a model in the browser: the scene, path-traced live, its normals, and the denoised image.
 
     The page is a single file that needs WebGL 2 and no server; -o writes it.
+
+    Examples:
+    wamnet view model.safetensors
+    wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
+    wamnet view model.safetensors -o page.html
     """
     if not 0 <= port <= LARGEST_PORT:
         raise InputError("--port", port, f"must be from 0 to {LARGEST_PORT}", "for example --port 8080")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import colorsys
 import math
 import os
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -97,19 +98,33 @@ Preset = Literal["best", "mirrors", "shadows", "paper", "short", "sky"]
 """Training protocols by name; equal to the registry in refimpl."""
 
 
-def option(default: Any, text: str, *names: str, **how: Any) -> Any:
-    """Return a field of a request [`request.spread`]: an option, called as the field unless it has names."""
-    return field(default=default, metadata={"option": typer.Option(*names, help=text, **how)})
+def usage(line: str, kind: Any = typer.Option, **how: Any) -> Any:
+    """Return an option, or an argument, from its line of help: `-o --output FILE  Model. [default: a name]`.
+
+    Names and metavar end at the first two spaces; without names it is called as its parameter. The default
+    is what is shown instead of the parameter's.
+    """
+    parts = re.fullmatch(r"(?:(\S.*?)  )?(.*?)(?: \[default: (.*)\])?", line)
+    assert parts is not None, "everything in it may be missing"
+    head, text, default = parts.groups()
+    words = (head or "").split()
+    names = [word for word in words if word.startswith("-")]
+    metavar = " ".join(words[len(names) :]) or None
+    return kind(*names, metavar=metavar, help=text or None, show_default=default or True, **how)
 
 
-def output(metavar: str, what: str, default: str | bool = True) -> Any:
-    """Return the option of what a command writes; `default` is shown in place of the parameter's."""
-    return typer.Option("-o", "--output", metavar=metavar, help=what, show_default=default)
+def option(line: str, default: Any = None, kind: Any = typer.Option, **how: Any) -> Any:
+    """Return an option [`usage`] for a field of a request, or for a command's parameter [`request.spread`].
+
+    The default `...` means that it is needed.
+    """
+    default = MISSING if default is ... else default
+    return field(default=default, metadata={"option": usage(line, kind, **how)})
 
 
-def names(what: str, default: str | bool = True, metavar: str = "NAME,...") -> Any:
-    """Return an option whose text is names with commas [`parse_names`], called as its parameter."""
-    return typer.Option(metavar=metavar, help=what, show_default=default)
+def argument(line: str, default: Any = ..., **how: Any) -> Any:
+    """Return an argument in the same way."""
+    return option(line, default, typer.Argument, **how)
 
 
 EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
@@ -118,145 +133,113 @@ the machine."""
 
 Executor = Annotated[
     ExecutorChoice,
-    typer.Option(
-        "--executor",
-        envvar=EXECUTOR_VARIABLE,
-        help="Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
+    usage(
+        "--executor  Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
         "executors[/] lists.",
+        envvar=EXECUTOR_VARIABLE,
     ),
 ]
 Renderer = Annotated[
     ExecutorChoice,
-    typer.Option(
+    usage(
+        "Backend that traces the paths: [bold]auto[/] is the fastest available.",
         envvar=EXECUTOR_VARIABLE,
-        help="Backend that traces the paths: [bold]auto[/] is the fastest available.",
     ),
 ]
 OpenGLContext = Annotated[
     ContextName | None,
-    typer.Option(
-        "--context",
+    usage(
+        "--context  OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main memory. "
+        "[default: the first one available, or WAMNET_OPENGL_CONTEXT]",
         callback=_context,
-        help="OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main memory.",
-        show_default="the first one available, or WAMNET_OPENGL_CONTEXT",
     ),
 ]
 Exposure = Annotated[
-    float,
-    typer.Option("--exposure", callback=_stops, help="Exposure in stops; +1 doubles the brightness."),
+    float, usage("--exposure  Exposure in stops; +1 doubles the brightness.", callback=_stops)
 ]
 ModelFile = Annotated[
-    Path, typer.Argument(metavar="MODEL", help=f"Trained model (.safetensors), or bundled model ({MODELS}).")
+    Path, usage(f"MODEL  Trained model (.safetensors), or bundled model ({MODELS}).", typer.Argument)
 ]
 Profile = Annotated[
     str,
-    typer.Option(
-        "--profile",
-        help="Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
-        "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
+    usage(
+        "--profile  Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
+        "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine."
     ),
 ]
 Trainer = Annotated[
     TrainerName,
-    typer.Option(
-        "--executor",
-        envvar=EXECUTOR_VARIABLE,
-        help="Backend that trains: numpy is the reference, opencl a compiled training step; "
+    usage(
+        "--executor  Backend that trains: numpy is the reference, opencl a compiled training step; "
         "[bold]auto[/] is the fastest available.",
+        envvar=EXECUTOR_VARIABLE,
     ),
 ]
 ActivationName = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        help="Hidden-layer activation: sine or relu.",
-        show_default="the preset's: sine",
-    ),
+    str | None, usage("NAME  Hidden-layer activation: sine or relu. [default: the preset's: sine]")
 ]
 CutRank = Annotated[
     int,
-    typer.Option(
-        "--rank",
-        metavar="R",
-        help="Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
-        "rows then columns. Loses little quality after fine-tuning.",
-        show_default="no cut",
+    usage(
+        "--rank R  Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
+        "rows then columns. Loses little quality after fine-tuning. [default: no cut]"
     ),
 ]
 Variant = Annotated[
     str | None,
-    typer.Option(
-        "--variant",
-        metavar="NAME",
-        help="Cheaper network: [bold]full[/], or any of without-FEATURE, windowN, hiddenN, rankN "
-        "and sineN joined by +, as in window8+rank16; or whole8, an 8-bit integer network, "
-        "bit-identical on every device.",
-        show_default="full",
+    usage(
+        "--variant NAME  Cheaper network: [bold]full[/], or any of without-FEATURE, windowN, hiddenN, rankN "
+        "and sineN joined by +, as in window8+rank16; or whole8, an 8-bit integer network, bit-identical on "
+        "every device. [default: full]"
     ),
 ]
 Here = Annotated[
     bool,
-    typer.Option(
-        "--here", help="Use the best schedule for this machine: the tuned one, or else the built-in choice."
-    ),
+    usage("--here  Use the best schedule for this machine: the tuned one, or else the built-in choice."),
 ]
 Schedule = Annotated[
     str | None,
-    typer.Option(
-        "--schedule",
-        metavar="NAME",
-        help="Kernel schedule: [bold]plain[/] is human-readable, the others are faster.",
-    ),
+    usage("--schedule NAME  Kernel schedule: [bold]plain[/] is human-readable, the others are faster."),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
+Seed = Annotated[int, usage("--seed  Random seed.")]
 Time = Annotated[
-    float | None,
-    typer.Option("--time", callback=_finite, help="Time in the animation, in seconds.", show_default="0"),
+    float | None, usage("--time  Time in the animation, in seconds. [default: 0]", callback=_finite)
 ]
 Parameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Parameter of a canonical scene: one number, or three separated by commas. Repeatable.",
+    usage(
+        "--set NAME=VALUE  Parameter of a canonical scene: one number, or three separated by commas. "
+        "Repeatable."
     ),
 ]
 SamplerName = Annotated[
     Sampler,
-    typer.Option(
-        "--sampler",
-        help="Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many samples.",
+    usage(
+        "--sampler  Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many samples."
     ),
 ]
 FeatureSpp = Annotated[
     int,
-    typer.Option(
-        "--feature-spp",
-        metavar="N",
-        help="Stratified camera rays per pixel for the features; 4 give smooth edges, and each "
-        "costs a fraction of a path.",
-        show_default="same as --spp",
+    usage(
+        "--feature-spp N  Stratified camera rays per pixel for the features; 4 give smooth edges, and each "
+        "costs a fraction of a path. [default: same as --spp]"
     ),
 ]
 ShadowRays = Annotated[
     int,
-    typer.Option(
-        "--shadow-rays",
-        metavar="N",
-        help="Also write the layer direct: direct light with its soft shadows, by N shadow rays per camera "
-        "ray.",
+    usage(
+        "--shadow-rays N  Also write the layer direct: direct light with its soft shadows, by N shadow rays "
+        "per camera ray."
     ),
 ]
 Seen = Annotated[
     bool,
-    typer.Option(
-        "--seen",
-        help="Also write specular features, traced through mirrors and glass: seen_albedo, seen_normal, ...",
+    usage(
+        "--seen  Also write specular features, traced through mirrors and glass: seen_albedo, seen_normal, "
+        "..."
     ),
 ]
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help=f"Canonical scene ({SCENES}) or scene file (.json).")
-]
+SceneName = Annotated[str, usage(f"SCENE  Canonical scene ({SCENES}) or scene file (.json).", typer.Argument)]
 
 
 def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:
@@ -290,20 +273,14 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
 class View:
     """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
 
-    yaw_deg: float = option(0.0, "Orbit the camera around its target, in degrees.", "--yaw", metavar="DEG")
+    yaw_deg: float = option("--yaw DEG  Orbit the camera around its target, in degrees.", 0.0)
     pitch_deg: float = option(
-        0.0,
-        "Raise the camera around its target, in degrees (negative: lower it).",
-        "--pitch",
-        metavar="DEG",
+        "--pitch DEG  Raise the camera around its target, in degrees (negative: lower it).", 0.0
     )
-    distance: float = option(1.0, "Scale the camera distance; 2 moves it twice as far away.", metavar="X")
+    distance: float = option("X  Scale the camera distance; 2 moves it twice as far away.", 1.0)
     lights: list[str] | None = option(
-        None,
-        "Hue and saturation of light N (from 1), in linear RGB; its brightness is unchanged. Repeatable.",
-        "--light",
-        metavar="N=R,G,B",
-        show_default="as in the scene",
+        "--light N=R,G,B  Hue and saturation of light N (from 1), in linear RGB; its brightness is "
+        "unchanged. Repeatable. [default: as in the scene]"
     )
 
     def of(self, scene: Scene) -> Scene:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from ...refimpl.errors import InputError
@@ -49,22 +49,13 @@ class KernelRequest:
 def given(request: Any, *names: str) -> dict[str, object]:
     """Return the values of fields, of all without names, that are not their defaults, by option."""
     found = {}
-    for field, kind in fields_of(type(request)):
-        value = getattr(request, field.name)
-        if value != field.default and field.name in (names or (field.name,)):
+    for each in _parameters(type(request), dataclasses.fields(type(request))):
+        value = getattr(request, each.name)
+        if value != each.default and each.name in (names or (each.name,)):
             # In an annotation the name of an option is where a default would be.
-            named = kind.__metadata__[0].default
-            found[named if isinstance(named, str) else f"--{field.name.replace('_', '-')}"] = value
+            named = each.annotation.__metadata__[0].default
+            found[named if isinstance(named, str) else f"--{each.name.replace('_', '-')}"] = value
     return found
-
-
-def fields_of(kind: Any) -> list[tuple[dataclasses.Field[Any], Any]]:
-    """Return the fields of a data class, each with its annotation for typer."""
-    hints = get_type_hints(kind, include_extras=True)
-    return [
-        (each, Annotated[hints[each.name], each.metadata["option"]] if each.metadata else hints[each.name])
-        for each in dataclasses.fields(kind)
-    ]
 
 
 def refuse(values: Mapping[str, object], rule: str, remedy: str = "leave it out") -> None:
@@ -76,29 +67,35 @@ def refuse(values: Mapping[str, object], rule: str, remedy: str = "leave it out"
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command for typer: each parameter that is a data class becomes a parameter for each field."""
-    requests: dict[str, tuple[Any, list[str]]] = {}
+    requests: dict[str, Any] = {}
     parameters: list[inspect.Parameter] = []
-
-    def add(name: str, default: Any, annotation: Any) -> None:
-        kind = inspect.Parameter.KEYWORD_ONLY
-        parameters.append(inspect.Parameter(name, kind, default=default, annotation=annotation))
-
-    hints = get_type_hints(command, include_extras=True)
-    for each in inspect.signature(command).parameters.values():
-        kind = hints[each.name]
-        if not dataclasses.is_dataclass(kind):
-            add(each.name, each.default, kind)
-            continue
-        requests[each.name] = kind, [field.name for field in dataclasses.fields(kind)]
-        for field, annotation in fields_of(kind):
-            needed = field.default is dataclasses.MISSING
-            add(field.name, inspect.Parameter.empty if needed else field.default, annotation)
+    for each in _parameters(command, inspect.signature(command).parameters.values()):
+        if dataclasses.is_dataclass(each.annotation):
+            requests[each.name] = each.annotation
+            parameters += _parameters(each.annotation, dataclasses.fields(each.annotation))
+        else:
+            parameters.append(each)
 
     def run(**values: Any) -> None:
-        for name, (kind, names) in requests.items():
-            values[name] = kind(**{field: values.pop(field) for field in names})
+        for name, kind in requests.items():
+            values[name] = kind(**{field.name: values.pop(field.name) for field in dataclasses.fields(kind)})
         command(**values)
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     return run
+
+
+def _parameters(of: Any, declared: Iterable[Any]) -> list[inspect.Parameter]:
+    """Return the fields of a data class, or the parameters of a function, with annotations for typer."""
+    hints, found = get_type_hints(of, include_extras=True), []
+    for each in declared:
+        kind, field = hints[each.name], each.default if isinstance(each, inspect.Parameter) else each
+        default = field
+        if isinstance(field, dataclasses.Field):
+            kind = Annotated[kind, field.metadata["option"]] if field.metadata else kind
+            default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+        found.append(
+            inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        )
+    return found

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
-from ...common import options
 from ...common.inputs import load_model
+from ...common.options import option
 from .shared import SceneShown, head, names_of, row
 
 if TYPE_CHECKING:
     from ....kernels.export.check import Verdict
     from ....refimpl.light.scene import Scene
     from ....refimpl.network.denoise import Model
-
-EXAMPLES = """Examples:
-wamnet bench exports
-wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places"""
-"""Shown below the help of `wamnet bench exports`."""
 
 STATUS_WRONG = 1
 """Exit status when something that was tried is wrong."""
@@ -30,25 +25,22 @@ TIME_S = 1.0
 
 
 def exports(
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MODEL",
-            help="Trained model (.safetensors) or bundled model.",
-            show_default="a small network with random weights",
-        ),
-    ] = None,
+    model: Path | None = option(
+        "MODEL  Trained model (.safetensors) or bundled model. [default: a small network with random weights]"
+    ),
     scene: SceneShown = "minicubes",
-    targets: Annotated[str | None, options.names("Export targets to measure.", "all")] = None,
-    places: Annotated[
-        bool, typer.Option("--places", help="Export every weight storage, without the path tracer.")
-    ] = False,
+    targets: str | None = option("NAME,...  Export targets to measure. [default: all]"),
+    places: bool = option("--places  Export every weight storage, without the path tracer.", False),
 ) -> None:
     """Export for every target, compile, run, check against the bound, and print the verdicts.
 
     Each target is compiled by its own tools and run by the closest available runtime, and its image is
     compared with the reference. A missing tool is reported in the table. The exit status is 1 if the image of
     a target is wrong.
+
+    Examples:
+    wamnet bench exports
+    wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places
     """
     from ....kernels.bench.workload import random_model
     from ....kernels.export.check import HEAD

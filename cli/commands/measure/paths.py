@@ -9,49 +9,25 @@ from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from ...common import options
-from ...common.options import SCENES, parse_names
+from ...common.options import SCENES, option, parse_names, usage
 from ...common.terminal import progress, say
 from .shared import NUMPY, Repeats, Square, check_counts, counts_of, extent, head, names_of, row, say_facts
 
 if TYPE_CHECKING:
     from ....kernels.measure import Entry
 
-RENDER_EXAMPLES = """Examples:
-wamnet bench render --size 512 --spp 2 --repeats 5
-wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16"""
-"""Shown below the help of `wamnet bench render`."""
-
-PRIMITIVES_EXAMPLES = """Examples:
-wamnet bench primitives
-wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000"""
-"""Shown below the help of `wamnet bench primitives`."""
-
-Spp = Annotated[int, typer.Option(help="Samples per pixel.")]
+Spp = Annotated[int, usage("Samples per pixel.")]
 
 
 def render(
-    scenes: Annotated[
-        str, options.names(f"Canonical scenes ({SCENES}) or scene files.")
-    ] = "minicubes,cornell",
-    by: Annotated[
-        str,
-        typer.Option(
-            "--by",
-            "--executors",
-            metavar="NAME,...",
-            help="Renderers to measure: numpy, opencl, opengl, c, mitsuba.",
-        ),
-    ] = "numpy",
-    workers: Annotated[
-        str | None,
-        options.names("Processes for the NumPy reference.", "1, and one per core", metavar="N,..."),
-    ] = None,
+    scenes: str = option(f"NAME,...  Canonical scenes ({SCENES}) or scene files.", "minicubes,cornell"),
+    by: str = option(
+        "--by --executors NAME,...  Renderers to measure: numpy, opencl, opengl, c, mitsuba.", "numpy"
+    ),
+    workers: str | None = option("N,...  Processes for the NumPy reference. [default: 1, and one per core]"),
     size: Square = 512,
     spp: Spp = 2,
-    depth: Annotated[int, typer.Option(help="Maximum path length, including the camera ray.")] = 6,
+    depth: int = option("Maximum path length, including the camera ray.", 6),
     repeats: Repeats = 5,
 ) -> None:
     """Measure samples per second: the reference renderer, its kernels, Mitsuba 3.
@@ -60,6 +36,10 @@ def render(
     median and the range, samples (paths) per second, and the ratio to the last row's. A second table
     compares each mean colour with that of the first renderer, in standard errors. [bold]pip install
     mitsuba[/] adds Mitsuba, which also needs libLLVM.
+
+    Examples:
+    wamnet bench render --size 512 --spp 2 --repeats 5
+    wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16
     """
     from ....kernels.bench import paths
     from ....kernels.bench.fresh import empty_caches
@@ -104,13 +84,11 @@ def _agreement(entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def primitives(
-    executors: Annotated[
-        str, options.names("Path tracers to measure: opencl, opengl, c, mitsuba.")
-    ] = "opencl,opengl",
-    kinds: Annotated[
-        str, options.names("Kinds of primitives: shared, turned, spheres, quads, mixture.")
-    ] = "mixture",
-    counts: Annotated[str, options.names("Number of primitives.", metavar="N,...")] = "10,30,100,300",
+    executors: str = option(
+        "NAME,...  Path tracers to measure: opencl, opengl, c, mitsuba.", "opencl,opengl"
+    ),
+    kinds: str = option("NAME,...  Kinds of primitives: shared, turned, spheres, quads, mixture.", "mixture"),
+    counts: str = option("N,...  Number of primitives.", "10,30,100,300"),
     size: Square = 128,
     spp: Spp = 4,
     repeats: Repeats = 5,
@@ -121,6 +99,10 @@ def primitives(
     the driver has built it and traced a first row of paths (without disk caches), and million samples
     per second: median and range of the interleaved rounds. A star marks the form that the compiler
     chooses; a tree is measured only if it is expected to pay off.
+
+    Examples:
+    wamnet bench primitives
+    wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000
     """
     from ....kernels import open_executor
     from ....kernels.bench import paths

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ....refimpl.errors import ExecutorUnavailable, InputError
-from ...common import options
+from ...common.options import option
 from ...common.terminal import say
 from .shared import (
     NUMPY,
@@ -28,34 +26,17 @@ if TYPE_CHECKING:
     from ....kernels.measure import Entry
     from ....refimpl.network.denoise import Model
 
-EXAMPLES = """Examples:
-wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
-wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
-wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32"""
-"""Shown below the help of `wamnet bench pipeline`."""
-
 
 def pipeline(
     scene: SceneShown = "minicubes",
-    executors: Annotated[
-        str, options.names("Backends to measure: numpy, opencl, opengl, c.")
-    ] = "opencl,opengl",
-    sizes: Annotated[
-        str, options.names("Image sizes (width and height), in pixels.", metavar="N,...")
-    ] = "256,512",
-    features: Annotated[str, options.names("Input features of the network.")] = "color,normal",
-    hidden: Annotated[str, options.names("Width of each hidden layer, in neurons.", metavar="N,...")] = (
-        "32,32,32,32"
-    ),
-    window: Annotated[int, typer.Option(help="Width and height of the window, in pixels.")] = 12,
-    feature_rays: Annotated[
-        int,
-        typer.Option(
-            metavar="N", help="Camera rays per pixel for the features; 0 uses the paths themselves."
-        ),
-    ] = 0,
+    executors: str = option("NAME,...  Backends to measure: numpy, opencl, opengl, c.", "opencl,opengl"),
+    sizes: str = option("N,...  Image sizes (width and height), in pixels.", "256,512"),
+    features: str = option("NAME,...  Input features of the network.", "color,normal"),
+    hidden: str = option("N,...  Width of each hidden layer, in neurons.", "32,32,32,32"),
+    window: int = option("Width and height of the window, in pixels.", 12),
+    feature_rays: int = option("N  Camera rays per pixel for the features; 0 uses the paths themselves.", 0),
     repeats: Repeats = 5,
-    peers: Annotated[str, options.names("Other renderers to include: mitsuba, cycles.", "none")] = "",
+    peers: str = option("NAME,...  Other renderers to include: mitsuba, cycles. [default: none]", ""),
 ) -> None:
     """Measure full frames of an animated scene: one path per pixel, and denoising.
 
@@ -64,6 +45,11 @@ def pipeline(
     [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
     own (package bpy). All are interleaved. The first frame includes compiling its path kernel; with empty
     caches, in a separate process, all kernels. The network has random weights.
+
+    Examples:
+    wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
+    wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
+    wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32
     """
     from ....kernels import EXECUTORS
     from ....kernels.bench import pipelines

@@ -9,10 +9,8 @@ from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Annotated
 
-import typer
-
 from ....refimpl.errors import InputError
-from ...common.options import SCENES, parse_names
+from ...common.options import SCENES, parse_names, usage
 from ...common.terminal import say
 from ...reports import machine
 
@@ -22,9 +20,9 @@ MOST = 1 << 20
 NUMPY = f"NumPy {metadata.version('numpy')}"
 """NumPy's version, with its name."""
 
-Repeats = Annotated[int, typer.Option(help="Number of interleaved rounds.")]
-SceneShown = Annotated[str, typer.Option(metavar="NAME", help=f"Canonical scene ({SCENES}) or scene file.")]
-Square = Annotated[int, typer.Option(help="Width and height in pixels.")]
+Repeats = Annotated[int, usage("Number of interleaved rounds.")]
+SceneShown = Annotated[str, usage(f"NAME  Canonical scene ({SCENES}) or scene file.")]
+Square = Annotated[int, usage("Width and height in pixels.")]
 
 
 def names_of(option: str, text: str, known: Iterable[str]) -> tuple[str, ...]:

@@ -3,37 +3,25 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
-
-import typer
 
 from ....refimpl.errors import InputError
-from ...common import options
+from ...common.options import option
 from ...common.terminal import progress, say
 from ...reports import machine
 from .shared import Repeats, Square, check_counts, extent, head, names_of, row, say_facts
-
-EXAMPLES = """Examples:
-wamnet bench train --presets paper,short --repeats 5
-wamnet bench train --trainers numpy,opencl,torch --presets paper"""
-"""Shown below the help of `wamnet bench train`."""
 
 LONGEST_S = 600.0
 """More seconds of one measurement than anybody waits for."""
 
 
 def train(
-    presets: Annotated[
-        str, options.names("Training presets: best, mirrors, paper, short, sky.")
-    ] = "paper,short",
-    trainers: Annotated[
-        str | None, options.names("Trainers to measure: numpy, opencl, torch.", "all that are installed")
-    ] = None,
+    presets: str = option("NAME,...  Training presets: best, mirrors, paper, short, sky.", "paper,short"),
+    trainers: str | None = option(
+        "NAME,...  Trainers to measure: numpy, opencl, torch. [default: all that are installed]"
+    ),
     size: Square = 256,
-    frames: Annotated[int, typer.Option(help="Number of noise frames to train on.")] = 4,
-    seconds: Annotated[
-        float, typer.Option(metavar="S", help="Approximate time per measurement, in seconds.")
-    ] = 1.0,
+    frames: int = option("Number of noise frames to train on.", 4),
+    seconds: float = option("S  Approximate time per measurement, in seconds.", 1.0),
     repeats: Repeats = 5,
 ) -> None:
     """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch.
@@ -42,6 +30,10 @@ def train(
     included and compilation excluded. The table has the median and the range, GFLOP/s of the matrix
     products, their share of the large product's rate, and the time that all steps would take. [bold]pip
     install torch[/] adds PyTorch.
+
+    Examples:
+    wamnet bench train --presets paper,short --repeats 5
+    wamnet bench train --trainers numpy,opencl,torch --presets paper
     """
     from ....kernels.bench import training
     from ....kernels.measure import measure

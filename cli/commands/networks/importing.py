@@ -4,52 +4,34 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ....refimpl.errors import InputError
-from ...common import options
 from ...common.inputs import check_input
+from ...common.options import argument, option
 from ...common.terminal import say
 from ...files.outputs import check_output
 
 if TYPE_CHECKING:
     from ....models.importing.network import Found
 
-EXAMPLES = """Examples:
-wamnet import network.onnx -o network.safetensors
-wamnet import coordinates.onnx --range -1:1
-wamnet import guided.onnx --range 0:1 --range normal=-1:1
-wamnet import filter.onnx --border zero"""
-"""Shown below the help of `wamnet import`."""
-
 SUFFIX = ".safetensors"
 """How the names of models end."""
 
 
 def import_model(
-    network: Annotated[Path, typer.Argument(metavar="NETWORK", help="ONNX network (.onnx).")],
-    output: Annotated[
-        Path | None, options.output("FILE", "Model to write (.safetensors).", "the network's name")
-    ] = None,
-    ranges: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--range",
-            metavar="[INPUT=]LOW:HIGH",
-            help="Range of one input's values, or of all other inputs; bounds hold within it.",
-            show_default="0:1",
-        ),
-    ] = None,
-    border: Annotated[
-        str | None,
-        typer.Option(
-            metavar="RULE",
-            help="Border rule for networks that pad intermediate layers: zero or clamp.",
-            show_default="the network's own padding",
-        ),
-    ] = None,
+    network: Path = argument("NETWORK  ONNX network (.onnx)."),
+    output: Path | None = option(
+        "-o --output FILE  Model to write (.safetensors). [default: the network's name]"
+    ),
+    ranges: list[str] | None = option(
+        "--range [INPUT=]LOW:HIGH  Range of one input's values, or of all other inputs; bounds hold within "
+        "it. [default: 0:1]"
+    ),
+    border: str | None = option(
+        "RULE  Border rule for networks that pad intermediate layers: zero or clamp. [default: the network's "
+        "own padding]"
+    ),
 ) -> None:
     """Import a small ONNX network as a model that compile, export and certify accept.
 
@@ -57,6 +39,12 @@ def import_model(
     them. A convolution becomes a layer on a window; the border rule of the image is that of the
     network's own padding. An operator that cannot become part of a kernel is rejected with its node's
     name.
+
+    Examples:
+    wamnet import network.onnx -o network.safetensors
+    wamnet import coordinates.onnx --range -1:1
+    wamnet import guided.onnx --range 0:1 --range normal=-1:1
+    wamnet import filter.onnx --border zero
     """
     from ....models.importing.network import import_network
     from ....models.model_file import save_model

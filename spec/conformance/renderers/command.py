@@ -19,15 +19,8 @@ if TYPE_CHECKING:
     from .judgement import Verdict
     from .renderers import Renderer
 
-EXAMPLES = """Examples:
-wamnet verify-renderer --renderer wamnet -k direct
-wamnet verify-renderer --renderer mitsuba --json mitsuba.json --markdown mitsuba.md
-wamnet verify-renderer --format mitsuba --command "my_renderer {scene} {output}" --profile clamps
-wamnet verify-renderer --format blender --write scenes"""
-"""Shown below the help of `wamnet verify-renderer`."""
-
-COMMANDS = {"verify-renderer": ("verify_renderer", "EXAMPLES")}
-"""Function and examples of the command, which `wamnet` registers."""
+COMMANDS = {"verify-renderer": "verify_renderer"}
+"""Function of the command, which `wamnet` registers."""
 
 STATUS_DEVIATES = 1
 """Exit status when a rule is broken."""
@@ -113,6 +106,12 @@ def verify_renderer(
     Each case is rendered several times with other seeds; a t-test with Holm's correction for the number of
     cases says what deviates, and a smaller picture with other seeds must confirm it. What a format cannot say
     is "not tested". Ends with status 1 if a rule is broken.
+
+    Examples:
+    wamnet verify-renderer --renderer wamnet -k direct
+    wamnet verify-renderer --renderer mitsuba --json mitsuba.json --markdown mitsuba.md
+    wamnet verify-renderer --format mitsuba --command "my_renderer {scene} {output}" --profile clamps
+    wamnet verify-renderer --format blender --write scenes
     """
     from . import report, run
     from .cases import PROFILES, chosen

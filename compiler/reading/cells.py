@@ -1,20 +1,21 @@
 """The memory of a kernel under test: arrays whose elements many turns use at once.
 
 Turns that are run at once must have nothing to do with each other: `Race` where one writes an element that
-another reads or writes. An array that is declared inside them has a column for each. Numbers of an image that
-only some lanes write are kept for each lane [`Wide`], and folded once all have written theirs. Another
-number, which all lanes share, is read by those alone that have written it.
+another reads or writes. An array that is declared inside them has a column for each. A number of an image
+that lanes write by themselves is kept for each lane, and folded when it is read. Any other number is one of
+all lanes, and is read by those alone that have written it.
 """
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.kernel import Type
-from .field import P, drawn, hashed, zero
+from .field import P, Words, drawn, hashed
 from .lanes import Unread, Wrong
 from .terms import Term
 
@@ -23,6 +24,10 @@ NOBODY, SEVERAL = -1, -2
 
 EMPTY, WIDE, SHAPE, SUM, BOTH = range(5)
 """What an element holds: nothing, a number of each lane, a shape, a sum on its way, or both of them."""
+
+
+Fold = Callable[[Term], Term]
+"""Returns a number of all lanes together."""
 
 
 class Race(Exception):
@@ -85,47 +90,36 @@ class Turns:
                 )
 
 
-class Reader(Protocol):
-    """What reads memory: for the lanes that are active."""
-
-    def readable(self, numbers: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return whether what the lanes of these numbers have written is there for all that are active."""
-        raise NotImplementedError
-
-    def complete(self, written: NDArray[np.bool_]) -> bool:
-        """Return whether all lanes that count, or are active, have written (..., lanes)."""
-        raise NotImplementedError
-
-    def folded(self, term: Term) -> Term:
-        """Return a number of all lanes together."""
-        raise NotImplementedError
-
-
-class Wide:
-    """Numbers (count, columns, lanes) of an array's elements, and the lanes that have written them."""
-
-    def __init__(self, size: tuple[int, ...]) -> None:
-        self.shape, self.written = np.full(size, zero()), np.zeros(size, bool)
-
-
 class Cells:
-    """An array of `count` numbers in `columns`: shapes, sums, spans, and the lanes that have written."""
+    """An array of `count` numbers in `columns`: shapes, sums, spans, and `wide` shapes of each lane.
 
-    def __init__(self, name: str, count: int, columns: int, kind: str = "float32") -> None:
-        self.name, self.count, self.columns, self.kind = name, count, columns, kind
+    `lanes`: the index in `masks` of those lanes that have written a number.
+    """
+
+    def __init__(
+        self, name: str, count: int, columns: int, kind: str = "float32", masks: Sequence[Any] = ()
+    ) -> None:
+        self.name, self.count, self.columns, self.kind, self.masks = name, count, columns, kind, masks
         size = count, columns
         self.state, self.lanes = np.zeros(size, np.uint8), np.zeros(size, np.int32)
         self.shape, self.sums = np.zeros(size, np.uint64), np.zeros((2, *size), np.uint64)
         whole = kind != "float32"
         self.span = np.zeros((2, *(size if whole else (0, 0))), np.int64)
-        self.has_sums, self.partial = whole, False
-        self.wide: Wide | None = None
+        self.has_sums = whole
+        self.wide: Words | None = None
+        self.written = np.zeros(0, bool)
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """All that it holds."""
-        wide = () if self.wide is None else (self.wide.shape, self.wide.written)
-        return self.state, self.lanes, self.shape, self.sums, self.span, *wide
+        return (
+            self.state,
+            self.lanes,
+            self.shape,
+            self.sums,
+            self.span,
+            *(() if self.wide is None else (self.wide, self.written)),
+        )
 
     def at(self, place: Any, width: int, turns: Turns, active: NDArray[np.bool_] | None) -> Any:
         """Return rows and columns of an access: slices, or (width, turns); place 0 if not active."""
@@ -149,16 +143,18 @@ class Cells:
             return rows, 0
         return rows, np.arange(turns.count) // (turns.count // self.columns)
 
-    def load(self, place: Any, width: int, turns: Turns, active: Any, reader: Reader) -> Term:
-        """Return numbers that have been written, in the lanes that run."""
+    def load(self, place: Any, width: int, turns: Turns, active: Any, fold: Fold, lanes: int = 0) -> Term:
+        """Return numbers that have been written, for the lanes of a number."""
         at = self.at(place, width, turns, active)
         if self.wide is not None and (self.state[at] == WIDE).any():
-            self._settle(at, turns, active, reader)
+            self._settle(at, turns, active, fold)
         state = self.state[at]
-        if not state.all() or self.partial:
-            bad = (state == EMPTY) | ~reader.readable(self.lanes[at])
-            if (bad if active is None else bad & active).any():
-                raise Wrong(f"{self.name} is read before it is written")
+        bad = state == EMPTY
+        for number in {*np.unique(self.lanes[at]).tolist()} - {0, lanes} if len(self.masks) > 1 else ():
+            if not (self.masks[number] | ~self.masks[lanes]).all():
+                bad |= self.lanes[at] == number
+        if (bad if active is None else bad & active).any():
+            raise Wrong(f"{self.name} is read before it is written")
         if self.columns < turns.count:
             self._reads(at, turns, active)
         shape = self.shape[at]
@@ -185,8 +181,8 @@ class Cells:
             shape, low, high = shape[:, None], low[:, None], high[:, None]
         return Term(shape.copy(), sums, kind=self.kind, span=(low, high))
 
-    def _settle(self, at: Any, turns: Turns, active: Any, reader: Reader) -> None:
-        """Fold what each lane has written for itself: all that count must have."""
+    def _settle(self, at: Any, turns: Turns, active: Any, fold: Fold) -> None:
+        """Fold what each lane has written for itself."""
         assert self.wide is not None
         if turns.undoes:
             turns.save(self)
@@ -194,14 +190,14 @@ class Cells:
         columns = np.broadcast_to(columns, rows.shape)
         own = self.state[rows, columns] == WIDE
         at = rows[own], columns[own]
-        if not reader.complete(self.wide.written[at]):
-            raise Wrong(f"{self.name} is read before it is written")
-        shape = np.ascontiguousarray(self.wide.shape[at].T)
+        if not self.written[at].all():
+            raise Wrong(f"{self.name} is read before it is written, in some lanes")
+        shape = np.ascontiguousarray(self.wide[at].T)
         term = Term(shape)
         if self.kind != "float32":
             span = self.span[0][at][None], self.span[1][at][None]
             term = Term(shape, self.sums[:, at[0], at[1]][:, None], kind=self.kind, span=span, leaf=shape)
-        term = reader.folded(term)
+        term = fold(term)
         if self.kind != "float32":
             assert term.sums is not None
             self.sums[:, at[0], at[1]] = term.sums[:, 0]
@@ -212,7 +208,6 @@ class Cells:
         at = self.at(place, width, turns, active)
         if turns.undoes:
             turns.save(self)
-        self.partial |= lanes > 0
         keep: Any = None
         if self.columns < turns.count or active is not None:
             rows, columns, keep = self._kept(at, turns, active)
@@ -237,13 +232,19 @@ class Cells:
             for end in (0, 1):
                 self.span[end][at] = own(value.span[end], 0)
 
-    def store_wide(self, place: Any, width: int, value: Term, turns: Turns, active: Any, mask: Any) -> None:
-        """Write numbers of an image in some lanes (lanes, turns)."""
+    def store_wide(
+        self, place: Any, width: int, value: Term, turns: Turns, active: Any, mask: Any, others: Any
+    ) -> None:
+        """Write numbers of an image in lanes (lanes, turns): in all, or those that all have written.
+
+        `others`: lanes that only look at what is written, and write the same later; or None.
+        """
         rows, columns, keep = self._kept(self.at(place, width, turns, active), turns, active, apart=True)
         if turns.undoes:
             turns.save(self)
         if self.wide is None:
-            self.wide = Wide((self.count, self.columns, len(mask)))
+            size = self.count, self.columns, len(mask)
+            self.wide, self.written = np.zeros(size, np.uint64), np.zeros(size, bool)
         shape = value.shape if self.kind == "float32" else value.leaf
         if shape is None:
             raise Unread("integers, in some lanes, that are not an image's")
@@ -253,12 +254,18 @@ class Cells:
             return np.broadcast_to(np.swapaxes(values, -1, -2), (*keep.shape, len(mask)))[keep]
 
         at = rows[keep], columns[keep]
-        where, fresh = own(np.broadcast_to(mask, (len(mask), turns.count))), self.state[at] != WIDE
-        self.wide.written[at] = np.where(fresh[:, None], where, self.wide.written[at] | where)
-        self.wide.shape[at] = np.where(where, own(shape), self.wide.shape[at])
+        where, new = own(np.broadcast_to(mask, (len(mask), turns.count))), own(shape)
+        really = where if others is None else where & ~own(np.broadcast_to(others, mask.shape))
+        whole, fresh = where.all(axis=1), self.state[at] != WIDE
+        if (fresh & ~whole).any():
+            raise Wrong(f"{self.name} is read before it is written, in some lanes")
+        if (~whole[:, None] & where & (self.wide[at] != new)).any():
+            raise Wrong(f"{self.name} has another number far from borders than near them")
+        self.wide[at] = np.where(whole[:, None], new, self.wide[at])
         self.state[at], self.lanes[at] = WIDE, 0
+        self.written[at] = really | (self.written[at] & ~whole[:, None])
         if self.kind != "float32":
-            self._offset(at, fresh, value, keep)
+            self._offset(at, whole, value, keep)
 
     def _offset(self, at: Any, fresh: Any, value: Term, keep: Any) -> None:
         """Keep what integers of some lanes are more than an image's: the same in all lanes."""

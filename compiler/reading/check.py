@@ -83,7 +83,7 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         slots = max(of for of, _ in passes[0]) if passes else 1
         tiles = Tiles(held["spectra"], pixels, rows, window, bool(passes)) if "spectra" in held else None
         if tiles:
-            lanes = tile_lanes((pixels, rows), window, seed, bool(passes))
+            lanes = tile_lanes((pixels, rows), window, seed, beyond=bool(passes))
         elif group:
             lanes = group_lanes((group[0], group[1]), pixels, window, seed)
         else:

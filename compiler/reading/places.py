@@ -26,59 +26,56 @@ COMPARES: Mapping[str, Callable[[Any, Any], Any]] = {
 
 
 class Place:
-    """An integer `values` (lanes, turns), and the linear `form` (4, lanes, turns) of x, width, y and height.
+    """An integer `values` (lanes, turns) of one `axis`: 0 along a row, 1 along a column, None in a group.
 
-    The form has no constant, and is NaN where the integer is not linear.
+    `form` (2, lanes, turns): how often the coordinate and the extent of that axis go into it.
     """
 
-    def __init__(self, values: NDArray[np.int64], form: NDArray[np.float64]) -> None:
-        self.values, self.form = values, form
+    def __init__(self, values: NDArray[np.int64], form: NDArray[np.int64], axis: int | None) -> None:
+        self.values, self.form, self.axis = values, form, axis
 
     @classmethod
     def inside(cls, lanes: Lanes, axis: int) -> Place:
         """Return the place of an item in its group."""
         assert lanes.inside is not None
-        return cls(lanes.inside[axis][:, None], np.zeros((4, 1, 1)))
+        return cls(lanes.inside[axis][:, None], NOTHING, None)
 
     @classmethod
-    def of(cls, lanes: Lanes, axis: int) -> Place:
+    def of(cls, lanes: Lanes, number: int) -> Place:
         """Return x, width, y or height."""
-        return cls(lanes.known[axis][:, None], np.eye(4)[axis].reshape(4, 1, 1))
+        form = np.eye(2, dtype=np.int64)[number % 2]
+        return cls(lanes.known[number][:, None], form.reshape(2, 1, 1), number // 2)
 
     @staticmethod
-    def values_of(value: Any) -> NDArray[np.int64]:
-        """Return the values of any integer."""
-        return value.values if isinstance(value, Place) else np.asarray(value, dtype=np.int64).reshape(1, -1)
-
-    @staticmethod
-    def form_of(value: Any) -> NDArray[np.float64]:
-        """Return the form of any integer."""
-        return value.form if isinstance(value, Place) else np.zeros((4, 1, 1))
+    def values_of(value: Any, axis: int | None = None) -> NDArray[np.int64]:
+        """Return the values of any integer: `Wrong` for a coordinate of another axis."""
+        if isinstance(value, Place):
+            if value.axis not in (None, axis):
+                raise Wrong("an index, or a row or a column, has a coordinate of another axis")
+            return value.values
+        return np.asarray(value, dtype=np.int64).reshape(1, -1)
 
     def each(self, _: Any, two: Any) -> Place:
         """Return a place of changed arrays."""
-        return Place(two(self.values), two(self.form))
+        return Place(two(self.values), two(self.form), self.axis)
 
     @classmethod
     def operated(cls, lanes: Lanes, what: str, a: Any, b: Any, mask: Any) -> Place:
         """Return what arithmetic makes of two integers: `Wrong` for one that may not fit 32 bits."""
-        (va, fa), (vb, fb) = ((cls.values_of(each), cls.form_of(each)) for each in (a, b))
+        (va, fa), (vb, fb), axis = _both(a, b)
         if what in ("minimum", "maximum"):
             first = cls.compared(lanes, "less_equal" if what == "minimum" else "greater_equal", a, b, mask)
-            return chosen(lanes, first, a, b)  # type: ignore[no-any-return]
-        if what in ("add", "subtract"):
+            found = cls(np.where(first, va, vb), np.where(first, fa, fb), axis)
+        elif what in ("add", "subtract"):
             sign = 1 if what == "add" else -1
-            found = cls(va + sign * vb, fa + sign * fb)
-        elif what == "multiply":
-            both = isinstance(a, Place) and isinstance(b, Place)
-            form = np.full((4, 1, 1), np.nan) if both else fa * vb if isinstance(a, Place) else fb * va
-            near = np.round(form)
-            found = cls(va * vb, np.where(np.abs(form - near) < 1e-9, near, form))
+            found = cls(va + sign * vb, fa + sign * fb, axis)
+        elif what == "multiply" and not (isinstance(a, Place) and isinstance(b, Place)):
+            found = cls(va * vb, fa * vb + fb * va, axis)
         elif what in ("divide", "remainder") and type(b) is int and not fa.any():
             bad = va < 0
             if b <= 0 or (bad if mask is None else bad & mask).any():
                 raise Wrong("it divides a negative integer, or by one")
-            found = cls(va // b if what == "divide" else va % b, fa)
+            found = cls(va // b if what == "divide" else va % b, fa, axis)
         else:
             raise Unread(f"{what} of coordinates")
         if max(-found.values.min(), found.values.max()) > lanes.least:
@@ -92,37 +89,42 @@ class Place:
     @classmethod
     def compared(cls, lanes: Lanes, what: str, a: Any, b: Any, mask: Any) -> NDArray[np.bool_]:
         """Return a comparison (lanes, turns): `Wrong` unless lanes decide its sign."""
-        values = cls.values_of(a) - cls.values_of(b)
-        form = cls.form_of(a) - cls.form_of(b)
-        known = lanes.known[:, :, None]
+        (va, fa), (vb, fb), axis = _both(a, b)
+        values, (own, extent) = va - vb, fa - fb
 
         def refuse(bad: Any, why: str) -> None:
             if np.any(bad if mask is None else np.logical_and(bad, mask)):
                 raise Wrong(why)
 
-        one_axis = (form[:2] == 0).all(axis=0) | (form[2:] == 0).all(axis=0)
-        plain = np.isin(form, (-1, 0, 1)).all(axis=0) & (form[0] * form[1] <= 0) & (form[2] * form[3] <= 0)
-        refuse(~(one_axis & plain), "it compares coordinates in a way that no lane decides")
-        rest = values - (np.nan_to_num(form) * known).sum(axis=0)
-        for axis, cap in enumerate(lanes.caps):
-            own, extent = form[2 * axis : 2 * axis + 2]
+        if axis is not None:
+            plain = (np.abs(own) <= 1) & (np.abs(extent) <= 1) & (own * extent <= 0)
+            refuse(~plain, "it compares coordinates in a way that no lane decides")
+            at, size = (lanes.known[2 * axis + k][:, None] for k in (0, 1))
+            rest, cap = values - own * at - extent * size, lanes.caps[axis]
             there = (own != 0) | (extent != 0)
             refuse(there & (np.abs(rest) > cap), f"it compares a coordinate with a constant beyond {cap}")
-            alone = rest * (own + extent) * (own * extent == 0)
             if lanes.steps:
+                alone = rest * (own + extent) * (own * extent == 0)
                 why = "it compares a coordinate with a constant as large as a group"
                 refuse(alone <= -lanes.steps[axis], why)
         found: NDArray[np.bool_] = COMPARES[what](values, 0)
         return found
 
 
-def chosen(lanes: Lanes, where: NDArray[np.bool_], a: Any, b: Any) -> Any:
-    """Return integer a in some lanes and turns, and b in the others."""
-    va, vb = Place.values_of(a), Place.values_of(b)
-    if where.shape[0] == 1 and not isinstance(a, Place) and not isinstance(b, Place):
-        return np.where(where, va, vb)
-    form = np.where(where, Place.form_of(a), Place.form_of(b))
-    return Place(np.where(where, va, vb), form)
+NOTHING: NDArray[np.int64] = np.zeros((2, 1, 1), np.int64)
+"""The form of an integer that no coordinate goes into."""
+
+
+def _both(a: Any, b: Any) -> tuple[tuple[Any, Any], tuple[Any, Any], int | None]:
+    """Return values and forms of two integers, and their axis."""
+    axes = {each.axis for each in (a, b) if isinstance(each, Place)} - {None}
+    if len(axes) > 1:
+        raise Wrong("it compares, or adds up, coordinates of both axes")
+    axis = axes.pop() if axes else None
+    pairs = [
+        (Place.values_of(each, axis), each.form if isinstance(each, Place) else NOTHING) for each in (a, b)
+    ]
+    return pairs[0], pairs[1], axis
 
 
 def indices(what: str, a: Any, b: Any, wrong: Callable[[Any, str], None]) -> Any:

@@ -256,25 +256,10 @@ def compared(what: str, a: Term, b: Term) -> Term:
 
 
 def chosen(where: NDArray[np.bool_], a: Term, b: Term) -> Term:
-    """Return a term in some lanes and turns, and another one in the others."""
-    if a.kind != b.kind or a.shape is None or b.shape is None:
-        raise Unread("a choice of sums on their way, or of numbers of several kinds")
-    if a.kind == "float32" and not (a.sums is b.sums is None):
-        raise Unread("a choice of sums on their way")
-    wide = where.shape[0] > 1
-    if wide and not a.is_wide and not b.is_wide:
-        raise Unread("a choice, by lanes, of numbers of all lanes")
-    shape = np.where(where, a.shape, b.shape)
-    sums: Words | None = None
-    leaf: Words | None = None
-    if a.kind != "float32" and a.span is not None and b.span is not None:
-        if (a.leaf is None) != (b.leaf is None) or (wide and not np.all(a.sums == b.sums)):
-            raise Unread("a choice, by lanes, of integers that are not an image's")
-        assert a.sums is not None
-        assert b.sums is not None
-        sums = a.sums if wide else np.where(where, a.sums, b.sums)
-        leaf = None if a.leaf is None or b.leaf is None else np.where(where, a.leaf, b.leaf)
-    return Term(shape, sums, kind=a.kind, span=hull(a.span, b.span), leaf=leaf)
+    """Return a number of an image in some lanes and turns, and 0 in the others."""
+    if where.shape[0] == 1 or not a.is_wide or a.kind != "float32" or b.literal != 0:
+        raise Unread("a choice, by lanes, of anything but a number of an image or 0")
+    return Term(np.where(where, a.known, b.known), span=hull(a.span, b.span))
 
 
 def hull(a: Span | None, b: Span | None) -> Span | None:

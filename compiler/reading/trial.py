@@ -41,7 +41,7 @@ from .claim import Claim
 from .field import Words, hashed
 from .integers import Stored
 from .lanes import Unread, Wrong
-from .places import Place, corner
+from .places import NOTHING, Place, corner
 from .terms import Term, constant
 from .values import Values
 
@@ -76,8 +76,9 @@ class Trial(Values):
         self.shared: list[Shared] = []
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
-        self.pixels: dict[tuple[int, int, str], Any] = {}
         self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
+        self.looking: NDArray[np.bool_] | None = None
+        self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
         self.start = self._start()
@@ -100,9 +101,12 @@ class Trial(Values):
         if self.lanes.inside is None or not self.kernel.group:
             return x, y
         local_x, local_y = Place.inside(self.lanes, 0), Place.inside(self.lanes, 1)
-        item = local_y.values * self.kernel.group[0] + local_x.values
-        self.names |= {"local_x": local_x, "local_y": local_y, "item": Place(item, local_x.form)}
-        return Place(x.values + local_x.values, x.form), Place(y.values + local_y.values, y.form)
+        item = Place(local_y.values * self.kernel.group[0] + local_x.values, NOTHING, None)
+        self.names |= {"local_x": local_x, "local_y": local_y, "item": item}
+        return (
+            Place(x.values + local_x.values, x.form, x.axis),
+            Place(y.values + local_y.values, y.form, y.axis),
+        )
 
     # ---- lanes and turns -----------------------------------------------------------------------------------
 
@@ -111,29 +115,13 @@ class Trial(Values):
         if self.mask is None or self.mask.shape[0] == 1:
             return 0
         lanes: NDArray[np.bool_] = np.asarray(self.mask.any(axis=1))
-        if self.mask.shape[1] > 1 and not np.array_equal(
-            self.mask & lanes[:, None], lanes[:, None] & self.mask.any(axis=0)
-        ):
-            raise Unread("numbers that some lanes write in some turns")
+        if (self.mask != (lanes[:, None] & self.mask.any(axis=0))).any():
+            raise Unread("numbers that some lanes write, or read, in some turns")
         for number, each in enumerate(self.masks):
             if np.array_equal(each, lanes):
                 return number
         self.masks.append(lanes)
         return len(self.masks) - 1
-
-    def readable(self, numbers: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return whether what these lanes have written is there for those that are active."""
-        good = np.ones(numbers.shape, bool)
-        for number in np.unique(numbers[numbers > 0]):
-            active = self.masks[0] if self.mask is None else self.mask.any(axis=1)
-            good &= (numbers != number) | bool((~active | self.masks[number]).all())
-        return good
-
-    def complete(self, written: NDArray[np.bool_]) -> bool:
-        """Return whether all lanes that count, or are active, have written."""
-        due: Any = self.claim.fold.factors.any(axis=1)
-        active = self.masks[0] if self.mask is None else self.mask.any(axis=1)
-        return bool((written | ~(due | active)).all())
 
     def _only(self, mask: NDArray[np.bool_], body: Body) -> None:
         """Run statements for some lanes and turns."""
@@ -160,7 +148,7 @@ class Trial(Values):
         if statement.space == "group":
             self.memory[statement.name] = self._share(statement.name, count, kind, sizes)
             return
-        cells = Cells(statement.name, count, self.turns.count, kind.dtype)
+        cells = Cells(statement.name, count, self.turns.count, kind.dtype, self.masks)
         self.memory[statement.name] = Slice(cells, 0, kind, sizes)
         if statement.value is not None:
             self._put(statement.name, (), kind, self.value(statement.value))
@@ -190,20 +178,27 @@ class Trial(Values):
 
     def _put(self, array: str, index: Sequence[Any], kind: Type, value: Any) -> None:
         if array == RESULT:
+            self._alike(array)
             self._result(index, value)
             return
         cells, place = self._place_of(array, index, kind)
         value = constant(value, kind.dtype) if type(value) is int else value
         if isinstance(cells, Shared) and isinstance(value, Term):
+            self._alike(array)
             cells.store(place, value, self.turns, self.mask)
             return
         if not isinstance(value, Term) or value.kind != cells.kind:
             raise Unread(f"anything but numbers of type {cells.kind} in {array}")
-        in_lanes = self.mask is not None and self.mask.shape[0] > 1
-        if in_lanes and (value.is_wide or (value.literal is not None and cells.kind == "float32")):
-            cells.store_wide(place, kind.lanes, value, self.turns, self.active, self.mask)
+        if self.mask is not None and value.is_wide and self.mask.shape[0] > 1:
+            cells.store_wide(place, kind.lanes, value, self.turns, self.active, self.mask, self.looking)
             return
+        self._alike(array)
         cells.store(place, kind.lanes, self.folded(value), self.turns, self.active, self._number())
+
+    def _alike(self, array: str) -> None:
+        """Refuse what is written near borders only, where all lanes look at it [`_run_if`]."""
+        if self.looking is not None:
+            raise Wrong(f"{array} is written near borders only")
 
     def _place_of(self, array: str, index: Sequence[Any], kind: Type) -> tuple[Any, Any]:
         """Return an array's memory, and the place of an element."""
@@ -280,14 +275,15 @@ class Trial(Values):
 
     def _at_once(self, loop: For, turns: range) -> bool:
         """Run all turns of a loop at once, if they have nothing to do with each other."""
-        outer, names, memory, mask, size = self.turns, self.names, self.memory, self.mask, dict(self.size)
+        outer, names, memory, size = self.turns, self.names, self.memory, dict(self.size)
+        lanes = self.mask, self.looking
         count, written = len(turns), self.written.copy() if _writes(loop) else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
         self.turns = Turns(outer.count * count, slot)
         self.turns.undoes, self.turns.ordered = True, outer.count == 1
         self.names = {key: _repeated(value, count) for key, value in names.items()}
         self.names[loop.name] = np.tile(np.array(turns, dtype=np.int64), outer.count)[None]
-        self.mask = _repeated(mask, count)
+        self.mask, self.looking = (_repeated(each, count) for each in lanes)
         self.memory = {key: _repeated(each, count) for key, each in memory.items()}
         try:
             self.body(loop.body)
@@ -301,16 +297,24 @@ class Trial(Values):
                 self.written = written
             return False
         finally:
-            self.turns, self.names, self.memory, self.mask = outer, names, memory, mask
+            self.turns, self.names, self.memory, (self.mask, self.looking) = outer, names, memory, lanes
 
     def _run_if(self, statement: If) -> None:
-        """Run each branch for the lanes and turns that take it."""
+        """Run each branch for the turns that take it.
+
+        Where lanes differ all of them look at what the second does; far from borders the first does the same.
+        """
         found = self._truth(self.value(statement.condition))
         if isinstance(found, bool):
             self.body(statement.body if found else statement.otherwise)
             return
+        if found.shape[0] == 1:
+            self._only(~found, statement.otherwise)
+        elif statement.otherwise:
+            outer, self.looking = self.looking, found if self.looking is None else found | self.looking
+            self._only(np.ones_like(found), statement.otherwise)
+            self.looking = outer
         self._only(found, statement.body)
-        self._only(~found, statement.otherwise)
 
     def _run_barrier(self, statement: Any) -> None:
         """Let all items of a group wait for each other."""
@@ -391,7 +395,7 @@ class Trial(Values):
         cells, place = self._place_of(array, index, kind)
         if isinstance(cells, Shared):
             return cells.load(place, self.mask)
-        return cells.load(place, kind.lanes, self.turns, self.active, self)
+        return cells.load(place, kind.lanes, self.turns, self.active, self.folded, self._number())
 
     def _of_weights(self, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of the file: of spectra no sums are made."""
@@ -425,7 +429,7 @@ class Trial(Values):
         key = id(row), id(column), array
         if key not in self.pixels:
             width, height = (self.lanes.known[axis][:, None] for axis in (1, 3))
-            rows, columns = (Place.values_of(each) for each in (row, column))
+            rows, columns = Place.values_of(row, 1), Place.values_of(column, 0)
             beyond = (rows < 0) | (rows >= height)
             found = beyond, (rows * width + columns) * channels, columns * channels, row, column
             self.pixels = {**dict([*self.pixels.items()][-3:]), key: found}
@@ -451,7 +455,9 @@ class Trial(Values):
         row, column, channel = index
         shape = self.lanes.count, self.turns.count
         x, y, width, height = (a[:, None] for a in (self.lanes.x, self.lanes.y, *self.lanes.known[1::2]))
-        rows, columns = (np.broadcast_to(Place.values_of(each), shape) for each in (row, column))
+        rows, columns = (
+            np.broadcast_to(Place.values_of(each, axis), shape) for axis, each in ((1, row), (0, column))
+        )
         channels = np.broadcast_to(self._plain(channel), (1, self.turns.count))[0]
         active = np.broadcast_to(True if self.mask is None else self.mask, shape)
         outside = (columns >= width) | (rows >= height) | (rows < 0) | (columns < 0)
@@ -471,6 +477,10 @@ class Trial(Values):
         found = np.broadcast_to(term.known, (1, self.turns.count))[0]
         slot = np.zeros(self.turns.count, int) if self.turns.slot is None else self.turns.slot
         at = tuple(a[there] for a in (slot, down_one * claim.pixels + across_one, channels))
+        if len({*zip(*(each.tolist() for each in at), strict=True)}) < len(at[0]):
+            raise Race
+        if (self.written[at] & active[:, there].T).any():
+            raise Wrong("a channel of the result is written twice")
         if not np.array_equal(self.outputs[at], found[there]):
             missing = claim.missing()
             why = f": {missing} are never made" if missing else ", though all its sums are made"

@@ -21,9 +21,8 @@ from .cells import Tile, Turns
 from .claim import COMMUTE, Claim, renamed, word_of
 from .field import P, hashed
 from .lanes import Unread, Wrong
-from .places import COMPARES, Place, chosen, indices
-from .terms import Term, compared, constant, expression, operate, select, stacked
-from .terms import chosen as chosen_term
+from .places import COMPARES, Place, indices
+from .terms import Term, chosen, compared, constant, expression, operate, select, stacked
 
 EVALUATED = (
     "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
@@ -104,8 +103,12 @@ class Values(Runner):
         if isinstance(a, Tile) or isinstance(b, Tile):
             return Tile.operated(what, a, b, self.tile_count, self.claim.fold.slots)
         if isinstance(a, Place) or isinstance(b, Place):
-            made = Place.compared if what in COMPARES else Place.operated
-            return made(self.lanes, what, a, b, self.mask)
+            if what not in COMPARES:
+                return Place.operated(self.lanes, what, a, b, self.mask)
+            found = Place.compared(self.lanes, what, a, b, self.mask)
+            if not self.lanes.far(found if self.mask is None else found & self.mask):
+                raise Wrong("a condition on coordinates holds near a border only")
+            return found
         return indices(what, a, b, self._wrong)
 
     def _of_terms(self, what: str, *terms: Term) -> Term:
@@ -181,7 +184,11 @@ class Values(Runner):
         where = self._truth(where)
         if isinstance(where, bool):
             return a if where else b
-        return chosen_term(where, a, b) if isinstance(a, Term) else chosen(self.lanes, where, a, b)
+        if isinstance(a, Term):
+            return chosen(where, a, b)
+        if where.shape[0] > 1 or isinstance(a, Place | Tile) or isinstance(b, Place | Tile):
+            raise Unread("a choice of coordinates, or by them")
+        return np.where(where, a, b)
 
     def _value_logical_and(self, value: Expr) -> Any:
         """Return whether both hold; the second is not asked where the first does not."""
@@ -198,12 +205,18 @@ class Values(Runner):
         b = self._truth(self.value(value.args[1]))
         if isinstance(a, bool):
             return b
-        return np.logical_and(a, b) if both else np.logical_or(a, b)
+        return np.logical_and(a, b) if both else np.logical_or(self._shared(a), self._shared(b))
 
     def _value_logical_not(self, value: Expr) -> Any:
         """Return whether something does not hold."""
-        found = self._truth(self.value(value.args[0]))
+        found = self._shared(self._truth(self.value(value.args[0])))
         return not found if isinstance(found, bool) else ~found
+
+    def _shared(self, truth: Any) -> Any:
+        """Return what is true of all lanes: of a pixel's place only that it is far from borders is asked."""
+        if isinstance(truth, np.ndarray) and truth.shape[0] > 1:
+            raise Unread("the opposite of a condition on coordinates, or one of two")
+        return truth
 
     def _value_component(self, value: Expr) -> Any:
         """Return one number of a vector."""

@@ -25,6 +25,11 @@ def plain(tmp_path_factory):
     return parts(kernel(tmp_path_factory.mktemp("plain"), "opencl"))
 
 
+@pytest.fixture(scope="module")
+def tile(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("tile"), "opencl", "tile:8"))
+
+
 @pytest.mark.parametrize("target", sorted(TITLES))
 @pytest.mark.parametrize(("size", "border"), [(3, "zero"), (4, "clamp")])
 def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
@@ -71,6 +76,32 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
 def test_faults_are_named(plain, old, new, why):
     with pytest.raises((Refused, Unread), match=why):
         run_text(*changed(plain, old, new))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("left + PATCH_WIDTH <= width && ", "", "beyond its ends"),
+        ("i < PATCH_WIDTH * 3; ++i", "i < PATCH_WIDTH * 3 - 1; ++i", "before it is written, in some lanes"),
+        ("dx < PATCH_WIDTH; ++dx", "dx < PATCH_WIDTH - 1; ++dx", "before it is written, in some lanes"),
+        ("+ left) * 3 + i]", "+ left) * 3 + 0]", "another number far from"),
+        ("+ dx * 3 + c] = inside", "+ dx * 3 + 2 - c] = inside", "another number far from"),
+        (
+            "    for (int dy = 0; dy < WINDOW",
+            "    float a[1]; if (within) { a[0] = 1.0f; } else { a[0] = 0.0f; } for (int dy = 0; dy < WINDOW",
+            "near borders only",
+        ),
+        (
+            "i < 3; ++i) {\n            result[(y * width + x + p) * 3 + i] ",
+            "i < 6; ++i) {\n            result[(y * width + x + p) * 3 + i % 3] ",
+            "written twice",
+        ),
+    ],
+)
+def test_both_branches_at_borders_do_the_same(tile, old, new, why):
+    """TXT-5: the branch near borders is run for all lanes, the other one for its own."""
+    with pytest.raises((Refused, Unread), match=why):
+        run_text(*changed(tile, old, new))
 
 
 def test_a_sum_in_another_order_is_accepted(plain):
@@ -135,10 +166,12 @@ def test_lanes_decide_what_may_be_compared():
         less(more(x, 5), 0)
     with pytest.raises(Wrong, match="beyond 2"):
         less(more(y, 3), 0)
-    with pytest.raises(Wrong, match="no lane decides"):
+    with pytest.raises(Wrong, match="both axes"):
         less(x, y)
     with pytest.raises(Wrong, match="no lane decides"):
-        less(Place(x.values * width.values, np.full((4, 1, 1), np.nan)), 3)
+        less(more(x, width), 3)
+    with pytest.raises(Unread, match="multiply of coordinates"):
+        Place.operated(lanes, "multiply", x, width, None)
 
 
 def test_lanes_have_every_case_of_an_axis():

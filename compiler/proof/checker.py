@@ -3,13 +3,14 @@
 1. The files beside it have the lengths that the manifest states and the digests that both state; the text
    and the weights make the program's [`evidence.read`].
 2. The text is that of a network of sines or rectifiers; anything else is refused [`_layers`].
-3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`_layer`]; each output: how far each
-   layer's errors reach, by norms that hold for the scalings in the certificate [`_output`]. Sums from
-   spectra have steps of their own [spectra_checker.py].
+3. Each layer: magnitudes, rounding of sums in parts, the sine's error [`layer_steps`]; each output: how far
+   each layer's errors reach, by norms for the scalings in the certificate [`output_steps`]. Sums from spectra
+   have steps of their own [spectra_checker.py].
 4. Elimination in integers proves that a matrix has a norm of at most N [`norm_is_below`].
    All other numbers are sums of magnitudes in float64, widened by more than it rounds.
 
-It shares no code with what wrote the certificate. Formulas: spec/certificate.md.
+It imports nothing of the compiler, which gets the numbers of its certificates from steps 2 and 3: these are
+the least that hold for the scalings that it has found. Formulas: spec/certificate.md.
 """
 
 from __future__ import annotations
@@ -41,37 +42,40 @@ def check(path: Path) -> dict[str, Any]:
             check_integers(held, text, arrays)
             same("manifest: bound", manifest["bound"]["output"], held["bound"]["output"])
             return held
-        layers, box = _layers(text)
+        layers, box = network_of(text)
         promise: Any = PROMISES.get(held["sine"]["text"])
         if promise is None or promise.domain != (held["sine"]["domain"] or np.inf):
             raise Refused("sine: nobody promises it")
         stated = manifest["sine"]
         same("sine", [stated["text"], stated["domain"]], [promise.text, held["sine"]["domain"]])
-        _at_least("manifest: error of the sine", [stated["error"]], [promise.error], exact=True)
-        _at_least("sine: error_bound", [held["sine"]["error_bound"]], [promise.error], exact=True)
+        _at_least("manifest: error of the sine", stated["error"], promise.error)
+        _at_least("sine: error_bound", held["sine"]["error_bound"], promise.error)
         same("layers", len(held["layers"]), len(layers))
-        matrices, own, tables, joint = [], [], None, {}
+        numbers = list(range(len(arrays[layers[-1]["weight"]])))
+        same("outputs", [o["output"] for o in held["outputs"]], numbers)
+        first, joint = None, []
         if "spectra" in held:
-            tables = Tables(held["spectra"], *_arrays(layers[0], arrays), raw, *box[:2])
-            joint = {o["output"]: _joint(tables, layers[0], o) for o in held["outputs"]}
-        for number, layer in enumerate(layers):
-            first = None if tables is None or number else (tables, *joint[0])
-            errors, box = _layer(
-                f"layer {number}", held["layers"][number], layer, box, arrays, promise, first
-            )
-            own.append(errors)
-            matrices.append(arrays[layer["weight"]] * (layer["scale"] or 1.0))
-        same("outputs", [o["output"] for o in held["outputs"]], list(range(len(own[-1]))))
-        found = [
-            _output(f"output {o['output']}", o, matrices[1:], own, joint.get(o["output"], (0.0,))[0])
-            for o in held["outputs"]
-        ]
-        _at_least("bound: output", held["bound"]["output"], found)
-        _at_least("manifest: bound", manifest["bound"]["output"], found)
+            tables = Tables(held["spectra"], *arrays_of(layers[0], arrays), raw, *box[:2])
+            joint = joint_steps(layers, held["outputs"], tables)
+            for output, added in zip(held["outputs"], joint, strict=True):
+                wanted = [up(step * WIDER) for step in added]
+                _at_least("spectra: step_bounds", output["spectra"]["step_bounds"], wanted)
+            first = tables, sum(joint[0]), np.array(held["outputs"][0]["scalings"][0], np.float64)
+        found, own = layer_steps(layers, box, arrays, promise, first)
+        for number, step in enumerate(found):
+            same(f"layer {number}: node", held["layers"][number]["node"], step.pop("node"))
+        outputs = output_steps(layers, arrays, own, held["outputs"], joint, by_elimination=True)
+        for name, steps in (("layer", found), ("output", outputs)):
+            for number, (stated, step) in enumerate(zip(held[f"{name}s"], steps, strict=True)):
+                for key, value in step.items():
+                    _at_least(f"{name} {number}: {key}", stated[key], value)
+        total = [step["error_bound"] for step in outputs]
+        _at_least("bound: output", held["bound"]["output"], total)
+        _at_least("manifest: bound", manifest["bound"]["output"], total)
         return held
 
 
-def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
+def network_of(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     """Return the layers of a network, first to last, and (low, high, parts) of its windows."""
     nodes = {int(m[1]): m for m in map(NODE.fullmatch, text.splitlines()) if m}
 
@@ -113,55 +117,57 @@ def _layers(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
     return layers, (low, high, parts if len(parts) > 1 else None)
 
 
-def _arrays(layer: Any, arrays: Any) -> tuple[Any, Any]:
+def arrays_of(layer: Any, arrays: Any) -> tuple[Any, Any]:
     """Return W and b of a layer."""
     weight = arrays[layer["weight"]]
     return weight, arrays[layer["bias"]] if "bias" in layer else np.zeros(len(weight))
 
 
-def _joint(tables: Tables, layer: Any, stated: Any) -> tuple[float, Any]:
-    """Return the bound of |s e| of an output's scalings, e what spectra add to arguments, and of each sum."""
-    after, scale = np.array(stated["scalings"][0], np.float64), abs(layer["scale"] or 1.0)
-    steps = tables.steps(np.array(stated["spectra"]["scalings"], np.float64), scale * after)
-    _at_least("spectra: step_bounds", stated["spectra"]["step_bounds"], np.array(steps) * WIDER)
-    return sum(steps), sum(steps) / (scale * after)
+def joint_steps(layers: Any, choices: Any, tables: Tables) -> list[list[float]]:
+    """Return for the scalings of each output what spectra add to |s e|, e the first layer's arguments."""
+    scale = abs(layers[0]["scale"] or 1.0)
+    pairs = [(choice["spectra"]["scalings"], choice["scalings"][0]) for choice in choices]
+    return [tables.steps(np.array(t, np.float64), scale * np.array(s, np.float64)) for t, s in pairs]
 
 
-def _layer(name: str, stated: Any, layer: Any, given: Any, arrays: Any, promise: Any, first: Any) -> Any:
-    """Check a layer's step; return what it adds to its numbers' errors (m,), and the next one's `given`.
+def layer_steps(layers: Any, box: Any, arrays: Any, promise: Any, first: Any = None) -> tuple[Any, Any]:
+    """Return the step of each layer, and what it adds to its numbers' errors (m,).
 
-    `first`: what spectra are, and how far they let each sum be off, of a layer whose sums come from them.
+    `first`: spectra from which the first layer's sums are, and the bound of |s e|, s some scalings (m,).
     """
-    low, high, parts = given
-    (weight, bias), scale = _arrays(layer, arrays), abs(layer["scale"] or 1.0)
-    own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
-    largest = np.maximum(-low, high)
-    own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
-    sizes, more = np.abs(weight) @ (largest + TINY) + np.abs(bias), 0.0
-    slack = 2.0**-40 * sizes
-    if first:
-        tables, _, more = first
-        own = tables.last(sizes, more)
-        sizes = tables.most() + 2 * (sizes + more)
-    ends = np.stack([least, most]) + np.outer([-1, 1], own + more + slack)
-    reach = np.abs(ends).max(axis=0)
-    if layer["scale"] is not None:
-        rounded = U * scale * reach + 2 * TINY
-        ends = np.sort(layer["scale"] * ends, axis=0) + np.outer([-1, 1], rounded)
-        own, reach = scale * own + rounded, scale * reach
-    same(f"{name}: node", stated["node"], layer["node"])
-    size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
-    sine = layer["end"] == "sin"
-    if size >= 3.4e38 or (sine and not argument <= promise.domain):
-        raise Refused(f"{name}: numbers up to {size:.3g}, arguments up to {argument:.6g} of a sine")
-    errors = (own + (promise.error if sine else 0.0) + (2 * TINY if layer["end"] else 0.0)) * WIDER
-    _at_least(f"{name}: size_bound", [stated["size_bound"]], [size])
-    _at_least(f"{name}: argument_bound", [stated["argument_bound"]], [argument])
-    _at_least(f"{name}: rounding_bound", stated["rounding_bound"], own * WIDER)
-    _at_least(f"{name}: error_bound", stated["error_bound"], errors)
-    if sine:
-        ends = np.outer([-1, 1], np.full(len(own), 1 + promise.error + TINY))
-    return errors, (*np.maximum(ends, layer["floor"]), None)
+    (low, high, parts), steps, every = box, list[dict[str, Any]](), []
+    for layer in layers:
+        (weight, bias), scale = arrays_of(layer, arrays), abs(layer["scale"] or 1.0)
+        own, least, most = _sum(weight, bias, low - TINY, high + TINY, parts)
+        largest = np.maximum(-low, high)
+        own = own + TINY * (np.abs(weight).sum(axis=1) + largest.sum() + 4 * (len(low) + 1))
+        sizes, more = np.abs(weight) @ (largest + TINY) + np.abs(bias), 0.0
+        slack = 2.0**-40 * sizes
+        if first:
+            (tables, joint, after), first = first, None
+            more = joint / (scale * after)
+            own = tables.last(sizes, more)
+            sizes = tables.most() + 2 * (sizes + more)
+        ends = np.stack([least, most]) + np.outer([-1, 1], own + more + slack)
+        reach = np.abs(ends).max(axis=0)
+        if layer["scale"] is not None:
+            rounded = U * scale * reach + 2 * TINY
+            ends = np.sort(layer["scale"] * ends, axis=0) + np.outer([-1, 1], rounded)
+            own, reach = scale * own + rounded, scale * reach
+        size, argument = sizes.max() * max(scale, 1.0) * (1 + 2.0**-10), reach.max() * (1 + 2.0**-20)
+        sine = layer["end"] == "sin"
+        if not size < 3.4e38 or (sine and not argument <= promise.domain):
+            why = f"numbers up to {size:.3g}, arguments up to {argument:.6g} of a sine"
+            raise Refused(f"layer {len(steps)}: {why}")
+        errors = (own + (promise.error if sine else 0.0) + (2 * TINY if layer["end"] else 0.0)) * WIDER
+        step = {"node": layer["node"], "size_bound": up(size), "argument_bound": up(argument)}
+        bounds = {"rounding_bound": [*map(up, own * WIDER)], "error_bound": [*map(up, errors)]}
+        steps.append({**step, **bounds})
+        every.append(errors)
+        if sine:
+            ends = np.outer([-1, 1], np.full(len(own), 1 + promise.error + TINY))
+        (low, high), parts = np.maximum(ends, layer["floor"]), None
+    return steps, every
 
 
 def _sum(weight: Any, bias: Any, low: Any, high: Any, parts: Any) -> tuple[Any, Any, Any]:
@@ -174,9 +180,8 @@ def _sum(weight: Any, bias: Any, low: Any, high: Any, parts: Any) -> tuple[Any, 
     least = np.stack([*(least for _, least, _ in found), bias], axis=1)
     most = np.stack([*(most for _, _, most in found), bias], axis=1)
     sizes, n = np.maximum(-least, most), len(parts) + 1
-    cap = np.maximum(np.maximum(most, 0).sum(axis=1), np.maximum(-least, 0).sum(axis=1))
     off = n * U / (1 - n * U) * (sizes.sum(axis=1) + own) + own
-    return own + U * (_additions(sizes, cap) + n * off), least.sum(axis=1), most.sum(axis=1)
+    return own + U * (_additions(least, most) + n * off), least.sum(axis=1), most.sum(axis=1)
 
 
 def _part(weight: Any, low: Any, high: Any, products: int) -> tuple[Any, Any, Any]:
@@ -184,49 +189,51 @@ def _part(weight: Any, low: Any, high: Any, products: int) -> tuple[Any, Any, An
     ends = np.stack([weight * low, weight * high])
     least, most, n = ends.min(axis=0), ends.max(axis=0), weight.shape[1]
     sizes = np.maximum(-least, most)
-    cap = np.maximum(np.maximum(most, 0).sum(axis=1), np.maximum(-least, 0).sum(axis=1))
     whole, rounded = sizes.sum(axis=1), sizes[:, :products].sum(axis=1)
-    error = U * (_additions(sizes, cap) + rounded + n * (n * U / (1 - n * U)) * whole)
+    error = U * (_additions(least, most) + rounded + n * (n * U / (1 - n * U)) * whole)
     return error, least.sum(axis=1) - 2.0**-40 * whole, most.sum(axis=1) + 2.0**-40 * whole
 
 
-def _additions(sizes: Any, cap: Any) -> Any:
-    """Return how large all additions of terms (m, n) are together, in any tree; no sum is above cap (m,)."""
-    largest = np.cumsum(np.sort(sizes, axis=1)[:, ::-1], axis=1)[:, 1:]
+def _additions(least: Any, most: Any) -> Any:
+    """Return how large all additions of terms (m, n) are together, in any tree; no sum is above the cap."""
+    cap = np.maximum(np.maximum(most, 0).sum(axis=1), np.maximum(-least, 0).sum(axis=1))
+    largest = np.cumsum(np.sort(np.maximum(-least, most), axis=1)[:, ::-1], axis=1)[:, 1:]
     return np.minimum(largest, cap[:, None]).sum(axis=1)
 
 
-def _output(name: str, stated: Any, matrices: Any, own: Any, joint: float) -> float:
-    """Check the step of one output: how far each layer's errors reach; return its bound.
+def output_steps(
+    layers: Any, arrays: Any, own: Any, choices: Any, joint: Any = (), by_elimination: bool = False
+) -> list[dict[str, Any]]:
+    """Return the step of each output for its scalings: how far each layer's errors reach it.
 
-    `joint`: the bound of |s_1 e|, e being what spectra add to the first layer's arguments.
+    `joint`: what spectra add, for each. `by_elimination`: and prove that each norm is below its bound.
     """
-    scales = [np.array(scale, np.float64) for scale in stated["scalings"]]
-    row, last = matrices[-1][stated["output"]], float(own[-1][stated["output"]])
-    same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
-    if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in scales):
-        raise Refused(f"{name}: scalings must be positive numbers")
-    short, sizes, found = float(np.linalg.norm(row / scales[-1])), np.abs(row), [last]
-    for at in range(len(scales) - 1, -1, -1):
-        by_norms = short * float(np.linalg.norm(scales[at] * own[at]))
-        if joint and not at:  # which is known of all neurons together only
-            found.insert(0, (by_norms + short * joint) * WIDER)
-        else:
-            found.insert(0, min(by_norms, float(sizes @ own[at])) * WIDER)
-        if at:
-            before, after, matrix = scales[at - 1], scales[at], matrices[at - 1]
-            scaled = after[:, None] * matrix / before
-            if not np.isfinite(scaled).all():  # LAPACK would print a complaint of its own
-                raise Refused(f"{name}: layer {at}, scaled, is not finite")
-            norm = _up(float(np.linalg.norm(scaled, 2)) * (1 + 1e-9))
-            _at_least(f"{name}: norm of layer {at}", [stated["norm_bounds"][at - 1]], [norm], exact=True)
-            if not norm_is_below(norm, after, matrix, before):
-                raise Refused(f"{name}: the norm of layer {at} is not below {norm}")
-            short, sizes = short * norm, sizes @ np.abs(matrix)
-    same(f"{name}: number of norms", len(stated["norm_bounds"]), len(scales) - 1)
-    _at_least(f"{name}: layer_bounds", stated["layer_bounds"], found)
-    _at_least(f"{name}: error_bound", [stated["error_bound"]], [total := (sum(found) + TINY) * WIDER])
-    return total
+    matrices = [arrays[layer["weight"]] * (layer["scale"] or 1.0) for layer in layers[1:]]
+    found = []
+    for choice, more in zip(choices, joint or [[]] * len(choices), strict=True):
+        name, scales = f"output {choice['output']}", [np.array(s, np.float64) for s in choice["scalings"]]
+        same(f"{name}: sizes of scalings", [s.shape for s in scales], [e.shape for e in own[:-1]])
+        if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in scales):
+            raise Refused(f"{name}: scalings must be positive numbers")
+        row, reaches = matrices[-1][choice["output"]], [float(own[-1][choice["output"]])]
+        norms: list[float] = []
+        short, sizes = float(np.linalg.norm(row / scales[-1])), np.abs(row)
+        for at in range(len(scales) - 1, -1, -1):
+            joined = 0.0 if at else sum(more)  # which is known of all neurons together only
+            by_norms = short * (float(np.linalg.norm(scales[at] * own[at])) + joined)
+            reaches.insert(0, (by_norms if joined else min(by_norms, float(sizes @ own[at]))) * WIDER)
+            if at:
+                before, after, matrix = scales[at - 1], scales[at], matrices[at - 1]
+                scaled = after[:, None] * matrix / before
+                if not np.isfinite(scaled).all():  # LAPACK would print a complaint of its own
+                    raise Refused(f"{name}: layer {at}, scaled, is not finite")
+                norms.insert(0, up(float(np.linalg.norm(scaled, 2)) * (1 + 1e-9)))
+                if by_elimination and not norm_is_below(norms[0], after, matrix, before):
+                    raise Refused(f"{name}: the norm of layer {at} is not below {norms[0]}")
+                short, sizes = short * norms[0], sizes @ np.abs(matrix)
+        bounds = {"layer_bounds": [*map(up, reaches)], "error_bound": up((sum(reaches) + TINY) * WIDER)}
+        found.append({"norm_bounds": norms, **bounds})
+    return found
 
 
 def norm_is_below(norm: float, after: Any, matrix: Any, before: Any) -> bool:
@@ -253,15 +260,16 @@ def norm_is_below(norm: float, after: Any, matrix: Any, before: Any) -> bool:
     return True
 
 
-def _up(value: float) -> float:
+def up(value: float) -> float:
     """Round up to four significant decimal digits."""
-    exact = Decimal(value)
+    exact = Decimal(float(value))
     return float(exact.quantize(Decimal(1).scaleb(exact.adjusted() - 3), ROUND_CEILING)) if value else 0.0
 
 
-def _at_least(step: str, stated: Any, found: Any, exact: bool = False) -> None:
-    """Refuse numbers that are below those found, these rounded up as a certificate's are."""
-    for value, wanted in zip(stated, found, strict=True):
-        least = float(wanted) if exact else _up(float(wanted))
+def _at_least(step: str, stated: Any, found: Any) -> None:
+    """Refuse a number, or one of several, that is below what has been found."""
+    pair = (stated, found) if isinstance(found, list) else ([stated], [found])
+    same(f"{step}: how many", len(pair[0]), len(pair[1]))
+    for value, least in zip(*pair, strict=True):
         if type(value) not in (int, float) or not least <= value <= 1e308:
             raise Refused(f"{step} is {value!r}: it must be a number, at least {least!r}")

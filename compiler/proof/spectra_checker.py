@@ -1,11 +1,15 @@
 """Check what a certificate says of sums over a window from spectra: derive every number again.
 
-The formulas are those of spec/fourier.md, FOU-5 to FOU-7, and spec/certificate.md, CER-7. It shares no code
-with what wrote the certificate [spectra.py].
+The formulas are those of spec/fourier.md, FOU-5 to FOU-7, and spec/certificate.md, CER-7.
 
 1. The kernel's spectra and bias are read from its weights and held against W, b and the centres [`Tables`].
-2. The coefficients of u of a transform, layer by layer [`_layers`].
+2. The coefficients of u of a transform, layer by layer [`layers`].
 3. What the transforms, spectra and products add, for a certificate's scalings [`Tables.steps`].
+
+One error of rounding is at most u times a number on the way. What it does to the sums of a pixel is a linear
+map of what follows, so errors of one step reach them as at most a norm times the norm of the step's numbers,
+and that norm is known of any tile: its energy, by Parseval's equation. Sums over disjoint frequencies F are
+at most M |x|, M^2 the sum of all |W(f)|^2. Neurons that share a complex image count with the larger scaling.
 """
 
 from __future__ import annotations
@@ -23,8 +27,8 @@ AGAIN, UNDERFLOW = 1 + 2.0**-16, 2.0**-90
 """A factor for errors of errors, and what underflow adds less than."""
 
 
-def _layers(n: int) -> Any:
-    """Return the squares of the coefficients (L, n): those of each number's operations, largest first."""
+def layers(n: int) -> Any:
+    """Return the coefficients of u (L, n) of a transform: of each number's operations, the largest first."""
 
     def operations(index: int, n: int) -> list[float]:
         if n <= 2:
@@ -36,10 +40,10 @@ def _layers(n: int) -> Any:
 
     found = [sorted(operations(index, n), reverse=True) for index in range(n)]
     depth = max(map(len, found))
-    return np.array([line + [0.0] * (depth - len(line)) for line in found]).T ** 2
+    return np.array([line + [0.0] * (depth - len(line)) for line in found]).T
 
 
-def _norms(matrices: Any) -> Any:
+def norms(matrices: Any) -> Any:
     """Return squares of what is above the norms of matrices (..., m, n): the trace of (A* A)^64, its root."""
     if matrices.shape[-2] < matrices.shape[-1]:
         matrices = np.swapaxes(matrices, -1, -2)
@@ -54,7 +58,10 @@ def _norms(matrices: Any) -> Any:
 
 
 class Tables:
-    """What a kernel holds of a layer W x + b, and of its windows in [low, high]; `raw` are its weights."""
+    """What a kernel holds of a layer W x + b, and of its windows in [low, high].
+
+    `raw`: its weights, or the spectra (N, N / 2 + 1, D_out, C) and the bias (D_out,) that they hold.
+    """
 
     def __init__(self, held: Any, weight: Any, bias: Any, raw: Any, low: Any, high: Any) -> None:
         self.n, self.lanes, self.block = (held[name] for name in ("points", "lanes", "block"))
@@ -73,11 +80,20 @@ class Tables:
         first = np.arange(max(len(weight) - self.lanes, 0))
         first = first[first // self.lanes % 2 == 0]
         self.both = self.order[np.stack([first, first + self.lanes])]
-        self._read(held["table"], raw)
-        self.shift = self._shift(held["bias"], bias, raw)
+        taps = weight.reshape(len(weight), self.size, self.size, channels)
+        wave = np.exp(2j * np.pi / self.n * (np.outer(np.arange(self.n), np.arange(self.size)) % self.n))
+        self.columns = np.einsum("kx,jyxc->jykc", wave, taps, optimize=True) / np.sqrt(self.n)
+        half = self.columns[:, :, : self.n // 2 + 1]
+        self.exact = np.einsum("fy,jykc->fkjc", wave, half, optimize=True) / np.sqrt(self.n)
+        table, added = raw if isinstance(raw, tuple) else self._read(held, bias, raw)
+        self.moved = np.abs(table - self.exact)
+        sizes = np.abs(weight).sum(axis=1) * np.abs(self.taps).max() + np.abs(bias)
+        off = len(self.taps) * 2.0**-52 * sizes if self.taps.any() else 0.0
+        self.shift = np.abs(added - (weight @ self.taps + bias)) + off
 
-    def _read(self, place: Any, raw: Any) -> None:
-        """Hold the kernel's spectra against those of W, both (D_out, N, N / 2 + 1, C) and divided by N."""
+    def _read(self, held: Any, bias: Any, raw: Any) -> tuple[Any, Any]:
+        """Return the kernel's spectra (N, N / 2 + 1, D_out, C), those of W, and what it adds to the sums."""
+        place, added = held["table"], np.zeros(len(bias))
         n, (count, channels) = self.n, (len(self.weight), len(self.centres))
         groups, pairs = -(-count // (2 * self.lanes)), -(-channels // 2)
         shape = [n // 2 + 1, groups, n, pairs, 2, 2, 2 * self.lanes]
@@ -86,30 +102,18 @@ class Tables:
         same("spectra: place in the weights", 0 <= place["offset"] < end <= len(raw), True)
         stored = raw[place["offset"] : end].reshape(shape).astype(np.float64)
         stored = (stored[..., 0, :] + 1j * stored[..., 1, :]) * 2 * n
-        taps = self.weight.reshape(count, self.size, self.size, channels)
-        wave = np.exp(2j * np.pi / n * (np.outer(np.arange(n), np.arange(self.size)) % n))
-        self.columns = np.einsum("kx,jyxc->jykc", wave, taps, optimize=True) / np.sqrt(n)
-        half = self.columns[:, :, : n // 2 + 1]
-        self.exact = np.einsum("fy,jykc->fkjc", wave, half, optimize=True) / np.sqrt(n)
         found = np.empty_like(self.exact)
         for at, neuron in enumerate(self.order):
             group, lane = divmod(at, 2 * self.lanes)
             one = stored[:, group, :, :, :, lane].transpose(1, 0, 3, 2).reshape(n, n // 2 + 1, -1)
             found[:, :, neuron] = one[..., :channels]
         same("spectra: real at 0 and N / 2", bool(found[:: n // 2, :: n // 2].imag.any()), False)
-        self.moved = np.abs(found - self.exact)
-
-    def _shift(self, place: Any, bias: Any, raw: Any) -> Any:
-        """Return how far the kernel's bias (D_out,) is from that of centred channels."""
-        if place is None:
+        if (at := held["bias"]) is None:
             same("spectra: centres without a bias", bool(self.centres.any() or bias.any()), False)
-            return np.zeros(len(bias))
-        same("spectra: place of the bias", 0 <= place <= len(raw) - len(bias), True)
-        found = np.empty(len(bias))
-        found[self.order] = raw[place:][: len(bias)]
-        sizes = np.abs(self.weight).sum(axis=1) * np.abs(self.taps).max() + np.abs(bias)
-        off = len(self.taps) * 2.0**-52 * sizes if self.taps.any() else 0.0
-        return np.abs(found - (self.weight @ self.taps + bias)) + off
+        else:
+            same("spectra: place of the bias", 0 <= at <= len(raw) - len(bias), True)
+            added[self.order] = raw[at:][: len(bias)]
+        return found, added
 
     def steps(self, before: Any, after: Any) -> list[float]:
         """Return what transforms forwards, spectra, products and transforms back add to |s e|."""
@@ -118,22 +122,22 @@ class Tables:
         same("spectra: number of scalings", [before.shape, after.shape], [(pairs,), (len(self.weight),)])
         if not all(np.isfinite(scale).all() and (scale > 0).all() for scale in (before, after)):
             raise Refused("spectra: scalings must be positive numbers")
-        scale, layers = before[np.arange(channels) % pairs], _layers(n)
+        scale, squared = before[np.arange(channels) % pairs], layers(n) ** 2
         sizes = n * self.radius * scale
-        energy, one = np.linalg.norm(sizes), np.sqrt(layers.mean(axis=1)).sum()
+        energy, one = np.linalg.norm(sizes), np.sqrt(squared.mean(axis=1)).sum()
         mirrored = np.where(np.arange(half + 1) % half == 0, 1.0, 2.0)
         bent = after[:, None] * self.exact / scale
         taps = after[:, None] * self.weight / np.tile(scale, self.size**2)
 
         def partial(chosen: list[int]) -> float:
-            largest = np.sqrt((_norms(bent[..., chosen]) * mirrored).sum())
+            largest = np.sqrt((norms(bent[..., chosen]) * mirrored).sum())
             return float(largest * np.linalg.norm(sizes[chosen]))
 
         centring = self.size / n if self.centres.any() else 0.0
-        forwards = U * AGAIN * np.sqrt(_norms(taps)) * energy * (one * (low + 1) + 1 + centring)
+        forwards = U * AGAIN * np.sqrt(norms(taps)) * energy * (one * (low + 1) + 1 + centring)
         forwards += UNDERFLOW * (1 + np.linalg.norm(taps)) * (1 + energy) * (1 + after.max())
         table = AGAIN * np.sqrt(2 * ((after[:, None] * self.moved / scale) ** 2).sum()) * energy
-        products = np.sqrt(2 * (_norms(np.abs(bent)) * mirrored).sum()) * energy
+        products = np.sqrt(2 * (norms(np.abs(bent)) * mirrored).sum()) * energy
         done: list[int] = []
         for first in range(0, pairs, self.block):
             images = range(first, min(first + self.block, pairs))
@@ -143,11 +147,11 @@ class Tables:
             done += chosen
         joint = after.copy()
         joint[self.both] = after[self.both].max(axis=0)
-        squares = _norms(joint[:, None] * self.exact / scale) * mirrored
+        squares = norms(joint[:, None] * self.exact / scale) * mirrored
         rows = (joint[:, None, None, None] * self.columns / scale).transpose(2, 0, 1, 3)
-        along = _norms(rows.reshape(n, len(joint), -1))
-        back = np.sqrt(squares.sum()) + np.sqrt(layers @ squares.sum(axis=1)).sum()
-        back += low * np.sqrt(layers @ along).sum()
+        along = norms(rows.reshape(n, len(joint), -1))
+        back = np.sqrt(squares.sum()) + np.sqrt(squared @ squares.sum(axis=1)).sum()
+        back += low * np.sqrt(squared @ along).sum()
         return [float(step) for step in (forwards, table, U * AGAIN * products, U * AGAIN * back * energy)]
 
     def last(self, sizes: Any, more: Any) -> Any:

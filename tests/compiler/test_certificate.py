@@ -208,6 +208,57 @@ def test_a_changed_step_of_spectra_is_refused_by_name(of_spectra, tmp_path, plac
         checker.check(tmp_path / NAME)
 
 
+def test_a_wrong_spectrum_in_the_weights_is_refused(of_spectra, tmp_path):
+    """One number of the table a thousandth off, all digests made to agree: its step is above its bound."""
+    held, manifest = certificate_of(of_spectra), json.loads((of_spectra.parent / "manifest.json").read_text())
+    raw = np.frombuffer((of_spectra.parent / "weights.bin").read_bytes(), "<f4").copy()
+    table = held["spectra"]["table"]
+    part = raw[table["offset"] :][: math.prod(table["shape"])]
+    part[np.abs(part).argmax()] *= np.float32(1.001)
+    manifest["files"] = held["files"] = {**manifest["files"], "weights.bin": sha256(raw.tobytes())}
+    (tmp_path / "weights.bin").write_bytes(raw.tobytes())
+    (tmp_path / "denoise.cl").write_bytes((of_spectra.parent / "denoise.cl").read_bytes())
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / NAME).write_text(json.dumps(held))
+    with pytest.raises(checker.Refused, match="spectra: step_bounds"):
+        checker.check(tmp_path / NAME)
+
+
+SPECTRAL_MUTANTS = {
+    "factor": ("[2.8]", "[2.7]"),
+    "eighth": ("[2.3]", "[2.2]"),
+    "sums": ("*factor, 1.0, 1.0]", "*factor, 1.0]"),
+    "unpacking": ("(low + 1) + 1 + centring", "(low + 1) + centring"),
+    "centring": ("1 + centring)", "1)"),
+    "table": ("np.sqrt(2 * ((after", "np.sqrt(1 * ((after"),
+    "rounding of products": ("np.sqrt(2 * (norms(np.abs(bent))", "np.sqrt(1 * (norms(np.abs(bent))"),
+    "additions": ("(2 if k else 1)", "1"),
+    "blocks": ("if done else 0.0", "if done and not done else 0.0"),
+    "pairs": ("after[self.both].max(axis=0)", "after[self.both].min(axis=0)"),
+    "combination": ("back = np.sqrt(squares.sum()) + ", "back = "),
+    "columns": ("squares.sum(axis=1)", "squares.sum(axis=1) / 2"),
+    "rows": ("back += low *", "back += low / 2 *"),
+    "mirrored": ("half == 0, 1.0, 2.0)", "half == 0, 1.0, 1.0)"),
+}
+"""A rule of each step made weaker, in the checker's text."""
+
+
+@pytest.mark.parametrize("mutant", SPECTRAL_MUTANTS)
+def test_each_rule_of_spectra_is_needed(of_spectra, monkeypatch, mutant):
+    """A checker with a weaker rule finds a smaller number: what it takes, the real one refuses."""
+    source, (old, new) = inspect.getsource(spectra_checker), SPECTRAL_MUTANTS[mutant]
+    assert source.count(old) == 1, mutant
+    weaker = dict(vars(spectra_checker))
+    exec(compile(source.replace(old, new), "mutant", "exec"), weaker)
+    held, raw = certificate_of(of_spectra), evidence.read(of_spectra)[4]
+    arrays, output = evidence.read(of_spectra)[3], held["outputs"][0]
+    low, high = np.tile(([0.0] * 3 + [-1.0] * 3) * 2, 81), np.ones(972)
+    scales = np.array(output["spectra"]["scalings"]), 2.0 * np.array(output["scalings"][0])
+    given = held["spectra"], arrays["W0"], arrays["b0"], raw, low, high
+    found = [made(*given).steps(*scales) for made in (spectra_checker.Tables, weaker["Tables"])]
+    assert sum(found[1]) < sum(found[0]) * (1 - 2.0**-10)
+
+
 # ---- rectifiers ------------------------------------------------------------------------------------------
 
 

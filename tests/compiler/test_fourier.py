@@ -18,7 +18,7 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.plan import analysed, sine_contract
-from wamnet.compiler.proof import bounds, spectra
+from wamnet.compiler.proof import bounds, spectra, spectra_checker
 from wamnet.compiler.schedules import fourier, schedules
 from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
@@ -30,6 +30,9 @@ POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
 
 FFT32 = schedule_named("opencl", "fft:16")
+TURN, HALF_TURN = 2.8, 2.3
+"""FOU-5: coefficients of a product with a factor, and with one of an eighth of a turn."""
+
 CONTRACT = sine_contract("ieee", "opencl")
 
 
@@ -67,7 +70,7 @@ def test_a_transform_in_float32_is_within_its_bound(n, sign) -> None:
     wanted = exact(points, sign)
     error, norm = (np.linalg.norm(a, axis=0) for a in (computed - wanted, wanted))
     # Whatever the energies: each layer's largest coefficient.
-    found = spectra.layers(n).max(axis=1).sum() * 2.0**-24 * spectra.AGAIN
+    found = spectra_checker.layers(n).max(axis=1).sum() * 2.0**-24 * spectra.AGAIN
     assert (error <= found * norm).all()
     # Not far from it either: the largest of many is within a factor of 40 of what no input exceeds.
     assert error.max() >= found * norm[error.argmax()] / 40
@@ -76,10 +79,10 @@ def test_a_transform_in_float32_is_within_its_bound(n, sign) -> None:
 @pytest.mark.parametrize("n", POWERS[1:-1])
 def test_layers_hold_every_operation_of_the_algorithm(n) -> None:
     """Each number is in log2 n sums; a factor's coefficient is above what its two operations add."""
-    layers = spectra.layers(n)
+    layers = spectra_checker.layers(n)
     sums = np.sum(layers == 1.0, axis=0)
     assert set(sums) == {n.bit_length() - 1}
-    assert set(layers.ravel()) <= {0.0, 1.0, spectra.TURN, spectra.HALF_TURN}
+    assert set(layers.ravel()) <= {0.0, 1.0, TURN, HALF_TURN}
     assert (np.diff(layers, axis=0) <= 0).all()
     for size in (2**i for i in range(3, n.bit_length())):
         for k in range(1, size // 4):
@@ -88,9 +91,26 @@ def test_layers_hold_every_operation_of_the_algorithm(n) -> None:
             rounded = np.float32(factor.real).astype(float) + 1j * np.float32(factor.imag).astype(float)
             own = abs(rounded - factor) * 2.0**24
             if 8 * k == size:
-                assert 2 + own <= spectra.HALF_TURN * (1 - 2.0**-10)
+                assert 2 + own <= HALF_TURN * (1 - 2.0**-10)
             else:
-                assert 1 + np.sqrt(1 + abs(np.sin(2 * angle))) + own <= spectra.TURN * (1 - 2.0**-10)
+                assert 1 + np.sqrt(1 + abs(np.sin(2 * angle))) + own <= TURN * (1 - 2.0**-10)
+
+
+def test_a_wrong_twiddle_factor_breaks_the_bound(monkeypatch) -> None:
+    """A factor that is off by 100 u, and a wave of which a quarter passes through it."""
+    turned = fourier._turned
+
+    def wrong(z, k, n):
+        a, b = turned(z, k, n)
+        return (a * (1 + 100 * 2.0**-24), b) if (n, k) == (32, 3) else (a, b)
+
+    wave = np.exp(-2j * np.pi * 3 * np.arange(32) / 32)
+    wanted = exact(wave, 1)
+    found = spectra_checker.layers(32).max(axis=1).sum() * 2.0**-24 * np.linalg.norm(wanted)
+    right = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
+    monkeypatch.setattr(fourier, "_turned", wrong)
+    error = np.linalg.norm(complexes(fourier.transform(pairs_of(wave), 1)) - wanted)
+    assert right < found < error
 
 
 def direct(tile, matrix, size):
@@ -150,7 +170,11 @@ def test_all_neurons_of_a_pixel_are_within_their_joint_bound(size, channels, neu
     tile = (2 * np.sign(tile)).astype(np.float32)
     before, after = random.uniform(0.2, 5, -(-channels // 2)), random.uniform(0.2, 5, neurons)
     of = held(matrix, size, 8, channels)
-    steps = spectra.reach(of, matrix, np.full(channels, 2.0), before, after)
+    facts = {"points": 8, "lanes": of.lanes, "block": of.block, "centres": [0.0] * channels}
+    ends = np.full(size**2 * channels, 2.0)
+    table = of.table.transpose(1, 2, 0, 3), of.bias
+    given = {**facts, "order": of.order.tolist()}, matrix, of.bias, table, -ends, ends
+    steps = spectra_checker.Tables(*given).steps(before, after)
     error = np.linalg.norm(after * (fourier.sums(tile, matrix, size) - direct(tile, matrix, size)), axis=-1)
     assert error.max() <= sum(steps)
     assert min(steps[0], *steps[2:]) > 0
@@ -162,7 +186,7 @@ def test_norms_are_above_the_largest_singular_value_and_near_it(shape) -> None:
     random = np.random.default_rng(4)
     matrices = random.normal(size=shape) + 1j * random.normal(size=shape)
     matrices[0] = 0
-    found, wanted = np.sqrt(spectra.norms(matrices)), np.linalg.norm(matrices, 2, axis=(-2, -1))
+    found, wanted = np.sqrt(spectra_checker.norms(matrices)), np.linalg.norm(matrices, 2, axis=(-2, -1))
     assert found[0] == 0
     assert (found >= wanted * (1 - 1e-12)).all()
     assert (found <= wanted * min(shape[1:]) ** (1 / 128) * (1 + 1e-12)).all()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..core import ir
 from ..core.ir import Program
 from ..core.profiles import SineContract
-from . import bounds, checker, scaled, spectra_search, whole
+from . import bounds, checker, integer_checker, scaled, spectra_search, whole
 from .evidence import FLOATS, INTEGERS, Refused
 from .spectra import Spectra
 from .spectra_checker import Tables
@@ -154,15 +154,10 @@ def integers(
     program: Program, schedule: Schedule, emitted: Program, manifest: Mapping[str, Any]
 ) -> Mapping[str, Any]:
     """Return the certificate of a kernel in which nothing rounds: ends of all values, largest sums."""
-    known = whole.known(program)
-    sums = {
-        str(index): whole.magnitudes(program, node, known[node.args[0]]).tolist()
-        for index, node in enumerate(program.nodes)
-        if node.op == "affine"
-    }
+    found, sums = whole.ranges(program)
     return {
         **_about(INTEGERS, program, schedule, emitted, manifest),
-        "ranges": [[float(value.low.min()), float(value.high.max())] for value in known],
+        "ranges": [integer_checker.ends_of(each) for each in found],
         "sums": sums,
         "bound": dict(manifest["bound"]),
     }

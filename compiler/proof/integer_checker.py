@@ -1,27 +1,31 @@
-"""Check a certificate of integers: follow the program's text with Python's integers, which have no size.
+"""Programs in which no operation rounds, and the check of their certificates.
 
-1. Digests of files, program and weights agree, as evidence.py finds them [`evidence.read`].
-2. The window's numbers lie in its images' ranges and are integers. Each line of the text gives the least and
-   the largest value of each number, in units of 2^grain [`_value`]: exact, since nothing is rounded here.
-3. A float must be an integer multiple of 2^grain whose magnitude, and for a sum that of all products
-   together, is at most 2^24 such units. Products and sums of int32 must stay in it; uint32 wraps; a
-   conversion must be of a number that the other kind holds. Anything else is refused.
-4. The sums and the ranges that the certificate states are those found.
+It follows the program's text with Python's integers, which have no size. Known of a line's numbers are the
+least and the largest value over all inputs, in units of 2^grain [`ranges`].
 
-It shares no code with whole.py, which wrote the certificate.
+1. The window's numbers lie in its images' ranges and are integers.
+2. float32 holds every multiple of 2^g up to 2^(g + 24) in magnitude. An operation on floats whose result is
+   such a number is exact, in any rounding mode, fused with another or not; a sum of products is if the sum
+   of all magnitudes is, which is a bound of its partial sums in any order.
+3. Products and sums of int32 must stay in it; uint32 wraps, as it does in every language.
+4. A conversion must be of a number that the other kind holds; int32 and uint32 wrap. All else is refused.
+
+Then every kernel and every schedule that only reorders sums compute the same numbers. It imports nothing of
+the compiler, which asks it whether a program is one of these [whole.py].
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from fractions import Fraction
 from typing import Any
+
+import numpy as np
 
 from .evidence import NODE, Refused, same
 
-Range = tuple[list[int], list[int], int]
-"""Least and largest values of a vector's numbers, or of one, in units of 2 to the power of the third."""
+Range = tuple[Any, Any, int]
+"""Least and largest values of a vector's numbers, or of one, as Python's integers: of units of 2^grain."""
 
 EXACT = 2**24
 """Units that float32 holds."""
@@ -32,15 +36,42 @@ KINDS = {"int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1)}
 
 def check_integers(held: Mapping[str, Any], text: str, arrays: Mapping[str, Any]) -> list[Range]:
     """Refuse a certificate of integers, a step of which does not hold; return its values' ranges."""
-    lines = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
-    found: list[Range] = []
-    for number, line in enumerate(lines):
-        same("program: number of a line", int(line[1]), number)
-        found.append(_value(Line(line, lines, found), text, arrays, held["sums"]))
-    ends = [[float(Fraction(2) ** g * v) for v in (min(low), max(high))] for low, high, g in found]
-    same("ranges", held["ranges"], ends)
+    found, sums = ranges(text, arrays)
+    for number, stated in sums.items():
+        same(f"%{number}: affine: sums", held["sums"].get(number), stated)
+    same("ranges", held["ranges"], [ends_of(each) for each in found])
     same("bound: output", held["bound"]["output"], [0.0] * len(held["bound"]["output"]))
     return found
+
+
+def ends_of(each: Range) -> list[float]:
+    """Return the ends of a range as a certificate states them."""
+    low, high, grain = each
+    return [float(min(low)) * 2.0**grain, float(max(high)) * 2.0**grain]
+
+
+def ranges(text: str, arrays: Mapping[str, Any]) -> tuple[list[Range], dict[str, list[float]]]:
+    """Return the range of each line's value, and the magnitudes of all products of each sum, added up."""
+    lines = [m for m in map(NODE.fullmatch, text.splitlines()) if m]
+    found: list[Range] = []
+    sums: dict[str, list[float]] = {}
+    for number, each in enumerate(lines):
+        same("program: number of a line", int(each[1]), number)
+        line = Line(each, lines, found)
+        if line.op == "input":
+            found.append(_window(text))
+        elif line.op == "constant":
+            found.append(_exact([float(line.named["value"])]))
+        elif line.op == "parameter":
+            found.append(_exact(arrays[line.named["name"]].tolist()))
+        elif line.op == "affine":
+            value, sums[line.number] = _affine(line, arrays)
+            found.append(value)
+        elif line.op in OPERATIONS:
+            found.append(OPERATIONS[line.op](line))
+        else:
+            raise Refused(f"{line.name} may round")
+    return found, sums
 
 
 class Line:
@@ -52,12 +83,7 @@ class Line:
         self.named = dict(pair.split("=") for pair in (found[4] or "").split(", ") if pair)
         places = [int(i) for i in re.findall(r"%(\d+)", found[3])]
         self.kinds = [_kind(lines[i]) for i in places]
-        length = max((len(known[i][0]) for i in places), default=0)
-        # A number goes with every number of a vector.
-        self.operands = [
-            (low * length, high * length, grain) if len(low) < length else (low, high, grain)
-            for low, high, grain in (known[i] for i in places)
-        ]
+        self.operands = [known[i] for i in places]
 
 
 def _kind(found: re.Match[str]) -> str:
@@ -65,43 +91,21 @@ def _kind(found: re.Match[str]) -> str:
     return found[0].rpartition(" : ")[2].partition("[")[0]
 
 
-def _value(line: Line, text: str, arrays: Mapping[str, Any], sums: Mapping[str, Any]) -> Range:
-    """Return the range of one line's value."""
-    if line.op == "input":
-        return _window(text)
-    if line.op == "constant":
-        return _exact([float(line.named["value"])])
-    if line.op == "parameter":
-        return _exact(arrays[line.named["name"]].tolist())
-    if line.op == "affine":
-        return _affine(line, arrays, sums.get(line.number))
-    if line.op not in OPERATIONS:
-        raise Refused(f"{line.name} may round")
-    return OPERATIONS[line.op](line)
-
-
 def _arithmetic(line: Line) -> Range:
     """Return the range of a sum, a difference, the smaller or the larger of two values."""
     least = min(grain for _, _, grain in line.operands)
-    (a, b), (c, d) = (
-        ([v << (grain - least) for v in low], [v << (grain - least) for v in high])
-        for low, high, grain in line.operands
-    )
+    (a, b), (c, d) = ((low << grain - least, high << grain - least) for low, high, grain in line.operands)
     if line.op == "subtract":
-        c, d = [-v for v in d], [-v for v in c]
-    low, high = list(zip(a, c, strict=True)), list(zip(b, d, strict=True))
-    if line.op in ("minimum", "maximum"):
-        choose: Callable[[tuple[int, int]], int] = min if line.op == "minimum" else max
-        return _held(line, ([choose(pair) for pair in low], [choose(pair) for pair in high], least))
-    return _held(line, ([sum(pair) for pair in low], [sum(pair) for pair in high], least))
+        c, d = -d, -c
+    choose = {"minimum": np.minimum, "maximum": np.maximum}.get(line.op, np.add)
+    return _held(line, (choose(a, c), choose(b, d), least))
 
 
 def _multiply(line: Line) -> Range:
     """Return the range of a product."""
-    (low, high, grain), (other_low, other_high, other_grain) = line.operands
-    pairs = zip(low, high, other_low, other_high, strict=True)
-    corners = [sorted((a * c, a * d, b * c, b * d)) for a, b, c, d in pairs]
-    return _held(line, ([c[0] for c in corners], [c[-1] for c in corners], grain + other_grain))
+    (a, b, grain), (c, d, other) = line.operands
+    corners = np.stack(np.broadcast_arrays(a * c, a * d, b * c, b * d))
+    return _held(line, (corners.min(axis=0), corners.max(axis=0), grain + other))
 
 
 def _convert(line: Line) -> Range:
@@ -119,19 +123,20 @@ def _shift(line: Line) -> Range:
     """Return the range of a word that is shifted by a constant."""
     (low, high, grain), (by, same_by, _) = line.operands
     _whole(line, grain)
-    if by != same_by or not all(0 <= v < 32 for v in by):
+    if (by != same_by).any() or not all(0 <= v < 32 for v in by):
         raise Refused(f"{line.name}: by a number that is not a constant below 32")
-    shifted = ([v >> s for v, s in zip(side, by, strict=True)] for side in (low, high))
-    return (*shifted, 0)  # type: ignore[return-value]
+    return low >> by, high >> by, 0
 
 
 def _bits(line: Line) -> Range:
     """Return the range of two words' bits together."""
     (_, a, grain), (_, b, _) = line.operands
     _whole(line, grain)
-    pairs = zip(a, b, strict=True)
-    both = [min(x, y) if line.op == "bitwise_and" else (1 << max(x, y).bit_length()) - 1 for x, y in pairs]
-    return [0] * len(both), both, 0
+    a, b = np.broadcast_arrays(a, b)
+    high = np.minimum(a, b)
+    if line.op == "bitwise_xor":
+        high = np.array([(1 << max(pair).bit_length()) - 1 for pair in zip(a, b, strict=True)], object)
+    return 0 * high, high, 0
 
 
 OPERATIONS: Mapping[str, Callable[[Line], Range]] = {
@@ -154,42 +159,39 @@ def _window(text: str) -> Range:
     ends = [(int(n), int(float(a)), int(float(b))) for n, _, a, b in images]
     low = [min(a, 0) if zero else a for n, a, _ in ends for _ in range(n)]
     high = [max(b, 0) if zero else b for n, _, b in ends for _ in range(n)]
-    return low * count, high * count, 0
+    return np.array(low * count, object), np.array(high * count, object), 0
 
 
 def _exact(values: Sequence[float]) -> Range:
     """Return numbers as integers of the largest unit that holds all."""
-    exact = [Fraction(value) for value in values]
-    grain = -max(value.denominator.bit_length() - 1 for value in exact)
-    units = [int(value / Fraction(2) ** grain) for value in exact]
-    return units, units, grain
+    pairs = [value.as_integer_ratio() for value in values]
+    unit = max(below for _, below in pairs)
+    units = np.array([above * (unit // below) for above, below in pairs], object)
+    return units, units, 1 - unit.bit_length()
 
 
-def _affine(line: Line, arrays: Mapping[str, Any], stated: Any) -> Range:
-    """Return the range of sums; the magnitudes of all products of a row together must be exact."""
+def _affine(line: Line, arrays: Mapping[str, Any]) -> tuple[Range, list[float]]:
+    """Return the range of sums; the magnitudes of all terms of a row together must be exact."""
     ((low, high, grain),) = line.operands
     rows, _, unit = _exact(arrays[line.named["weight"]].ravel().tolist())
-    columns = len(low)
+    rows, grain = rows.reshape(-1, len(low)), grain + unit
+    up, down = np.maximum(rows, 0), np.minimum(rows, 0)
+    ends, sums = (up @ low + down @ high, up @ high + down @ low), (up - down) @ np.maximum(-low, high)
     if "bias" in line.named:
-        raise Refused(f"{line.name}: a bias in floats")
-    least, most, sums = [], [], []
-    for start in range(0, len(rows), columns):
-        row = rows[start : start + columns]
-        corners = [sorted((w * a, w * b)) for w, a, b in zip(row, low, high, strict=True)]
-        least.append(sum(c[0] for c in corners))
-        most.append(sum(c[1] for c in corners))
-        sums.append(sum(max(-c[0], c[1]) for c in corners))
+        bias, _, unit = _exact(arrays[line.named["bias"]].tolist())
+        least = min(grain, unit)
+        bias, by, grain = bias << unit - least, grain - least, least
+        ends, sums = ((ends[0] << by) + bias, (ends[1] << by) + bias), (sums << by) + abs(bias)
     if max(sums) > EXACT:
-        raise Refused(f"{line.name}: a sum may be {max(sums)} units of 2^{grain + unit}, of at most 2^24")
-    same(f"{line.name}: sums", stated, [float(value * Fraction(2) ** (grain + unit)) for value in sums])
-    return least, most, grain + unit
+        raise Refused(f"{line.name}: a sum may be {max(sums)} units of 2^{grain}, of at most 2^24")
+    return (*ends, grain), [float(value) * 2.0**grain for value in sums]
 
 
 def _held(line: Line, value: Range) -> Range:
     """Return a value that its kind of number holds; uint32 wraps."""
     low, high, grain = value
     if line.kind == "float32":
-        if (largest := max(-min(low), *high)) > EXACT:
+        if (largest := max(-min(low), max(high))) > EXACT:
             raise Refused(f"{line.name}: {largest} units of 2^{grain}, of at most 2^24")
         return value
     _whole(line, grain)
@@ -198,7 +200,7 @@ def _held(line: Line, value: Range) -> Range:
         return low, high, 0
     if line.kind == "int32":
         raise Refused(f"{line.name}: {min(low)} or {max(high)} is not in int32")
-    return [0] * len(low), [most] * len(low), 0
+    return 0 * low, 0 * high + most, 0
 
 
 def _whole(line: Line, grain: int) -> None:

@@ -67,13 +67,14 @@ def refused_by_bytes(program: Program) -> str:
     for node in program.nodes:
         if node.op != "affine":
             continue
-        read, matrix = known[node.args[0]], program.parameters[str(node["weight"])]
-        if node.get("bias") is not None or read.largest > LARGEST:
+        low, high, grain = known[node.args[0]]
+        matrix = program.parameters[str(node["weight"])]
+        if node.get("bias") is not None or max(-low.min(), high.max()) > LARGEST:
             return "its numbers take more than 8 bits"
         if np.abs(matrix).max() > LARGEST:
             return "its weights take more than 8 bits"
         # What does not round may be a multiple of a fraction.
-        if read.grain < 0 or (matrix != np.floor(matrix)).any():
+        if grain < 0 or (matrix != np.floor(matrix)).any():
             return "its numbers or weights are fractions"
     return ""
 

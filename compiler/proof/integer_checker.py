@@ -191,7 +191,7 @@ def _held(line: Line, value: Range) -> Range:
     """Return a value that its kind of number holds; uint32 wraps."""
     low, high, grain = value
     if line.kind == "float32":
-        if (largest := max(-min(low), max(high))) > EXACT:
+        if (largest := max(-min(low), *high)) > EXACT:
             raise Refused(f"{line.name}: {largest} units of 2^{grain}, of at most 2^24")
         return value
     _whole(line, grain)

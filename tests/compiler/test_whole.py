@@ -24,7 +24,7 @@ from wamnet.compiler.schedules.schedules import Dot, GroupDot
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window
-from wamnet.refimpl.network.whole import Whole, forward_whole, rounded
+from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
 
 CHANNELS = {"a": 3, "b": 1}
 """Images of the networks here."""

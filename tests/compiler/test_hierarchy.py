@@ -116,6 +116,17 @@ def test_rays_from_surfaces(seed):
         check(scene, lifted, towards / np.linalg.norm(towards, axis=1, keepdims=True).astype(np.float32))
 
 
+def test_a_walk_that_enters_every_node_reads_all_rows():
+    """Ranges are of all rows: of the first part 0, then 1 and 2; of the second 0 and 1."""
+    walk = hierarchy.Walk(0, (), "first", "skip", (hierarchy.Part((0,), ()), hierarchy.Part((1,), ())))
+    parameters = {"first": np.array([0, 1, 3, 0, 2, 2]), "skip": np.array([2, 2])}
+    first, second = walk.parts
+    assert [*walk.all_rows(parameters)] == [*((first, row) for row in range(3)), (second, 0), (second, 1)]
+    assert sorted(walk.rows(parameters, lambda _: True), key=lambda row: row[0].body) == [
+        *walk.all_rows(parameters)
+    ]
+
+
 def test_a_tree_is_a_loop_of_the_program_and_may_be_walked_one_by_one():
     """Interpreted for one lane or many, with the bits of the list's program."""
     scene = scene_of(3, 60, ["sphere", "quad", "turned"])

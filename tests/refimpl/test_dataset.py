@@ -89,12 +89,12 @@ def test_examples_of_frames_of_any_sizes_match_their_windows_and_targets(
 
 
 def test_digest_names_the_data() -> None:
-    def digest(seed: int, size: int) -> str:
-        pairs = [(frame_of(3, 4, seed), frame_of(3, 4, 9))]
+    def digest(seed: int, size: int, reference: int = 9) -> str:
+        pairs = [(frame_of(3, 4, seed), frame_of(3, 4, reference))]
         return dataset.build(pairs, ("color",), Window(size), Normalization()).digest
 
     assert digest(0, 2) == digest(0, 2)
-    assert len({digest(0, 2), digest(1, 2), digest(0, 3)}) == 3
+    assert len({digest(0, 2), digest(1, 2), digest(0, 3), digest(0, 2, 8)}) == 4
 
 
 # ---- features --------------------------------------------------------------------------------------------
@@ -232,12 +232,12 @@ def test_normalization_by_hand() -> None:
 
 
 def test_a_plain_to_the_horizon_does_not_press_the_rest_together() -> None:
-    """Along x nine positions 1 to 9 and one at 1000. Their quartiles are 3 and 8, indices floor(9/4) = 2 and
-    ceil(27/4) = 7 of 10; the fence is at 8 + 1.5 * 5 = 15.5. So the box goes from 1 to 15.5."""
-    position = np.zeros((1, 10, 3))
-    position[0, :, 0] = [1000.0, *range(1, 10)]
+    """Along x eleven positions 1 to 11 and one at 1000. Their quartiles are 3 and 10, indices floor(11/4) = 2
+    and ceil(33/4) = 9 of 12; the fence is at 10 + 1.5 * 7 = 20.5. So the box goes from 1 to 20.5."""
+    position = np.zeros((1, 12, 3))
+    position[0, :, 0] = [1000.0, *range(1, 12)]
     found = dataset.normalization_of([Frame({"position": position})])
-    assert found == Normalization(0.0, 1.0, (8.25, 0.0, 0.0), 7.25)
+    assert found == Normalization(0.0, 1.0, (10.75, 0.0, 0.0), 9.75)
     encoded = dataset.encode_position(position, found)
     assert encoded[0, 0, 0] == 1.0  # what is beyond is clipped
     assert encoded[0, 1, 0] == -1.0

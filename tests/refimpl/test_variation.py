@@ -28,6 +28,8 @@ def test_the_orbit_by_hand() -> None:
     steep = V.orbited(camera, 0.0, 90.0, 1.0).position
     b = math.radians(85.0)
     assert np.allclose(steep, (0.0, 2 * math.sin(b), 1 + 2 * math.cos(b)), rtol=0, atol=16 * U)
+    below = V.orbited(camera, 0.0, -90.0, 1.0).position
+    assert np.allclose(below, (0.0, -2 * math.sin(b), 1 + 2 * math.cos(b)), rtol=0, atol=16 * U)
 
 
 @given(st.floats(-180, 180), st.floats(-80, 80), st.floats(0.1, 10))

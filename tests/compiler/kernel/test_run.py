@@ -388,11 +388,14 @@ def test_items_that_are_not_active_make_no_error():
     assert (ran(kernel) == 1).all()
 
 
-LATER = (Let("t", load("shared", LOCAL)), Store("shared", (ITEM,), const(0.0)), Barrier())
+AFTER = Store("shared", (ITEM,), const(0.0))
+READ_BY_ONE = (Let("t", load("shared", const(7) - ITEM)), AFTER)
+READ_BY_SEVERAL = (Let("t", load("shared", LOCAL)), AFTER)
 RACES = {
     "no barrier": (group_kernel(), "reads shared where another wrote"),
     "one element": (group_kernel(Barrier(), write=const(0)), "two items write one element of shared"),
-    "the next write": (group_kernel(Barrier(), *LATER), "writes shared where another read"),
+    "read by one": (group_kernel(Barrier(), *READ_BY_ONE), "writes shared where another read"),
+    "read by several": (group_kernel(Barrier(), *READ_BY_SEVERAL), "writes shared where another read"),
 }
 
 

@@ -6,12 +6,13 @@ import hashlib
 import math
 import re
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ...refimpl.reading import read_file
 from ..kernel.interface import IMAGE, ITEMS, RESULT
-from ..kernel.kernel import Array, Kernel, Store, parts, values, walk
+from ..kernel.kernel import Array, Body, Call, Kernel, Let, Store, inside, parts, values, walk
 from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
@@ -93,6 +94,10 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         lanes.channels = max(int(manifest["output"]["channels"]), *(int(n) for _, n in claim.images))
         kernel = parsed(source, manifest)
         check_interface(kernel, claim, manifest)
+        bodies = [(kernel.body, ()), *((each.body, filter(None, [each.result])) for each in kernel.functions)]
+        for body, results in bodies:
+            for key in unread(body, {e.value for result in results for e in parts(result)}):
+                raise Wrong(f"{key} is computed and never read")
         trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
         trial.body(kernel.body)
         trial.ended()
@@ -106,6 +111,19 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     except MEANINGLESS as error:
         raise Refused(f"source: it has no meaning to the checker ({error})") from error
     return {"sums": len(claim.tables) * claim.together // slots, "lanes": lanes.count}
+
+
+def unread(body: Body, read: set[Any]) -> Iterator[str]:
+    """Yield the names of values and arrays that nothing reads, and add to `read` what statements read."""
+    for statement in reversed(body):
+        if isinstance(statement, Let | Array) and statement.name not in read:
+            yield statement.name
+        for inner in inside(statement):
+            own: set[Any] = set()
+            yield from unread(inner, own)
+            read |= own
+        read |= {e.value for v in values(statement) for e in parts(v) if e.op in ("name", "load")}
+        read |= {view.array for view in statement.views} if isinstance(statement, Call) else set()
 
 
 def passes_of(schedule: Any) -> Passes | None:

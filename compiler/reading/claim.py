@@ -93,6 +93,7 @@ class Claim:
         self.tables: list[tuple[str, str]] = []
         self.first: dict[int, int] = {}
         self.found: set[int] = set()
+        self.made: set[int] = set()
         self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
         (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
         self.centre = int(manifest["window"]["centre"])
@@ -178,6 +179,8 @@ class Claim:
                 values[number] = OPERATIONS[op](*given)
             else:
                 raise Unread(f"operation {op} of %{number}")
+            if kind == "int32" or (op == "convert" and kind != "float32"):
+                self.made.update(values[number].known.ravel().tolist())
         (output,) = re.findall(r"(?m)^  output \w+ = %(\d+)$", self.text)
         found: Term = values[output]
         return found

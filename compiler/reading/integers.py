@@ -112,6 +112,8 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     if not ranges.stated or (term.span is None and not whole):
         term = fold(term)
     span = term.span if whole or not ranges.stated else term.span or ranges.of(term.known)
+    if span is None and not whole:  # sums of nothing but products with 0, which fill vectors up
+        span = spans((term.value == 0).all(axis=0) | (term.known == hashed("sum", 0, 0)), 0, 0)
     good = np.zeros(term.known.shape, bool) if span is None else within(span, LIMITS[kind])
     good = good & (term.shape is not None or whole)
     if term.is_wide and not good.all():

@@ -116,7 +116,8 @@ class Values(Runner):
         arithmetic = what in ("add", "subtract", "multiply")
         if arithmetic and terms[0].kind != "float32":
             a, b = terms
-            return integers.operate(what, a, b, self.folded, self._wrong)
+            found = integers.operate(what, a, b, self.folded, self._wrong)
+            return self._defined(found) if found.kind == "int32" else found
         if any(each.kind == "word" for each in terms):
             raise Unread(f"{what} of words")
         terms = tuple(self.folded(each) for each in terms)
@@ -255,7 +256,20 @@ class Values(Runner):
             return integers.as_float(self.folded(term), self._found, self._wrong)
         if kind not in integers.LIMITS or term.kind not in ("float32", *integers.LIMITS):
             raise Unread(f"a {term.kind} as {kind}")
-        return integers.convert(term, kind, self.claim.ranges, self.folded)
+        found = integers.convert(term, kind, self.claim.ranges, self.folded)
+        return self._defined(found) if term.kind == "float32" else found
+
+    def _defined(self, term: Term) -> Term:
+        """Return an integer that its kind is known to hold, or that is one of the program's.
+
+        Kernels of bytes are let be: they fill words up with what follows from zeros.
+        """
+        good: Any = False if term.span is None else term.span[0] <= term.span[1]
+        if not self.claim.stated and not np.all(good):
+            made = [word in self.claim.made for word in term.known.ravel().tolist()]
+            good = np.logical_or(good, np.reshape(made, term.known.shape))
+            self._wrong(~good, f"a number that is not the program's may be beyond what {term.kind} holds")
+        return term
 
     def _value_bits(self, value: Expr) -> Any:
         """Return the bits of words that are known as floats."""

@@ -67,7 +67,7 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
         ("v1[j] += part1[j];", "v1[j] += part1[j] + weights[0] - weights[0];", "never made"),
         ("height - 1);", "height);", "beyond its ends|never made"),
         ("x >= width || ", "", "not a frame of opencl"),
-        ("t16 * t38", "t16 * t37", "the sums of %4 are never made"),
+        ("t16 * t38", "t16 * t37", "t38 is computed and never read"),
         ("[(y * width + x) * 3 + i] =", "[(y * width + x) * 3 + i * 2 % 3] =", "not the program's"),
         ("i < 3; ++i) {\n        result", "i < 2; ++i) {\n        result", "without a result"),
         ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
@@ -76,6 +76,33 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
 def test_faults_are_named(plain, old, new, why):
     with pytest.raises((Refused, Unread), match=why):
         run_text(*changed(plain, old, new))
+
+
+@pytest.mark.parametrize(
+    ("new", "why"),
+    [
+        ("int t0 = (int)(v4[0] * 1e+30f);", "t0 is computed and never read"),
+        ("float a[2]; a[0] = v4[0];", "a is computed and never read"),
+        ("float a = 1.0f; { float b = 1.0f; a = b; }", "a is computed and never read"),
+        ("for (int i = 0; i < 3; ++i) { float t0 = v4[i]; }", "t0 is computed and never read"),
+    ],
+)
+def test_what_nothing_reads_is_refused(plain, new, why):
+    """TXT-6: it changes no result, but may be undefined."""
+    name = re.findall(r"float (v\d+)\[3\];", plain[0])[-1]
+    with pytest.raises(Refused, match=why):
+        run_text(*changed(plain, "    /* output", f"    {new.replace('v4', name)}\n    /* output"))
+
+
+@pytest.mark.parametrize("new", ["(int)(v1[0] * 3.0f)", "((int)v1[0] * 65536)"])
+def test_integers_that_are_not_the_program_s_are_refused(new, tmp_path):
+    """TXT-6: what overflows is undefined, used or not."""
+    plan = plan_model(model(border="clamp"), "opencl", variant="whole8")
+    artifact.write(compile_plan(plan), tmp_path)
+    given = parts(tmp_path / NAME)
+    line = f"float a[2]; a[0] = (float){new}; a[1] = v1[0]; v1[0] = a[1];"
+    with pytest.raises(Refused, match="not the program's may be beyond"):
+        run_text(*changed(given, "    /* %2 to", f"    {line}\n    /* %2 to"))
 
 
 @pytest.mark.parametrize(
@@ -88,7 +115,8 @@ def test_faults_are_named(plain, old, new, why):
         ("+ dx * 3 + c] = inside", "+ dx * 3 + 2 - c] = inside", "another number far from"),
         (
             "    for (int dy = 0; dy < WINDOW",
-            "    float a[1]; if (within) { a[0] = 1.0f; } else { a[0] = 0.0f; } for (int dy = 0; dy < WINDOW",
+            "float a[1]; if (within) { a[0] = 1.0f; } else { a[0] = 0.0f; } patch_color[0] = a[0];"
+            "    for (int dy = 0; dy < WINDOW",
             "near borders only",
         ),
         (

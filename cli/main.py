@@ -9,8 +9,6 @@
 A list of all commands appears at once: no module of a command is imported for it.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import os

@@ -9,8 +9,6 @@
    [`movie.write_movie`].
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -18,10 +16,27 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ...compiler.scenes.encode_kernel import feature_rays, sees
+from ...compiler.variants import FULL, with_rank
+from ...kernels import Pipeline, denoise_on, open_executor, render_on
+from ...kernels.devices.executor import Executor
+from ...kernels.run import render_frame
+from ...kernels.run.before import wants
+from ...kernels.run.pipeline import Drawn
+from ...kernels.run.render_on import Frames
+from ...models.data.frame_plan import animation_times
+from ...models.data.scene_source import scene_source
 from ...models.writing import remove_temporaries
+from ...refimpl.encoding import to_display
 from ...refimpl.errors import InputError
+from ...refimpl.frame import SUN, Frame
+from ...refimpl.light.render import Job, feature_job, render_info
+from ...refimpl.light.scene import Scene, scene_digest
+from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.denoise import Model, learned_shadow_rays
+from ...refimpl.network.factored import check_rank
 from ..common import options
 from ..common.domain import Watch
 from ..common.effort import said_of_rendering
@@ -29,18 +44,10 @@ from ..common.executors import chosen
 from ..common.inputs import learned_scene, load_model, model_path, unlike_training
 from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
-from ..files import movie
+from ..files import images, movie
 from ..files.alone import working_in
 from ..files.outputs import check_output, check_parent, check_real_folder
 from ..reports import machine
-
-if TYPE_CHECKING:
-    from ...kernels.devices.executor import Executor
-    from ...kernels.run.pipeline import Drawn
-    from ...refimpl.frame import Frame
-    from ...refimpl.light.render import Job
-    from ...refimpl.light.scene import Scene
-    from ...refimpl.network.denoise import Model
 
 
 @dataclass(frozen=True)
@@ -136,9 +143,6 @@ def _draw(
     shots: Sequence[Shot], folder: Path, network: Model, by: tuple[str, str], rank: int
 ) -> tuple[int, Watch]:
     """Draw the pictures that are not in the folder, which only this process uses: how many, how far off."""
-    from ...compiler.variants import FULL, with_rank
-    from ...kernels import open_executor
-
     executor, renderer = by
     watch = Watch(network)
     # It was another process's until now.
@@ -159,11 +163,6 @@ def _draw(
 
 def _one_device(executor: str, renderer: str, noisy: Job, features: Sequence[str]) -> bool:
     """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
-    from ...kernels.run.before import wants
-    from ...refimpl.frame import SUN
-    from ...refimpl.light.render import feature_job
-    from ...refimpl.network.dataset import FEATURES
-
     beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
     return renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
 
@@ -198,8 +197,6 @@ def _parameters(assignments: Sequence[str] | None) -> dict[str, Any]:
 
 def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) -> None:
     """Warn of pictures that are unlike those of the training: how many, and what the first one shows."""
-    from ...refimpl.light.render import render_info
-
     found = [unlike_training(model, render_info(shot.scene, shot.noisy)) for shot in shots]
     unlike = [sentences for sentences in found if sentences]
     for sentence in unlike[0] if unlike else ():
@@ -208,8 +205,6 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
 
 def cut_facts(network: Model, rank: int) -> list[str]:
     """Return what a cut of the first layer adds to a picture's origin; refuse a rank that it cannot have."""
-    from ...refimpl.network.factored import check_rank
-
     if not rank:
         return []
     check_rank(rank, network.window.size, *network.siren.widths[:2])
@@ -224,13 +219,6 @@ def plan_shots(
     facts: Sequence[str],
 ) -> list[Shot]:
     """Return the pictures of an animation; `named` are the scene's name, parameters and view."""
-    from ...compiler.scenes.encode_kernel import feature_rays, sees
-    from ...models.data.frame_plan import animation_times
-    from ...models.data.scene_source import scene_source
-    from ...refimpl.light.render import Job
-    from ...refimpl.light.scene import scene_digest
-    from ...refimpl.network.denoise import learned_shadow_rays
-
     (name, parameters, view), size, spp = named, film.size, film.reference_spp
     source, shots = scene_source(name, parameters), []
     rays = feature_rays(network) if film.feature_spp is None else film.feature_spp
@@ -249,8 +237,6 @@ def plan_shots(
 
 def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
     """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
-    from ..files import images
-
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "is a file", "choose another with -o")
     check_parent(folder)
@@ -279,11 +265,7 @@ def draw_apart(
 
     `film`: all pictures of the film, in order, of which they are some.
     """
-    from ...kernels import denoise_on
     from ...kernels.run.before import Film, wants
-    from ...kernels.run.render_frame import render_frame
-    from ...kernels.run.render_on import Frames
-    from ...refimpl.encoding import to_display
 
     film = film or shots
     frames, model = Frames([shot.scene for shot in film]), watch.model
@@ -292,7 +274,7 @@ def draw_apart(
     # The history of a missing picture is made of all pictures before it.
     count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
     for shot in shots if before is None else film[:count]:
-        frame = render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
+        frame = render_frame.render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
         if before is not None:
             frame = before.add(shot.scene, shot.noisy, frame)
         if shot.path not in wanted:
@@ -303,7 +285,9 @@ def draw_apart(
         reference = None
         if shot.reference is not None:
             job = shot.reference
-            reference = render_frame(renderer, shot.scene, job, workers=None, frames=frames).frame
+            reference = render_frame.render_frame(
+                renderer, shot.scene, job, workers=None, frames=frames
+            ).frame
         write_shot(shot, model, noisy, denoised, reference)
         yield
 
@@ -312,10 +296,6 @@ def draw_frames(
     shots: Sequence[Shot], watch: Watch, executor: Executor, renderer: str, variant: str
 ) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
-    from ...kernels import Pipeline, render_on
-    from ...kernels.run.render_on import Frames
-    from ...refimpl.light.render import feature_job
-
     if not shots:
         return
     first, scenes, model = shots[0], [shot.scene for shot in shots], watch.model
@@ -362,9 +342,6 @@ def _write_drawn(shot: Shot, watch: Watch, drawn: Callable[[], Drawn], reference
 
 def write_shot(shot: Shot, model: Model, noisy: Any, denoised: Any, reference: Frame | None) -> None:
     """Write a picture: noisy and denoised (H, W, 3), display-encoded, and the reference if there is one."""
-    from ...refimpl.encoding import to_display
-    from ..files import images
-
     panels = [("noisy, 1 spp", noisy), ("denoised", denoised)]
     if reference is not None and shot.reference is not None:
         shown = to_display(reference["color"], model.normalization.exposure_stops)

@@ -1,16 +1,19 @@
 """`wamnet bench`: speed against error of all kernels, forms of the network and peers that are installed."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ...kernels.bench import contenders, workload
+from ...kernels.bench.contenders import Tools, Variant
+from ...kernels.bench.contest import Contest, Request
+from ...kernels.bench.workload import check_size
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.network.denoise import Model
 from ..common import packages
 from ..common.effort import said_of_measuring
 from ..common.executors import fastest
@@ -22,11 +25,6 @@ from ..files.outputs import check_output, replacing, unwritable, write_text
 from ..reports import bench_report, machine
 from . import bench_forms, bench_frames
 from .bench_frames import Frames
-
-if TYPE_CHECKING:
-    from ...kernels.bench.contenders import Variant
-    from ...kernels.bench.contest import Contest, Request
-    from ...refimpl.network.denoise import Model
 
 PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "openvino", "tinygrad", "halide", "pyoidn")
 """Packages of peers whose versions the result names."""
@@ -117,8 +115,6 @@ class Wanted:
 
     def check_numbers(self) -> None:
         """Refuse numbers that no run can have."""
-        from ...kernels.bench.workload import check_size
-
         for name, most in MOST.items():
             if not 1 <= self.number(name) <= most:
                 option = f"--{name.replace('_', '-')}"
@@ -141,8 +137,6 @@ class Wanted:
 
     def network(self) -> tuple[str, Model]:
         """Return the model and its name, or refuse features that do not go with it."""
-        from ...kernels.bench import workload
-
         if self.is_paper:
             return PAPER, workload.paper_model(parse_names(self.features) or workload.FEATURES)
         if self.features:
@@ -175,9 +169,6 @@ class Wanted:
 
     def forms(self, network: Model) -> dict[str, Variant]:
         """Return the forms that are to be trained and take part; refuse names that nobody has."""
-        from ...kernels.bench import contenders
-        from ...kernels.bench.contenders import Tools
-
         names = bench_forms.QUICK_FORMS if self.quick else bench_forms.FORMS
         planned = bench_forms.planned(network, names if self.train_variants else (), self.number("steps"))
         with Tools() as tools:
@@ -199,8 +190,6 @@ class Wanted:
 
     def request(self, name: str, network: Model, frames: Frames) -> Request:
         """Return what is to be measured."""
-        from ...kernels.bench.contest import Request
-
         size, *sizes = self.all_sizes
         facts = frames.as_data() if frames.pairs else {}
         numbers = (self.number("repeats"), tuple(sizes), frames.pairs, facts, name, self.number("budget"))
@@ -249,10 +238,6 @@ def measure(
     forms: Sequence[Variant] = (),
 ) -> dict[str, Any]:
     """Return what a benchmark finds, and write it into the folder `output`, also after an interrupt."""
-    from ...kernels.bench import contenders
-    from ...kernels.bench.contenders import Tools
-    from ...kernels.bench.contest import Contest
-
     with Tools() as tools, progress("measuring", 1.0) as advance:
         everybody = contenders.of_machine(tools, request.size, request.quick and not only, forms)
         taking_part = contenders.chosen(everybody, only, executors)

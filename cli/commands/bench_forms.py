@@ -7,23 +7,23 @@
 3. The whole network is trained on as far too: what more steps give is not credited to a form [`FURTHER`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ...compiler import variants
+from ...compiler.variants import digest_of
+from ...kernels.bench.contenders import Variant
+from ...kernels.run.measure_curve import names_for
+from ...models.model_file import load_checkpoint
 from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
+from ...refimpl.network import dataset
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.train import PRESETS, Recipe, TrainState, recipe_from_json, start
 from ..common.inputs import load_model
 from ..common.terminal import say
 from . import train
-
-if TYPE_CHECKING:
-    from ...kernels.bench.contenders import Variant
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-    from ...refimpl.network.train import Recipe, TrainState
 
 FORMS = (
     *("full", "rank16", "rank12", "rank8", "window10", "window8", "window6"),
@@ -43,10 +43,6 @@ SEED = 2
 
 def planned(model: Model, names: Sequence[str], steps: int) -> dict[str, Variant]:
     """Return the forms that this model can have, by the names of variants, not trained yet."""
-    from ...compiler import variants
-    from ...kernels.bench.contenders import Variant
-    from ...kernels.run.measure_curve import names_for
-
     found = {}
     for name in names_for(model, names):
         varied = variants.vary(variants.parse(name), model)
@@ -58,8 +54,6 @@ def planned(model: Model, names: Sequence[str], steps: int) -> dict[str, Variant
 
 def folder_of(model: Model, output: Path) -> Path:
     """Return the folder of a model's forms, in that of the results."""
-    from ...compiler.variants import digest_of
-
     return output / f"forms-{digest_of(model)[:12]}"
 
 
@@ -86,9 +80,6 @@ def trained(
 
 def start_of(model: Model, name: str, steps: int, pairs: Sequence[tuple[Frame, Frame]]) -> TrainState:
     """Return the state of a form before its first step, on the model's own scales."""
-    from ...refimpl.network import dataset
-    from ...refimpl.network.train import start
-
     recipe, network = train.varied(recipe_of(model, steps), model, name)
     scales = model.normalization
     data = dataset.build(pairs, recipe.features, recipe.window, scales)
@@ -97,8 +88,6 @@ def start_of(model: Model, name: str, steps: int, pairs: Sequence[tuple[Frame, F
 
 def recipe_of(model: Model, steps: int) -> Recipe:
     """Return the recipe that a model was trained by, or the best preset, with other steps."""
-    from ...refimpl.network.train import PRESETS, recipe_from_json
-
     text = model.info.get("recipe")
     known = recipe_from_json(text) if text else PRESETS["best"]
     return replace(known, steps=steps, seed=SEED, log_every=max(1, min(known.log_every, steps)))
@@ -106,8 +95,6 @@ def recipe_of(model: Model, steps: int) -> Recipe:
 
 def _kept(path: Path, begin: TrainState) -> TrainState:
     """Return the state of an earlier run of the same recipe on the same frames, or the first one."""
-    from ...models.model_file import load_checkpoint
-
     if not path.exists():
         return begin
     try:

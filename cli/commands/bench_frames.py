@@ -9,26 +9,25 @@
 An interrupted run resumes, as that of `wamnet dataset` does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ...compiler.scenes.encode_kernel import sees
+from ...models.data.frame_plan import Request, plan
 from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
+from ...refimpl.light.render import FEATURE_SAMPLER
+from ...refimpl.light.variation import RANGES, ranges_from_json
+from ...refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
 from ..common.executors import fastest
 from ..common.inputs import trained_scene, unlike_training
 from ..common.terminal import say
-from ..files import dataset_files
+from ..files import dataset_files, exr
 from . import dataset
 
-if TYPE_CHECKING:
-    from ...models.data.frame_plan import Request
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-
-    Pair = tuple[Frame, Frame]
+Pair = tuple[Frame, Frame]
 
 SPP_OF_NUMPY = 32
 """Most samples of a reference where no kernel runs: more would take an hour."""
@@ -70,8 +69,6 @@ class Frames:
 
 def of_folder(folder: Path, model: Model, split: str = "test") -> Frames:
     """Return a data set's frames of a split; refuse one without any, or whose frames lack a layer."""
-    from ..files import exr
-
     pairs = dataset_files.read_pairs(folder, split, tell=say)
     if not pairs:
         raise InputError("data set", str(folder), f"has no {split} frames", "make one with --test 1")
@@ -107,11 +104,6 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
 
 def request_for(model: Model, executor: str, **numbers: Any) -> Request:
     """Return the request of frames that are like those that a model was trained on."""
-    from ...compiler.scenes.encode_kernel import sees
-    from ...models.data.frame_plan import Request
-    from ...refimpl.light.render import FEATURE_SAMPLER
-    from ...refimpl.network.denoise import learned_feature_spp, learned_shadow_rays
-
     scene = trained_scene(model)
     assert scene is not None, "whoever asks for frames has looked for a scene"
     rays = learned_feature_spp(model)
@@ -125,8 +117,6 @@ def request_for(model: Model, executor: str, **numbers: Any) -> Request:
 
 def ranges_of(model: Model) -> dict[str, Any]:
     """Return the ranges that a model has learned, as parts of a request; nothing where it names none."""
-    from ...refimpl.light.variation import RANGES, ranges_from_json
-
     if (text := model.info.get(f"trained_on_{RANGES}")) is None:
         return {}
     found = asdict(ranges_from_json(text))
@@ -162,6 +152,4 @@ def for_training(model: Model, folder: Path) -> Sequence[Pair]:
 
 def _make(folder: Path, request: Request) -> None:
     """Render what the folder lacks of a request."""
-    from ...models.data.frame_plan import plan
-
     dataset.make(folder, request, plan(request), workers=1, scheduler=None)

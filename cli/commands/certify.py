@@ -1,12 +1,16 @@
 """`wamnet certify`: check a certificate and the text beside it, and show where the error comes from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from ...compiler.artifact import CERTIFICATE_NAME
+from ...compiler.proof.checker import check
+from ...compiler.proof.evidence import INTEGERS, Refused
+from ...compiler.reading.check import check_text
+from ...compiler.reading.lanes import Unread
+from ...compiler.reading.trusted import trusted_lines
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
 from ..common.options import argument, option
@@ -46,13 +50,6 @@ def certify(
     wamnet certify kernel-opencl
     wamnet certify kernel-c --source denoise-mine.h
     """
-    from ...compiler.artifact import CERTIFICATE_NAME
-    from ...compiler.proof.checker import check
-    from ...compiler.proof.evidence import Refused
-    from ...compiler.reading.check import check_text
-    from ...compiler.reading.lanes import Unread
-    from ...compiler.reading.trusted import trusted_lines
-
     inside = [file / CERTIFICATE_NAME, file / "denoise" / CERTIFICATE_NAME] if file.is_dir() else [file]
     path = next(filter(Path.is_file, inside), inside[0])
     if not path.is_file():
@@ -81,8 +78,6 @@ def certify(
 
 def show(held: Any) -> None:
     """Print what a certificate proves, and its table."""
-    from ...compiler.proof.evidence import INTEGERS
-
     if held["schema"] == INTEGERS:
         table(*sums_table(held))
         say("holds: no operation rounds; every value equals the reference's, for all integer images")

@@ -3,24 +3,23 @@
 The curve is a file's, or the user's cache folder's, or measured then and there and kept.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ...compiler import variants
+from ...kernels import cache, open_executor
+from ...kernels.devices.executor import Executor
+from ...kernels.run import curve, measure_curve
+from ...kernels.run.curve import Choice, Curve, Limits
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.frame import Frame
+from ...refimpl.network.denoise import Model
 from ..common.options import option
 from ..common.request import given
 from ..common.terminal import progress, say
-
-if TYPE_CHECKING:
-    from ...kernels.devices.executor import Executor
-    from ...kernels.run.curve import Choice, Curve, Limits
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
+from ..files import dataset_files
 
 SMALLEST_PX, LARGEST_PX = 16, 4096
 """Sides of pictures on which times are taken."""
@@ -56,8 +55,6 @@ class Request:
 
 def check_request(request: Request, variant: str | None) -> None:
     """Refuse options that contradict each other, or have nothing to act on."""
-    from ...kernels.run import curve
-
     named = list(given(request))
     if variant is not None and named:
         rule = f"{named[0]} chooses a variant itself"
@@ -78,8 +75,6 @@ def choose(
     model: Model, request: Request, executor: str, profile: str, schedule: str | None
 ) -> tuple[str, str]:
     """Return the variant and the schedule that the limits ask for, and say what was chosen and why."""
-    from ...kernels.run import curve
-
     found = _curve(model, request, executor, profile)
     points = [point for point in found.points if point.executor == executor]
     if schedule is not None:
@@ -91,8 +86,6 @@ def choose(
 
 def _limits(request: Request) -> Limits:
     """Return the limits of a request."""
-    from ...kernels.run.curve import Limits
-
     return Limits(request.max_error, request.max_ms, request.max_loss_db)
 
 
@@ -106,11 +99,6 @@ def _say(choice: Choice, found: Curve) -> None:
 
 def _curve(model: Model, request: Request, executor: str, profile: str) -> Curve:
     """Return the curve to choose from."""
-    from ...compiler import variants
-    from ...kernels import open_executor
-    from ...kernels.run import curve
-    from ...kernels.run.curve import Curve
-
     if request.curve is not None:
         found = curve.read(request.curve)
         wanted = Curve(variants.digest_of(model), found.device, found.size, profile, ())
@@ -126,8 +114,6 @@ def _curve(model: Model, request: Request, executor: str, profile: str) -> Curve
 
 def _frames(folder: Path) -> tuple[list[tuple[Frame, Frame]], str]:
     """Return the pairs on which errors are measured, a data set's test frames, and a name for them."""
-    from ..files import dataset_files
-
     pairs = dataset_files.read_pairs(folder, "test")
     if not pairs:
         rule = "has no test frames"
@@ -145,11 +131,6 @@ def _kept_or_measured(
     digest: str,
 ) -> Curve:
     """Return the curve from the cache folder, or measure it and keep it; say which."""
-    from ...compiler import variants
-    from ...kernels import cache
-    from ...kernels.run import curve, measure_curve
-    from ...kernels.run.curve import Curve
-
     names = measure_curve.names_for(model)
     wanted = Curve(variants.digest_of(model), runner.device, (side, side), profile, ())
     key = curve.key_of(wanted, runner.name, digest, names)

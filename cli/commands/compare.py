@@ -1,16 +1,19 @@
 """`wamnet compare`: how far a picture is from its reference, in every metric, and a kernel's paths."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import typer
 
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.light.render import Job
+from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.options import ExecutorName, argument, option
 from ..common.terminal import table, tell
+from ..files.images import read_image
+from ..reports.compare_paths import compare_paths
+from ..reports.scores import as_data, measure
 
 PANEL = "Paths"
 """Title of the options that go with `--paths`."""
@@ -70,19 +73,12 @@ def compare(
         compare_pictures(image, reference, exposure, as_json)
         return
     options.refuse_given(context, OF_PICTURES, "with --paths")
-    from ...refimpl.light.render import Job
-    from ...refimpl.light.transport import Settings
-    from ..reports.compare_paths import compare_paths
-
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
     compare_paths(paths, executor.value, job, time, parameters or [], as_json)
 
 
 def compare_pictures(image: Path, reference: Path, exposure: float, as_json: bool) -> None:
     """Print the score of a picture in each metric."""
-    from ..files.images import read_image
-    from ..reports.scores import as_data, measure
-
     a, b = read_image(image, exposure, tell), read_image(reference, exposure, tell)
     if a.display.shape != b.display.shape:
         (height, width, _), (rows, columns, _) = a.display.shape, b.display.shape

@@ -4,15 +4,25 @@ A name of a canonical scene, or a file that ends in .json, is a scene; anything 
 one that ships with the package, as in model:minicubes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ... import models
+from ...compiler import artifact
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_plan
+from ...compiler.scenes import lower_scene, path_kernel
+from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.targets import Language, language_named
+from ...kernels import open_executor
+from ...kernels.run import tune
 from ...refimpl.errors import NO_VALUE, InputError, choice
+from ...refimpl.light.scenes import CANONICAL
+from ...refimpl.light.transport import Settings
+from ...refimpl.network.denoise import Model
 from ...refimpl.reading import parse_json, read_file
 from ..common import options
 from ..common.effort import said_of_compiling
@@ -22,11 +32,6 @@ from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_parent, unwritable
 from .choose import Request, check_request, choose
-
-if TYPE_CHECKING:
-    from ...compiler.artifact import Artifact
-    from ...compiler.targets import Language
-    from ...refimpl.network.denoise import Model
 
 HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
 """What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
@@ -44,17 +49,13 @@ class OfScene:
 
     def compiled(self, name: str, language: Language, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
-        from ...compiler.scenes.lower_scene import lower_scene
-        from ...compiler.scenes.path_kernel import compile_path
-        from ...refimpl.light.transport import Settings
-
         scene = load_scene(name, self.time, self.parameters or [])
         for line in said_of_compiling(scene):
             say(line)
         settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)
-        programs = lower_scene(scene, settings, language.forms)
+        programs = lower_scene.lower_scene(scene, settings, language.forms)
         return compile_path(programs, language, profile, 1 if self.lanes is None else self.lanes)
 
 
@@ -87,8 +88,6 @@ def compile_model(
     wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
     wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl
     """
-    from ...compiler.targets import language_named
-
     folder, language = output or Path(target), language_named(target)
     if is_scene(model):
         of_models = given(network, "schedule", "variant") | {"--here": here or None} | given(limits)
@@ -118,9 +117,6 @@ def _write(kernel: Artifact, folder: Path) -> None:
 
 def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
     """Return the schedule of a variant for this machine's device, and say why."""
-    from ...kernels import open_executor
-    from ...kernels.run import tune
-
     refuse(given(network, "schedule"), "--here chooses another", "leave one of them out")
     plan = network.plan(model, executor)
     with open_executor(executor) as runner:
@@ -133,8 +129,6 @@ def _compiled_model(
     path: Path, language: Language, network: KernelRequest, limits: Request, here: bool
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
-    from ...compiler.compile import compile_plan
-
     check_request(limits, network.variant)
     model = load_model(path, imported=True)
     if limits.limited:
@@ -151,8 +145,6 @@ def _compiled_model(
 
 def is_scene(name: str) -> bool:
     """Tell whether a name is that of a scene."""
-    from ...refimpl.light.scenes import CANONICAL
-
     return name in CANONICAL or Path(name).suffix.lower() == ".json"
 
 
@@ -162,18 +154,12 @@ def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
     refuse(of_scenes, rule, "leave it out, or name a scene")
     comes_along = name.startswith(MODEL_PREFIX)
     if not comes_along and not Path(name).suffix and not Path(name).exists():
-        from ... import models
-        from ...refimpl.light.scenes import CANONICAL
-
         known = [*CANONICAL, *(f"{MODEL_PREFIX}{model}" for model in models.names())]
         raise InputError("model or scene", name, "not found", f"{choice(name, known)}, or give a file")
 
 
 def check_folder(folder: Path, name: str, of_scene: bool = False) -> None:
     """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
-    from ...compiler import artifact
-    from ...compiler.scenes import path_kernel
-
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "is a file", "choose another name with -o")
     check_parent(folder)
@@ -200,8 +186,6 @@ def check_folder(folder: Path, name: str, of_scene: bool = False) -> None:
 
 def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
     """Write a kernel's files; what the system refuses is reported with the folder's name."""
-    from ...compiler import artifact
-
     try:
         return artifact.write(kernel, folder)
     except OSError as error:

@@ -1,27 +1,29 @@
 """`wamnet conformance`: hold any program, or the project's own executors, to the vectors of the spec."""
 
-from __future__ import annotations
-
 import math
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
+from ...compiler.core.profiles import profile_named
+from ...kernels.devices.registry import EXECUTORS
+from ...kernels.export.runners import RUNNERS
 from ...refimpl.errors import NO_VALUE, InputError, choice
+from ...spec.conformance import report, run
+from ...spec.conformance import vectors as all_vectors
+from ...spec.conformance.case import FOLDER, Case
+from ...spec.conformance.protocol import Session
+from ...spec.conformance.report import about, counts, first_blamed
+from ...spec.conformance.run import PASS, UNSUPPORTED, Verdict
 from ..common import options
 from ..common.options import option
 from ..common.request import given
 from ..common.terminal import progress, say, table
 from ..files.outputs import check_output, write_text
-
-if TYPE_CHECKING:
-    from ...spec.conformance.case import Case
-    from ...spec.conformance.run import Verdict
 
 STATUS_FAILED = 1
 """Exit status when a case fails."""
@@ -82,11 +84,6 @@ def conformance(*, tested: Tested, reports: Reports) -> None:
     wamnet conformance --program "./mine --fast" --junit report.xml
     wamnet conformance --program ./mine --track mine.json
     """
-    from ...compiler.core.profiles import profile_named
-    from ...spec.conformance import report, run
-    from ...spec.conformance import vectors as all_vectors
-    from ...spec.conformance.case import FOLDER
-
     if reports.write is not None:
         if given(tested, "program", "executor"):
             rule = "it makes vectors and asks nobody"
@@ -136,9 +133,6 @@ def _command(program: str | None, executor: str | None) -> list[str]:
         if not command:
             raise InputError("--program", program, "is not a command", "name a program")
         return command
-    from ...kernels.devices.registry import EXECUTORS
-    from ...kernels.export.runners import RUNNERS
-
     if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
         known = dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS))
         raise InputError("--executor", executor, "unknown", choice(str(executor), known))
@@ -164,9 +158,6 @@ def _asked(
     command: Sequence[str], cases: Mapping[str, Sequence[Case]], profile: str, timeout: float
 ) -> list[Verdict]:
     """Ask all cases and return the verdicts."""
-    from ...spec.conformance import run
-    from ...spec.conformance.protocol import Session
-
     total = sum(map(len, cases.values()))
     with Session(command, timeout) as session, progress("testing", total, "cases") as advance:
         return list(run.run(session, cases, profile, advance))
@@ -174,9 +165,6 @@ def _asked(
 
 def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
     """Print a table with a line a kind."""
-    from ...spec.conformance.report import counts
-    from ...spec.conformance.run import PASS, UNSUPPORTED
-
     rows = []
     for known in counts(verdicts):
         passed, unsupported = known.found.get(PASS, 0), known.found.get(UNSUPPORTED, 0)
@@ -194,8 +182,6 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
 
 def _print_failures(failed: Sequence[Verdict], cases: Mapping[str, Sequence[Case]], again: str) -> None:
     """Print the first failures in full."""
-    from ...spec.conformance.report import about, first_blamed
-
     first = first_blamed(failed)
     if first is not None and len(failed) > 1:
         say(f"look first at {first.clause}: {first.id} fails, and others depend on it")

@@ -10,28 +10,30 @@
 5. `--check` compares every file with its checksum and changes nothing [`check`].
 """
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
+from ... import kernels
+from ...kernels.run import before
+from ...kernels.run.render_frame import shares_work
+from ...models.data import frame_plan
+from ...models.data.frame_plan import KINDS, FramePlan, Request, Task, plan
+from ...models.data.scene_source import SceneSource, scene_source
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.frame import Frame
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.options import argument, option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files
-
-if TYPE_CHECKING:
-    from ...models.data.frame_plan import FramePlan, Request, Task
-    from ...models.data.scene_source import SceneSource
+from .blender.dataset import make as make_from_blender
 
 LIMITS = "LOW:HIGH"
 """How a range is written."""
@@ -154,9 +156,6 @@ def dataset(
     wamnet dataset --from-blender hall.blend --frames 12 --percent 50 --spp 256 -o hall
     wamnet dataset --check -o cubes
     """
-    from ...models.data.scene_source import scene_source
-    from .blender.dataset import make as make_from_blender
-
     blender = [field.name for field in dataclasses.fields(OfBlender)]
     if only_check:
         check(output, scene)
@@ -179,8 +178,6 @@ def _make_from_scene(
     folder: Path, source: SceneSource, fields: dict[str, Any], workers: int | None, scheduler: str | None
 ) -> None:
     """Make the data set of a scene and the other fields of a request."""
-    from ...models.data.frame_plan import Request, plan
-
     request = Request(source.name, source.parameters, still=source.still, **fields)
     _check_workers(workers, scheduler)
     executor = chosen(request.executor, because=OF_SCHEDULER if scheduler else "")
@@ -207,15 +204,13 @@ def make(
     folder: Path, request: Request, frames: Sequence[FramePlan], workers: int | None, scheduler: str | None
 ) -> None:
     """Make what is missing in the folder; on a cluster if there is more than one worker (None: per core)."""
-    from ...kernels import open_executor
-
     nearest = compared(frames)
     known = 0
     if (folder / dataset_files.MANIFEST).exists():
         known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
     elif scheduler is None:
         # A device that is missing here is reported before a folder needs it.
-        open_executor(request.executor).close()
+        kernels.open_executor(request.executor).close()
     with (
         progress("checking", known, "bytes") as look,
         dataset_files.Store.open(folder, request, frames, look, nearest) as store,
@@ -231,8 +226,6 @@ def make(
 
 def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     """Return how far the nearest training frame is, by split of test frames; refuse frames that are alike."""
-    from ...models.data import frame_plan
-
     tests = any(frame.split != frame_plan.TRAIN for frame in frames)
     with progress("comparing views", len(frames) if tests else 0, "frames") as advance:
         found = frame_plan.compared(frames, advance)
@@ -257,11 +250,6 @@ def _render(
     scheduler: str | None,
 ) -> None:
     """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
-    from ...kernels.run.before import carry_out
-    from ...kernels.run.render_frame import shares_work
-    from ...models.data.frame_plan import KINDS
-    from ...refimpl.frame import Frame
-
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
@@ -274,7 +262,7 @@ def _render(
         say(line)
     with progress("rendering", total, "samples") as advance:
         if scheduler is None and workers == 1:
-            cluster.do_here(tasks, lambda task: carry_out(task, advance), store.put)
+            cluster.do_here(tasks, lambda task: before.carry_out(task, advance), store.put)
             return
 
         def keep(task: Task, band: Frame) -> None:
@@ -282,7 +270,7 @@ def _render(
             advance(task.samples)
 
         with cluster.open_client(workers, scheduler) as client:
-            cluster.do_on_cluster(client, tasks, carry_out, keep)
+            cluster.do_on_cluster(client, tasks, before.carry_out, keep)
 
 
 def check(folder: Path, scene: str | None = None) -> None:

@@ -12,8 +12,6 @@ A run that was interrupted resumes: the data set knows what of it is there; trai
 checkpoint, which refuses other frames and other recipes.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shlex
@@ -22,17 +20,35 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
+from ... import kernels
+from ...compiler.compile import compile_program
+from ...compiler.core.lower import lower
+from ...compiler.scenes.encode_kernel import sees
+from ...compiler.targets import TARGETS
+from ...kernels.bench.contest import Request
+from ...kernels.devices import registry
+from ...kernels.run.trainer import facts_of
+from ...models.data import frame_plan
+from ...models.data.scene_source import scene_source
+from ...models.model_file import load_checkpoint
+from ...refimpl.encoding import from_display, normal_to_display, to_display
 from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
+from ...refimpl.light.render import Job
+from ...refimpl.light.shading import build, ever_follows
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.train import PRESETS, TrainState, model_of
 from ...refimpl.reading import read_file
 from ..common import options
 from ..common.effort import said_of_learning
 from ..common.options import option
 from ..common.packages import need
 from ..common.terminal import hint_on_interrupt, progress, say, table
-from ..files import dataset_files
+from ..files import dataset_files, exr, images
 from ..files.alone import working_in
+from ..files.images import Image
 from ..files.outputs import write_text
 from ..reports import report
 from ..reports.report import Plan, Results, Unseen
@@ -41,12 +57,7 @@ from ..reports.scores import Score, measure
 from . import bench, bench_forms, bench_frames, dataset, train
 from .compile import write_kernel
 
-if TYPE_CHECKING:
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-    from ...refimpl.network.train import TrainState
-
-    Pair = tuple[Frame, Frame]
+Pair = tuple[Frame, Frame]
 
 FOLDER = "out/demo"
 """Folder of the results, unless another is given."""
@@ -130,9 +141,6 @@ def demo(
 
 def of_scene(plan: Plan, name: str) -> Plan:
     """Return the plan for a scene: the preset that suits its materials, and views if it is static."""
-    from ...models.data.scene_source import scene_source
-    from ...refimpl.light.shading import build, ever_follows
-
     source = scene_source(name)
     shown = source.at()
     specular = ever_follows(build(shown, float))
@@ -143,8 +151,6 @@ def of_scene(plan: Plan, name: str) -> Plan:
 
 def for_this_machine(plan: Plan) -> Plan:
     """Return the plan with the fastest executors that are available here, or one that NumPy can do."""
-    from ...kernels.devices import registry
-
     (name, passed), (trainer, _) = registry.fastest(), registry.fastest(trains=True)
     for reason in passed:
         say(f"not {reason}")
@@ -163,8 +169,6 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
 
     Nobody else makes a demonstration there until the block has ended.
     """
-    from ...refimpl.light.render import Job
-
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
     if folder.exists() and not folder.is_dir():
         raise InputError("output folder", str(folder), "is a file", "choose another with -o")
@@ -235,11 +239,6 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
-    from ...compiler.scenes.encode_kernel import sees
-    from ...models.data import frame_plan
-    from ...models.data.scene_source import scene_source
-    from ...refimpl.network.train import PRESETS
-
     source = scene_source(plan.scene)
     request = frame_plan.Request(
         source.name,
@@ -270,10 +269,6 @@ def _pairs(output: Path, split: str) -> list[tuple[float, Pair]]:
 
 def train_network(plan: Plan, pairs: Sequence[Pair], output: Path) -> tuple[Model, TrainState, float | None]:
     """Train, or finish what an earlier run began; return model, last state and seconds a step, if known."""
-    from ...kernels.run.trainer import facts_of
-    from ...models.model_file import load_checkpoint
-    from ...refimpl.network.train import PRESETS, model_of
-
     recipe = replace(PRESETS[plan.preset], seed=plan.seed)
     if plan.steps is not None:
         recipe = replace(recipe, steps=plan.steps, log_every=max(1, plan.steps // 20))
@@ -307,19 +302,14 @@ def run_kernels(
 
     Return the pictures, whose they are, and what was found about each executor.
     """
-    from ...compiler.compile import compile_program
-    from ...compiler.core.lower import lower
-    from ...compiler.targets import TARGETS
-    from ...kernels import denoise_on, open_executor
-
-    kernels = {target: compile_program(lower(model), target) for target in TARGETS}
-    for target, kernel in kernels.items():
+    compiled = {target: compile_program(lower(model), target) for target in TARGETS}
+    for target, kernel in compiled.items():
         write_kernel(kernel, output / "kernels" / target)
-    with progress("running", len(kernels), "kernels") as advance:
-        images, runs = run_all(model, frames[0], kernels, advance)
+    with progress("running", len(compiled), "kernels") as advance:
+        images, runs = run_all(model, frames[0], compiled, advance)
     by = next(name for name in SHOWN_FIRST if name in images)
-    with open_executor(by) as executor:
-        others = [denoise_on(executor, model, frame).image for frame in frames[1:]]
+    with kernels.open_executor(by) as executor:
+        others = [kernels.denoise_on(executor, model, frame).image for frame in frames[1:]]
     return [images[by], *others], by, runs
 
 
@@ -328,8 +318,6 @@ def measure_speed(plan: Plan, results: Results, output: Path) -> dict[str, Any]:
 
     Forms are trained where that is compiled: the reference would take an hour.
     """
-    from ...kernels.bench.contest import Request
-
     model, forms = results.model, []
     shown = bench_frames.of_folder(output / DATA_SET, model)
     if plan.trainer != "numpy":
@@ -346,9 +334,6 @@ def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[s
 
     The network's output is display-encoded and ends at white, so all pictures are measured in that form.
     """
-    from ...refimpl.encoding import from_display, to_display
-    from ..files.images import Image
-
     stops = model.normalization.exposure_stops
 
     def seen(display: Any) -> Image:
@@ -361,10 +346,6 @@ def score(model: Model, noisy: Frame, reference: Frame, denoised: Any) -> dict[s
 
 def write_pictures(output: Path, results: Results) -> None:
     """Write each test frame's pictures as PNG, and the denoised one as EXR too."""
-    from ...refimpl.encoding import from_display, normal_to_display, to_display
-    from ...refimpl.frame import Frame
-    from ..files import exr, images
-
     stops = results.model.normalization.exposure_stops
     folder = output / report.FOLDER
     folder.mkdir(exist_ok=True)

@@ -6,17 +6,23 @@
 3. What was said of several frames is said once, with their number [`Notes`].
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ... import kernels
+from ...kernels.devices.images import Images
+from ...kernels.run.denoise_on import Denoiser
+from ...kernels.run.tune import first_time
+from ...refimpl.encoding import from_display
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ...refimpl.frame import Frame, not_finite
+from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.denoise import Model
 from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
@@ -25,13 +31,8 @@ from ..common.options import ExecutorName, argument, option
 from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
+from ..files import exr, images
 from ..files.outputs import check_output
-
-if TYPE_CHECKING:
-    from ...kernels.devices.images import Images
-    from ...kernels.run.denoise_on import Denoiser
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,6 @@ class Job:
 
     def read(self, path: Path) -> tuple[Frame, Images]:
         """Return a frame and its encoded features, or refuse it."""
-        from ..files import exr
-
         model = self.denoiser.full
         noisy = exr.read_frame(path, False, self.notes.add, self.layers.view_layer)
         because, remedy = "the model was trained with it", "render or export that layer too"
@@ -89,9 +88,6 @@ class Job:
 
     def write(self, output: Path, source: Path, encoded: Any, origin: str) -> None:
         """Write a denoised image (H, W, 3), display-encoded: as it is to PNG, as linear colour to EXR."""
-        from ...refimpl.encoding import from_display
-        from ..files import exr, images
-
         if output.suffix.lower() == ".png":
             images.write_png(output, encoded, origin)
             return
@@ -140,9 +136,6 @@ def denoise(
     wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
     wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16
     """
-    from ...kernels import open_executor
-    from ...kernels.run.denoise_on import Denoiser
-
     paths = frames_of(frames)
     outputs = outputs_of(paths, output)
     many, suffixes = is_many(paths, output), (".exr",) if layers.keep_layers else (".exr", ".png")
@@ -153,7 +146,7 @@ def denoise(
     network, notes = load_model(model), Notes()
     how = kernel.profile, kernel.schedule, kernel.network(rank)
     name = chosen(executor)
-    with open_executor(name) as runner:
+    with kernels.open_executor(name) as runner:
         job = Job(Denoiser(runner, network, *how, len(paths), keeps=True), notes, layers)
         if many:
             made_by = [name, *how, layers.keep_layers, layers.view_layer]
@@ -165,8 +158,6 @@ def denoise(
 
 def _denoise_one(job: Job, path: Path, output: Path) -> None:
     """Denoise a frame, and say all about it."""
-    from ...kernels.run.tune import first_time
-
     denoiser = job.denoiser
     noisy, images = job.read(path)
     job.notes.say()
@@ -235,8 +226,6 @@ def _origin(path: Path, how: str) -> str:
 
 def read_origin(path: Path) -> str | None:
     """Return the origin that a result names; None where there is none, or it is damaged."""
-    from ..files import exr, images
-
     if not path.exists():
         return None
     return images.read_origin(path) if path.suffix.lower() == ".png" else exr.read_origin(path)
@@ -244,9 +233,6 @@ def read_origin(path: Path) -> str | None:
 
 def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes) -> None:
     """Note pixels that are read as something else."""
-    from ...refimpl.frame import not_finite
-    from ...refimpl.network.dataset import FEATURES
-
     layers = {layer for name in model.features for layer in FEATURES[name].layers}
     for layer, count in not_finite(noisy).items():
         if layer in layers:
@@ -267,10 +253,8 @@ def executors() -> None:
 
 def probe(name: str) -> tuple[str, str, str, str]:
     """Return an executor's name, whether it works here, its schedule, and its device or why it does not."""
-    from ...kernels import open_executor
-
     try:
-        with open_executor(name) as executor:
+        with kernels.open_executor(name) as executor:
             least = f" from {executor.schedule_pixels} pixels on" if executor.schedule_pixels else ""
             return name, "ready", executor.schedule + least, executor.device
     except ExecutorUnavailable as error:

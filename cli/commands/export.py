@@ -1,14 +1,22 @@
 """`wamnet export`: a model, and a scene's path tracer with it, for other programs and engines."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
+from ...compiler.artifact import schedule_text
+from ...kernels.export import check as checking
+from ...kernels.export.hosts.table import host_named
+from ...kernels.export.motion import TIME, Motion
+from ...kernels.export.package import Export, Request, with_speed
+from ...kernels.export.package import export as exported
+from ...kernels.export.speed import check_measured, measure
+from ...models.data.frame_plan import animation_times
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.inputs import load_model, load_scene
 from ..common.options import option
@@ -16,11 +24,6 @@ from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
-
-if TYPE_CHECKING:
-    from ...kernels.export.motion import Motion
-    from ...kernels.export.package import Export
-    from ...refimpl.light.scene import Scene
 
 TARGETS = (
     "opencl, glsl, glsl-compute, glsl-es, glsl-vulkan, wgsl, hlsl, metal, spirv, c, cuda, shadertoy, godot, "
@@ -97,9 +100,6 @@ class Shown:
 
         Some scenes are laid out in another way at time 0, where their boxes are parallel to the axes.
         """
-        from ...kernels.export.motion import TIME, Motion
-        from ...models.data.frame_plan import animation_times
-
         if self.moving is None:
             return None
         kinds, start = tuple(self.moving.split(",")), self.time or 0.0
@@ -124,8 +124,6 @@ class Into:
     def language(self) -> str:
         """Return the target that is named, or that of a host."""
         if self.host is not None:
-            from ...kernels.export.hosts.table import host_named
-
             return self.target or host_named(self.host).target
         if self.target is None:
             rule = "one of them is needed"
@@ -193,11 +191,6 @@ def export(
 
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
     """Return the export that the options ask for; `measured`: it says how long it takes."""
-    from ...kernels.export.package import Request, with_speed
-    from ...kernels.export.package import export as exported
-    from ...kernels.export.speed import check_measured, measure
-    from ...refimpl.light.transport import Settings
-
     if measured:
         check_measured(target)
     settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
@@ -210,8 +203,6 @@ def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, m
 
 def _tell(made: Export) -> None:
     """Say which schedule an export has, which limits it keeps, and what its bound rests on."""
-    from ...compiler.artifact import schedule_text
-
     for picked in filter(None, (kernel.get("schedule") for kernel in made.manifest["kernels"])):
         say(f"schedule {schedule_text(picked)}")
     for limit in made.manifest["limits"]:
@@ -232,14 +223,13 @@ def _write(folder: Path, contents: Any) -> None:
 
 def _checked(made: Export) -> None:
     """Say what compiles and runs an export here, and how far off it is; end with status 1 if wrong."""
-    from ...kernels.export.check import HEAD, digest_of
-    from ...kernels.export.check import check as checked
-
-    verdict = checked(made)
-    for name, value in zip(HEAD, verdict.cells(), strict=True):
+    verdict = checking.check(made)
+    for name, value in zip(checking.HEAD, verdict.cells(), strict=True):
         say(f"{name}: {value}")
     if verdict.bound == 0:
-        say(f"SHA-256 of the image: {verdict.digest}; the reference's: {digest_of(made.pair.output)}")
+        say(
+            f"SHA-256 of the image: {verdict.digest}; the reference's: {checking.digest_of(made.pair.output)}"
+        )
     if not verdict.holds:
         say(f"wrong: {verdict.wrong}")
         raise typer.Exit(STATUS_WRONG)

@@ -1,20 +1,20 @@
 """`wamnet listing`: a kernel, and above its lines those of the reference that they came from."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ...compiler.compile import compile_program
+from ...compiler.core.listing import Line, as_text, lines_of
+from ...compiler.core.lower import lower
+from ...compiler.scenes.lower_scene import lower_scene
+from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.targets import Language, language_named
+from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.inputs import load_model, load_scene
 from ..common.options import Target, argument, option
 from ..common.terminal import say
 from ..files.outputs import check_output, write_text
 from .compile import is_scene
-
-if TYPE_CHECKING:
-    from ...compiler.core.listing import Line
-    from ...compiler.targets import Language
 
 
 def listing(
@@ -31,9 +31,6 @@ def listing(
     wamnet listing model.safetensors --target glsl
     wamnet listing minicubes --target opencl --profile native -o minicubes.txt
     """
-    from ...compiler.core.listing import as_text
-    from ...compiler.targets import language_named
-
     if output is not None:
         check_output(output, inputs=[Path(model)])
     text = as_text(_lines(model, language_named(target), profile), _reference)
@@ -47,13 +44,6 @@ def listing(
 
 def _lines(model: str, language: Language, profile: str) -> list[Line]:
     """Return the lines of the kernel of a model or a scene, with their places."""
-    from ...compiler.compile import compile_program
-    from ...compiler.core.listing import lines_of
-    from ...compiler.core.lower import lower
-    from ...compiler.scenes.lower_scene import lower_scene
-    from ...compiler.scenes.path_kernel import compile_path
-    from ...refimpl.light.transport import Settings
-
     if is_scene(model):
         scene = load_scene(model, None, [])
         programs = lower_scene(scene, Settings(), language.forms, keep_places=True)

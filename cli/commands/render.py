@@ -1,20 +1,24 @@
 """`wamnet render` and `wamnet scene`: from a scene to a frame, and from a scene's name to its text."""
 
-from __future__ import annotations
-
 import time as clock
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from ...kernels.run import render_frame
+from ...refimpl.encoding import to_display
 from ...refimpl.errors import InputError
+from ...refimpl.light.render import Job
+from ...refimpl.light.scene import to_json
+from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_scene
 from ..common.options import FloatType, option
 from ..common.terminal import progress, say
+from ..files import exr, images
 from ..files.outputs import check_output, write_text
 
 
@@ -58,10 +62,6 @@ def render(
     wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
     wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png
     """
-    from ...kernels.run.render_frame import render_frame
-    from ...refimpl.light.render import Job
-    from ...refimpl.light.transport import Settings
-
     loaded = load_scene(scene, time, parameters or [], view)
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
@@ -72,7 +72,7 @@ def render(
         say(line)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples, "samples") as advance:
-        frame = render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
+        frame = render_frame.render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
     taken = f"{clock.perf_counter() - started:.1f} s"
     write_picture(path, frame, exposure)
     say(f"{path}: {width}x{height} pixels, {spp} spp, {taken}")
@@ -80,11 +80,9 @@ def render(
 
 def _tracer(executor: str, workers: int | None, dtype: FloatType) -> str:
     """Return the executor that traces the paths; reject one that shares the work by itself."""
-    from ...kernels.run.render_frame import shares_work
-
     because = "kernels compute in float32" if dtype == "float64" else ""
     name = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
-    if workers is not None and shares_work(name):
+    if workers is not None and render_frame.shares_work(name):
         rule = f"{name} shares the work by itself"
         raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
     return name
@@ -92,9 +90,6 @@ def _tracer(executor: str, workers: int | None, dtype: FloatType) -> str:
 
 def write_picture(path: Path, frame: Any, exposure: float) -> None:
     """Write all layers of a frame as EXR, or its colour at an exposure as PNG, as the name says."""
-    from ...refimpl.encoding import to_display
-    from ..files import exr, images
-
     if path.suffix.lower() == ".exr":
         exr.write_frame(path, frame)
     else:
@@ -116,8 +111,6 @@ def scene(
     wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
     wamnet render mine.json
     """
-    from ...refimpl.light.scene import to_json
-
     text = to_json(load_scene(name, time, parameters or [], view))
     if output is None:
         typer.echo(text, nl=False)

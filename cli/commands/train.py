@@ -1,30 +1,34 @@
 """`wamnet train`: from pairs of a noisy frame and its reference to a model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ... import kernels
+from ...compiler import variants
+from ...compiler.core import sine
+from ...compiler.variants import amplitude_of, parse
+from ...kernels.run.trainer import model_of_run
+from ...models import model_file
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.frame import Frame
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.domain import LEAST_FRAMES, of_model
+from ...refimpl.network.siren import Siren
+from ...refimpl.network.train import PRESETS, Recipe, TrainState, check_recipe, whole_of, with_activation
 from ..common import options
 from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK, load_model
 from ..common.options import Preset, option
 from ..common.request import given
 from ..common.terminal import hint_on_interrupt, progress, say
+from ..files import dataset_files, exr
 from ..files.alone import alone_at
 from ..files.outputs import check_output
-
-if TYPE_CHECKING:
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-    from ...refimpl.network.siren import Siren
-    from ...refimpl.network.train import Recipe, TrainState
 
 WHOLE = "whole8"
 """The variant that --whole is short for."""
@@ -74,8 +78,6 @@ class Wanted:
 
     def recipe(self, state: TrainState | None) -> Recipe:
         """Return the recipe, checked."""
-        from ...refimpl.network.train import check_recipe, with_activation
-
         names = None if self.features is None else options.parse_names(self.features)
         choices = {"features": names, "steps": self.steps, "seed": self.seed, "rank": self.rank}
         recipe = choose_recipe(self.preset or "best", state, choices)
@@ -120,8 +122,6 @@ def train(
     wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
     wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors
     """
-    from ...models.model_file import load_checkpoint
-
     inputs, targets, begin = pairs.inputs or [], pairs.targets or [], wanted.begin
     check_output(output, (".safetensors",), [*inputs, *targets])
     check_output(checkpoint_path(output))
@@ -129,7 +129,7 @@ def train(
     # Two runs would leave a model of one and a checkpoint of the other.
     with alone_at(output, "training a model"), alone_at(saved, "training a model"):
         check_begin(saved, wanted.preset, resume, restart)
-        state = load_checkpoint(saved) if resume else None
+        state = model_file.load_checkpoint(saved) if resume else None
         recipe, network = wanted.recipe(state), _first_network(begin, state)
         name = wanted.network(state)
         if name is not None:
@@ -146,8 +146,6 @@ def train(
 
 def whole_bits(name: str) -> int | None:
     """Return the bits of a variant that is only rounded to integers, or None for another one."""
-    from ...compiler.variants import parse
-
     steps = parse(name).steps
     return int(steps[0][1]) if len(steps) == 1 and steps[0][0] == "whole" else None
 
@@ -156,9 +154,6 @@ def _of_variant(
     recipe: Recipe, begin: Path | None, name: str, others: Mapping[str, object]
 ) -> tuple[Recipe, Siren | None]:
     """Return recipe and first network of a variant; integers by themselves need no model to begin with."""
-    from ...compiler.variants import amplitude_of
-    from ...refimpl.network.train import check_recipe
-
     bits = whole_bits(name)
     if begin is None and bits is not None:
         found = replace(recipe, whole=amplitude_of(bits))
@@ -173,10 +168,7 @@ def _of_variant(
 
 def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
     """Write a model in integers, rounded on the frames and not trained, and say so."""
-    from ...models.model_file import save_model
-    from ...refimpl.network.train import whole_of
-
-    save_model(output, whole_of(load_model(begin), pairs, recipe.whole, recipe.seed))
+    model_file.save_model(output, whole_of(load_model(begin), pairs, recipe.whole, recipe.seed))
     say(f"{output}: {begin} in integers, rounded on {len(pairs)} frames")
 
 
@@ -191,10 +183,6 @@ def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None
 
 def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     """Return the recipe and the first network with which a variant of a model is trained."""
-    from ...compiler import variants
-    from ...compiler.core import sine
-    from ...refimpl.network.train import check_recipe
-
     varied, amplitude = variants.vary(variants.parse(name), model).floats
     if varied.degree != sine.DEGREE:
         rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
@@ -259,8 +247,6 @@ def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool)
 
 def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]) -> Recipe:
     """Return the checkpoint's recipe, or the preset's, with the choices that were made (not None)."""
-    from ...refimpl.network.train import PRESETS
-
     base = PRESETS[preset] if state is None else state.recipe
     return replace(base, **{name: value for name, value in choices.items() if value is not None})
 
@@ -269,8 +255,6 @@ def read_training(
     dataset: Path | None, inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
 ) -> list[tuple[Frame, Frame]]:
     """Read the pairs to train on: a data set's, or those of the named frames; one of the two."""
-    from ..files import dataset_files
-
     if dataset is None and not inputs and not targets:
         raise InputError("training frames", NO_VALUE, "missing", "give -i and -t, or --dataset")
     if dataset is None:
@@ -285,8 +269,6 @@ def read_pairs(
     inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
 ) -> list[tuple[Frame, Frame]]:
     """Read the noisy frames, which must have the layers of the features, and their references."""
-    from ..files import exr
-
     if len(inputs) != len(targets):
         rule = f"each --input needs its --target, and there are {len(inputs)} inputs"
         raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
@@ -312,9 +294,6 @@ def fit(
 
     The run continues from `state`, or begins with the weights of `network`, or with random ones.
     """
-    from ...kernels.run.trainer import model_of_run
-    from ...models.model_file import save_checkpoint, save_model
-
     saved, seen = checkpoint_path(output), state.step if state is not None else 0
     started = kept = monotonic()
     with progress("training", recipe.steps - seen, "steps") as advance:
@@ -324,7 +303,7 @@ def fit(
             advance(now.step - seen)
             seen = now.step
             if monotonic() - kept > CHECKPOINT_INTERVAL_S:
-                save_checkpoint(saved, now)
+                model_file.save_checkpoint(saved, now)
                 kept = monotonic()
 
         with _trainer(executor) as train:
@@ -334,10 +313,10 @@ def fit(
                 state=state,
                 network=network,
                 on_progress=on_progress,
-                on_checkpoint=lambda now: save_checkpoint(saved, now),
+                on_checkpoint=lambda now: model_file.save_checkpoint(saved, now),
             )
     seconds = monotonic() - started
-    save_model(output, model_of_run(state, pairs))
+    model_file.save_model(output, model_of_run(state, pairs))
     return state, seconds
 
 
@@ -349,8 +328,6 @@ def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
 
         yield train
         return
-    from ... import kernels
-
     with kernels.open_executor(executor) as device:
         yield partial(kernels.train_on, device)
 
@@ -363,8 +340,6 @@ def _say_what_there_is(path: Path, steps: int) -> None:
 
 def _said_of_domain(path: Path) -> str:
     """Return what a model states as its domain."""
-    from ...refimpl.network.domain import LEAST_FRAMES, of_model
-
     domain = of_model(load_model(path))
     if domain is None:
         return (

@@ -14,30 +14,38 @@ import math
 import shlex
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import typer
 
+from ...compiler import artifact
+from ...compiler import compile as compiling
+from ...compiler.artifact import Artifact
+from ...compiler.core import ir
+from ...compiler.core.lower import lower
+from ...compiler.core.profiles import profile_named
+from ...compiler.plan import Plan, analysed
+from ...kernels.devices.images import Images
+from ...kernels.devices.registry import EXECUTORS, WAYS
+from ...kernels.judge import apart
+from ...kernels.judge.reduce import Box, Reduced, reduced
+from ...kernels.judge.triage import Compile, Judge, Kernel, Verdict, conclusion, kernels_of, odd_ones
+from ...kernels.run.denoise_on import images_of
 from ...refimpl.errors import ExecutorUnavailable, InputError, choice
+from ...refimpl.frame import Frame
+from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.denoise import Model
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common import options
 from ..common.inputs import load_model, model_path
 from ..common.options import argument, option
 from ..common.terminal import progress, say, table
+from ..files import exr
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
-
-if TYPE_CHECKING:
-    from ...compiler.artifact import Artifact
-    from ...compiler.plan import Plan
-    from ...kernels.devices.images import Images
-    from ...kernels.judge.apart import Apart
-    from ...kernels.judge.reduce import Box, Reduced
-    from ...kernels.judge.triage import Compile, Kernel, Verdict
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
 
 STATUS_DEVIATES = 1
 """Exit status when a kernel is beyond its bound."""
@@ -87,10 +95,6 @@ def triage(
     wamnet triage model.safetensors noisy.exr --schedules all
     wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd
     """
-    from ...compiler.core.profiles import profile_named
-    from ...kernels.run.denoise_on import images_of
-    from ..files import exr
-
     check_new_folder(output)
     profile_named(chosen.profile)
     model = model_path(model)
@@ -129,25 +133,20 @@ class Task:
     @property
     def compiled(self) -> Compile:
         """Return the compiler, which has the kept kernel for its own where there is one."""
-        from ...compiler.compile import compile_plan
-
-        return self.kept.compiled if self.kept else compile_plan
+        return self.kept.compiled if self.kept else compiling.compile_plan
 
 
-def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Apart]:
+def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[apart.Apart]:
     """Open executors by name, each in a process of its own: all that are here, or those that are wanted."""
-    from ...kernels.devices.registry import EXECUTORS, WAYS
-    from ...kernels.judge.apart import Apart
-
     for name in wanted:
         if name not in {*WAYS, *EXECUTORS}:
             raise InputError("--executor", name, "unknown", choice(name, dict.fromkeys([*EXECUTORS, *WAYS])))
-    runners: list[Apart] = []
+    runners: list[apart.Apart] = []
     for way, (name, _) in WAYS.items():
         if wanted and not {way, name} & set(wanted):
             continue
         try:
-            runners.append(opened.enter_context(Apart(way)))
+            runners.append(opened.enter_context(apart.Apart(way)))
         except ExecutorUnavailable as error:
             if way in wanted:
                 raise
@@ -157,11 +156,8 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Apart]:
     return runners
 
 
-def _judged(task: Task, runners: Sequence[Apart]) -> list[Verdict]:
+def _judged(task: Task, runners: Sequence[apart.Apart]) -> list[Verdict]:
     """Run all kernels on the whole frame."""
-    from ...compiler.core.lower import lower
-    from ...kernels.judge.triage import Judge, kernels_of
-
     program, size = lower(task.model), (task.frame.height, task.frame.width)
     # The schedule that an executor would pick is not that of the kept kernel.
     instead = {task.kept.kernel.target: task.kept.schedule} if task.kept else {}
@@ -178,9 +174,6 @@ def _judged(task: Task, runners: Sequence[Apart]) -> list[Verdict]:
 
 def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
     """Say who is the odd one out; return the failure made small, or None where there is none."""
-    from ...kernels.judge.reduce import reduced
-    from ...kernels.judge.triage import conclusion, odd_ones
-
     text = conclusion(verdicts)
     if not any(verdict.ran for verdict in verdicts):
         raise InputError("--schedules", task.schedules, text, f"the first reason: {verdicts[0].state}")
@@ -214,10 +207,6 @@ def _print(title: str, verdicts: Sequence[Verdict]) -> None:
 
 def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, model_file: Path) -> None:
     """Write model, part of the frame, the odd kernels and the report: all of it or nothing."""
-    from ...compiler import artifact
-    from ...kernels.judge.triage import odd_ones
-    from ..files import exr
-
     odd = [verdict.kernel for verdict in odd_ones(found.verdicts)]
     with making_folder(folder) as new:
         (new / MODEL).write_bytes(model_file.read_bytes())
@@ -236,10 +225,6 @@ def part_of(task: Task, box: Box) -> Frame:
 
     NaN is 0, and infinities the largest numbers: they are encoded alike.
     """
-    import numpy as np
-
-    from ...refimpl.network.dataset import FEATURES
-
     names = dict.fromkeys(layer for name in task.model.features for layer in FEATURES[name].layers)
     largest = float(np.finfo(np.float32).max)
     layers = {
@@ -256,13 +241,6 @@ def _folder_of(kernel: Kernel) -> str:
 
 def _report(task: Task, verdicts: Sequence[Verdict], found: Reduced) -> dict[str, Any]:
     """Return what report.json holds; numbers that JSON does not know are words."""
-    from dataclasses import asdict
-
-    from ...compiler.core import ir
-    from ...compiler.core.lower import lower
-    from ...compiler.plan import analysed
-    from ...kernels.judge.triage import conclusion
-
     return {
         "schema": SCHEMA,
         "conclusion": conclusion(verdicts),
@@ -357,9 +335,7 @@ class Kept:
 
     def compiled(self, plan: Plan) -> Artifact:
         """Return the kept kernel where it is the plan's, else a new one."""
-        from ...compiler.compile import compile_plan
-
-        made = compile_plan(plan)
+        made = compiling.compile_plan(plan)
         same = all(
             made.manifest[key] == self.kernel.manifest[key] for key in ("program", "target", "schedule")
         )
@@ -381,12 +357,6 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     They may have been changed: neither their hashes nor their lengths are checked. The manifest says what
     they are the kernel of.
     """
-    from ...compiler import artifact
-    from ...compiler.compile import compile_program
-    from ...compiler.core import ir
-    from ...compiler.core.lower import lower
-    from ...compiler.plan import analysed
-
     way_out = "give a folder that triage or compile wrote"
     rule = f"must hold a {artifact.MANIFEST_NAME} that wamnet wrote beside a model's kernel"
     with refusing("--kernel", str(folder), rule, way_out):
@@ -398,7 +368,7 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     if wanted != ir.digest(analysed(program)) or name != profile:
         rule = f"its kernel is of another model or profile ({name})"
         raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
-    made = compile_program(program, target, profile, schedule)
+    made = compiling.compile_program(program, target, profile, schedule)
     if made.manifest["schedule"] != manifest["schedule"]:
         rule = f"the compiler makes no kernel of this model for {target} in schedule {schedule} any more"
         raise InputError("--kernel", str(folder), rule, "compile the model again")
@@ -407,11 +377,6 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
 
 def _with_files(made: Artifact, folder: Path) -> Artifact:
     """Return an artifact with the source and the weights in a folder instead of its own."""
-    import numpy as np
-
-    from ...compiler import artifact
-    from ...compiler.core import ir
-
     content = read_file(folder / made.source_name, "--kernel")
     raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")
     if len(raw) != 4 * made.weights.size:

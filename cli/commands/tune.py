@@ -1,22 +1,21 @@
 """`wamnet tune`: measure a denoiser's schedules on this machine, and remember the fastest."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ...compiler.variants import FULL, plan_model, with_rank
+from ...kernels import cache, open_executor
+from ...kernels.bench.workload import paper_model
+from ...kernels.run import tune as tuning
+from ...kernels.run.tune import Table
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.inputs import load_model
 from ..common.options import ExecutorName, argument, option
 from ..common.terminal import say, table
 from ..files.alone import alone_in
-
-if TYPE_CHECKING:
-    from ...kernels.run.tune import Table
 
 LARGEST_SIZE = 2**13
 """Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
@@ -47,11 +46,6 @@ def tune(
     wamnet tune
     wamnet tune model.safetensors --executor opengl --size 512 --force
     """
-    from ...compiler.variants import FULL, plan_model, with_rank
-    from ...kernels import open_executor
-    from ...kernels.bench.workload import paper_model
-    from ...kernels.run import tune as tuning
-
     if not 1 <= size <= LARGEST_SIZE:
         raise InputError("--size", size, f"must be from 1 to {LARGEST_SIZE}", "for example --size 512")
     if cache is not None:
@@ -73,8 +67,6 @@ def tune(
 @contextmanager
 def _alone() -> Iterator[None]:
     """Keep out another process that tunes on this machine: each would measure the other's load."""
-    from ...kernels import cache
-
     folder = cache.folder()
     # A cache that cannot be written costs time, never a run.
     if folder is None or not cache.writable(folder):

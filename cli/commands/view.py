@@ -7,8 +7,6 @@
    once [`PageServer`].
 """
 
-from __future__ import annotations
-
 import socket
 import threading
 import webbrowser

@@ -8,9 +8,8 @@
    this process keeps many results.
 """
 
-from __future__ import annotations
-
 import logging
+import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -59,8 +58,6 @@ def do_on_cluster(
         A worker without this package then answers with an error. Were the task sent as it is, Dask would drop
         the connection when it could not read it, and this process would wait for ever.
         """
-        import pickle
-
         function, argument = pickle.loads(parcel)
         result: _Result = function(argument)
         return result

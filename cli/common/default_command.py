@@ -9,8 +9,6 @@
 Typer's groups do it the other way around: what a group does not know is refused.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from typer.core import TyperGroup

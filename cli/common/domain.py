@@ -5,21 +5,20 @@
 3. Of an animation each picture that is made is measured [`Watch`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
+from ...refimpl.network.dataset import FEATURES
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.domain import Distance, Domain, measure, measure_frame, of_model
 from .inputs import unlike_training
 from .terminal import say
-
-if TYPE_CHECKING:
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-    from ...refimpl.network.domain import Distance, Domain
 
 
 def check_domain(
@@ -29,9 +28,6 @@ def check_domain(
 
     Another program's frame that is outside of the domain is refused, unless it is to be denoised `anyway`.
     """
-    from ...refimpl.network.dataset import FEATURES
-    from ...refimpl.network.domain import measure_frame, of_model
-
     foreign = not frame.info
     read = ", ".join(dict.fromkeys(layer for name in model.features for layer in FEATURES[name].layers))
     named, domain = unlike_training(model, frame.info), of_model(model)
@@ -77,8 +73,6 @@ class Watch:
 
     def __post_init__(self) -> None:
         """Read the domain."""
-        from ...refimpl.network.domain import of_model
-
         self.domain = of_model(self.model)
 
     @property
@@ -88,17 +82,11 @@ class Watch:
 
     def see_frame(self, name: str, frame: Frame) -> None:
         """Measure the frame of a picture of this name."""
-        from ...refimpl.network.domain import measure_frame
-
         if self.domain:
             self.pictures.append((name, measure_frame(self.domain, self.model, frame)))
 
     def see_images(self, name: str, images: Any) -> None:
         """Measure the encoded features (H, W, channels) of a picture, by name."""
-        import numpy as np
-
-        from ...refimpl.network.domain import measure
-
         if self.domain:
             image = np.concatenate([images[feature] for feature in self.features], axis=-1)
             self.pictures.append((name, measure(self.domain, image)))

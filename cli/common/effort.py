@@ -11,15 +11,12 @@ to 27,000 of them: processor time on one core for NumPy and compilation, time on
 OpenCL, with 30 primitives. The memory of a pixel is counted, not measured. A rule of thumb, no more.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from ...refimpl.light.scene import Scene
+from ...refimpl.light.render import TILE_PIXELS
+from ...refimpl.light.scene import Scene, primitives
 
 MANY_PRIMITIVES = 100_000
 """From so many primitives on a sentence is said."""
@@ -55,15 +52,11 @@ their means, and the frame."""
 
 def primitives_of(scene: Scene) -> int:
     """Return the number of things in a scene that a ray can meet."""
-    from ...refimpl.light.scene import primitives
-
     return primitives(scene) + (scene.room is not None)
 
 
 def seconds_of(primitives: int, samples: int, pixels: int, executor: str, workers: int) -> float:
     """Return how long rendering may take, of pictures of so many pixels each."""
-    from ...refimpl.light.render import TILE_PIXELS
-
     if executor != "numpy":
         return primitives * samples * _KERNEL_SAMPLE_S
     tiles = samples / pixels * math.ceil(pixels / TILE_PIXELS)

@@ -1,7 +1,6 @@
 """The executor that a command runs on: the one that is named, or the fastest available."""
 
-from __future__ import annotations
-
+from ...kernels.devices import registry
 from .terminal import say
 
 AUTO = "auto"
@@ -18,8 +17,6 @@ def chosen(executor: str, *, because: str = "", trains: bool = False, work: str 
 
 def fastest(*, because: str = "", trains: bool = False, work: str = "executor") -> str:
     """Return the fastest executor; print it, and why each faster one is passed over."""
-    from ...kernels.devices import registry
-
     name, passed = ("numpy", []) if because else registry.fastest(trains)
     for reason in passed:
         say(f"not {reason}")

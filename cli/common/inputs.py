@@ -1,19 +1,19 @@
 """Reading what commands are given, with errors that name the file and fit the command."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ... import models
+from ...models import model_file
+from ...models.data.scene_source import SCENE_FILE, scene_source
 from ...refimpl.errors import InputError, choice
+from ...refimpl.light.render import FEATURE_SAMPLER, FEATURE_SPP, SHADOW_RAYS, spread_rays
+from ...refimpl.light.scene import Scene
+from ...refimpl.light.scenes import CANONICAL, canonical
+from ...refimpl.light.variation import RANGES, outside, ranges_from_json
+from ...refimpl.network.denoise import Model
 from . import options
 from .terminal import tell
-
-if TYPE_CHECKING:
-    from ...refimpl.light.scene import Scene
-    from ...refimpl.network.denoise import Model
 
 MODEL_PREFIX = "model:"
 """May be before the name of a model that ships with the package, and must where scenes have names too."""
@@ -53,8 +53,6 @@ def load_model(path: Path, imported: bool = False) -> Model:
 
     `imported`: networks of other programs too, which do not read frames.
     """
-    from ...models import model_file
-
     path = model_path(path)
     try:
         found = model_file.load_model(path)
@@ -72,9 +70,6 @@ def load_model(path: Path, imported: bool = False) -> Model:
 
 def trained_scene(model: Model) -> str | None:
     """Return the canonical scene that a model was trained on; None for several, a file's, and no name."""
-    from ...models.data.scene_source import SCENE_FILE
-    from ...refimpl.light.scenes import CANONICAL
-
     name = model.info.get("trained_on_scene", "")
     return name if name in CANONICAL and f"trained_on_{SCENE_FILE}" not in model.info else None
 
@@ -91,9 +86,6 @@ def learned_scene(model: Model) -> str:
 
 def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what about a frame of this info a model has not learned, as sentences; not known is nothing."""
-    from ...models.data.scene_source import SCENE_FILE
-    from ...refimpl.light.render import SHADOW_RAYS
-
     told, files = [], model.info.get(f"trained_on_{SCENE_FILE}", "")
     scenes, scene = model.info.get("trained_on_scene", ""), info.get("scene", "")
     if scenes and scene and scene not in scenes.split(", "):
@@ -112,8 +104,6 @@ def unlike_training(model: Model, info: Mapping[str, str]) -> list[str]:
 
 def unlike_features(model: Model, info: Mapping[str, str]) -> str:
     """Return that a frame's features are of other rays than a model's, or "": fewer do if spread."""
-    from ...refimpl.light.render import FEATURE_SAMPLER, FEATURE_SPP, spread_rays
-
     rays, wanted = info.get(FEATURE_SPP, "1"), model.info.get(f"trained_on_{FEATURE_SPP}", "1")
     source, learned = info.get(FEATURE_SAMPLER, ""), model.info.get(f"trained_on_{FEATURE_SAMPLER}", "")
     counts = wanted.split(", ")
@@ -127,10 +117,6 @@ def unlike_features(model: Model, info: Mapping[str, str]) -> str:
 
 def outside_ranges(model: Model, info: Mapping[str, str]) -> list[str]:
     """Return what of a frame lies outside of the ranges that a model says it has learned."""
-    from ...models.data.scene_source import SCENE_FILE
-    from ...refimpl.light.scenes import CANONICAL, canonical
-    from ...refimpl.light.variation import RANGES, outside, ranges_from_json
-
     text, scene = model.info.get(f"trained_on_{RANGES}"), info.get("scene", "")
     files = model.info.get(f"trained_on_{SCENE_FILE}")
     if text is None:
@@ -143,8 +129,6 @@ def load_scene(
     name: str, time: float | None, assignments: Sequence[str], view: options.View | None = None
 ) -> Scene:
     """Return a canonical scene by name, or that of a scene file, as a view has it."""
-    from ...models.data.scene_source import scene_source
-
     parameters = options.parse_parameters(assignments)
     if time is not None:
         parameters["time"] = time

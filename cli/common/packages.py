@@ -1,7 +1,5 @@
 """Optional packages: imported when they are needed, and a plain sentence when they are not there."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

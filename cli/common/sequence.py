@@ -8,8 +8,6 @@
    and the others are done [`overlapped`].
 """
 
-from __future__ import annotations
-
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence

@@ -3,8 +3,6 @@
 Names and texts may be untrusted: nothing reaches the terminal before [`errors.escaped`] has seen it.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence

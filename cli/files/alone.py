@@ -9,8 +9,6 @@
    [`signals_wait`, models/writing.py].
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import hashlib

@@ -27,17 +27,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import IO, Any, Generic, Protocol, TypeVar
 
+from ...models.data.frame_plan import Rows, join, version
 from ...models.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
+from ...refimpl.frame import Frame
 from ...refimpl.reading import BROKEN, parse_json, read_file
+from . import exr
 from .alone import working_in
 from .outputs import check_real_folder, write_text
-
-if TYPE_CHECKING:
-    from ...models.data.frame_plan import Rows
-    from ...refimpl.frame import Frame
 
 SCHEMA = "wamnet-dataset-2"
 """Name and version of the manifest's form; described in spec/dataset_files.md."""
@@ -196,8 +195,6 @@ def manifest_of(
 
     `nearest` says of each split of test frames how far the nearest training frame is.
     """
-    from ...models.data.frame_plan import version
-
     facts = [frame.describe() for frame in frames]
     for frame in facts:
         for kind in KINDS:
@@ -269,9 +266,6 @@ def read_pairs(
     Nothing but its colour is learnt from a target, so the other layers do not stay in memory. `tell` is given
     what was said of pictures of another program [exr.read_frame], each sentence once.
     """
-    from ...refimpl.frame import Frame
-    from . import exr
-
     manifest = read_manifest(folder)
     frames = [frame for frame in manifest["frames"] if frame["split"] == split]
     refuse_wrong(folder, verify(folder, {**manifest, "frames": frames}))
@@ -409,8 +403,6 @@ class Store(Generic[BandT]):
 
     def _publish(self, picture: Pictured[Band], rows: Rows, band: Frame) -> None:
         """Write a band under a name that ends in its checksum."""
-        from . import exr
-
         new = self.unfinished / NEW
         exr.write_frame(new, band)
         first, last = rows
@@ -420,9 +412,6 @@ class Store(Generic[BandT]):
 
     def _join_if_whole(self, picture: Pictured[Band]) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
-        from ...models.data.frame_plan import join
-        from . import exr
-
         bands, whole = self._bands[picture.name], (0, picture.height)
         if whole not in bands:
             if not all(task.rows in bands for task in picture.tasks()):

@@ -14,8 +14,6 @@
    among all channels of that file, for a compositor [`write_denoised`].
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -10,8 +10,6 @@
 Source: "OpenEXR File Layout" of the OpenEXR documentation.
 """
 
-from __future__ import annotations
-
 import mmap
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence

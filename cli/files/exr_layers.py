@@ -10,8 +10,6 @@
 Source: "Storing Multi-View Images in OpenEXR Files" of the OpenEXR documentation, for names with views.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

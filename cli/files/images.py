@@ -7,8 +7,6 @@
    form [`read_image`], [`Image`].
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

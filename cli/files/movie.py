@@ -3,8 +3,6 @@
 A film is written from files of one size, one at a time, all of it or nothing [`write_movie`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any

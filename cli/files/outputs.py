@@ -9,8 +9,6 @@
 4. A folder that is written as a whole appears in the same way [`check_new_folder`], [`making_folder`].
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

@@ -9,8 +9,6 @@
 Source: Portable Network Graphics (PNG) Specification, third edition, W3C 2025.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path

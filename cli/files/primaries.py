@@ -12,8 +12,6 @@ Sources: SMPTE RP 177 (matrix of primaries); K. M. Lam, "Metamerism and colour c
 SMPTE ST 2065-1 (AP0), Academy S-2014-004 (AP1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 The data are those of spec/bench.md; here they are only written down and drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any

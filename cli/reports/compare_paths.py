@@ -1,21 +1,18 @@
 """`wamnet compare --paths`: a path kernel against the reference, path by path and as a picture."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
+from ... import kernels
+from ...kernels.judge.compare_images import ImageReport, check_samples, compare_images
+from ...kernels.judge.compare_paths import PathReport
+from ...refimpl.light.render import Job
 from ..common.inputs import load_scene
 from ..common.terminal import progress, say, table
-
-if TYPE_CHECKING:
-    from ...kernels.judge.compare_images import ImageReport
-    from ...kernels.judge.compare_paths import PathReport
-    from ...refimpl.light.render import Job
 
 STATUS_DIFFERENT = 1
 """Exit status when a difference has no explanation."""
@@ -30,8 +27,6 @@ def compare_paths(
     as_json: bool,
 ) -> None:
     """Compare the paths of the job's first sample, and the picture; end with status 1 if they disagree."""
-    from ... import kernels
-    from ...kernels.judge.compare_images import check_samples, compare_images
     from ...kernels.judge.compare_paths import View, compare_paths
 
     scene = load_scene(name, time, parameters)

@@ -1,7 +1,5 @@
 """What a report says about the machine, and the versions of what ran on it."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Sequence

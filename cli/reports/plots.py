@@ -3,12 +3,18 @@
 Colour maps and scales are chosen so that a plot can be read in grey too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
+
+from matplotlib import colormaps
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.ticker import NullLocator
+from matplotlib.transforms import Bbox
 
 
 @dataclass(frozen=True)
@@ -48,8 +54,6 @@ def error_maps(maps: Sequence[tuple[str, Any]], theme: Theme) -> list[bytes]:
 
     The scale follows the square root of the error: else a few bright samples would hide everything else.
     """
-    from matplotlib.colors import PowerNorm
-
     largest = max(float(values.max()) for _, values in maps)
     scale = PowerNorm(0.5, 0.0, largest or 1.0)
     drawn = []
@@ -85,8 +89,6 @@ def training_curve(
 
 def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> bytes:
     """Draw times (ms) over widths of square pictures, a line for each name."""
-    from matplotlib import colormaps
-
     figure, axis = _figure(theme, (8.0, 5.0))
     axis.set_xscale("log", base=2)
     axis.set_yscale("log")
@@ -107,8 +109,6 @@ def growth(lines: Mapping[str, Sequence[tuple[int, float]]], theme: Theme) -> by
 
 def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> list[Any]:
     """Return the boxes that labels leave free: around points at these coordinates, and the legend's."""
-    from matplotlib.transforms import Bbox
-
     figure.draw_without_rendering()
     corners = (
         (x - MARKER_PX, y - MARKER_PX, x + MARKER_PX, y + MARKER_PX)
@@ -121,8 +121,6 @@ def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> lis
 
 def _place(axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any]) -> None:
     """Write a name beside a point in the first position that is free, if there is one."""
-    from matplotlib.text import Text
-
     frame = axis.get_window_extent()
     for x, y in POSITIONS:
         text = axis.annotate(
@@ -241,8 +239,6 @@ def _height(panel: Panel, mark: Mark) -> float:
 
 def _panel(axis: Any, panel: Panel, theme: Theme) -> None:
     """Draw a panel's marks, front and band."""
-    from matplotlib.ticker import NullLocator
-
     for mark in panel.marks:
         marker = {**MARKERS, "": PEER_MARKER, "other": OTHER_MARKER}[mark.executor][0]
         colour, height = COLOURS[mark.kind][0], _height(panel, mark)
@@ -277,8 +273,6 @@ def _panel(axis: Any, panel: Panel, theme: Theme) -> None:
 
 def _legend(figure: Any, marks: Sequence[Mark], theme: Theme) -> None:
     """Draw a legend of the markers and colours that occur, below the panels."""
-    from matplotlib.lines import Line2D
-
     forms = {**MARKERS, "": PEER_MARKER, "other": OTHER_MARKER}
     here = {mark.executor for mark in marks}, {mark.kind for mark in marks}
     grey: dict[str, Any] = {"linestyle": "none", "color": theme.text, "markersize": 6.5}
@@ -309,8 +303,6 @@ def _dress(axis: Any, theme: Theme, grid: str = "") -> None:
 
 def _figure(theme: Theme, inches: tuple[float, float], panels: int = 1) -> tuple[Any, ...]:
     """Return a figure and its transparent axes, one above the other."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=inches, dpi=DOTS_PER_INCH, layout="constrained", facecolor=theme.page)
     form = {"facecolor": "none"}
     return figure, *figure.subplots(panels, sharex=True, squeeze=False, subplot_kw=form)[:, 0]

@@ -5,25 +5,25 @@
    runs, and it follows the reader's choice of a light or a dark page.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import jinja2
+
+from ...refimpl.encoding import to_display
+from ...refimpl.frame import Frame
+from ...refimpl.metrics import error_map
+from ...refimpl.network.denoise import Model
+from ...refimpl.network.train import TrainState
 from ..files.outputs import write_text
 from . import bench_report, machine, plots, scores
-
-if TYPE_CHECKING:
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
-    from ...refimpl.network.train import TrainState
-    from .runs import Run
-    from .scores import Score
+from .runs import Run
+from .scores import Score
 
 SCHEMA = "wamnet-demo-2"
 """Name and version of the form of `report.json`."""
@@ -179,17 +179,12 @@ def draw(results: Results) -> dict[str, Any]:
 
 def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
     """Return the absolute error (H, W) of the noisy and the denoised picture."""
-    from ...refimpl.encoding import to_display
-    from ...refimpl.metrics import error_map
-
     noisy, target = (to_display(layers["color"], stops) for layers in (frame.noisy, frame.reference))
     return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
 
 
 def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
     """Return the report as one HTML page."""
-    import jinja2
-
     text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters["number"] = bench_report.number

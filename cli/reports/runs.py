@@ -1,18 +1,21 @@
 """One model and one frame on every executor: picture, times, error against the float64 reference, bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from ... import kernels
+from ...compiler.artifact import Artifact
+from ...compiler.core.enclosure import round_up
+from ...compiler.plan import Plan
+from ...compiler.variants import plan_model
+from ...kernels.run.denoise_on import images_of
 from ...refimpl.errors import CompileError, ExecutorUnavailable
-
-if TYPE_CHECKING:
-    from ...compiler.artifact import Artifact
-    from ...compiler.plan import Plan
-    from ...refimpl.frame import Frame
-    from ...refimpl.network.denoise import Model
+from ...refimpl.frame import Frame
+from ...refimpl.metrics import largest_error
+from ...refimpl.network.denoise import Model, denoise
 
 
 @dataclass(frozen=True)
@@ -34,17 +37,13 @@ class Run:
 
 
 def run_all(
-    model: Model, frame: Frame, kernels: dict[str, Artifact], on_done: Callable[[float], None]
+    model: Model, frame: Frame, compiled: dict[str, Artifact], on_done: Callable[[float], None]
 ) -> tuple[dict[str, Any], tuple[Run, ...]]:
     """Run each executor that is here; return pictures (H, W, 3) by executor, and what was found about all."""
-    import numpy as np
-
-    from ...refimpl.network.denoise import denoise
-
     truth = denoise(model, frame, np.float64)
     images: dict[str, Any] = {}
     runs = []
-    for name, kernel in kernels.items():
+    for name, kernel in compiled.items():
         try:
             images[name], run = run_one(name, kernel, model, frame, truth)
         except (ExecutorUnavailable, CompileError) as error:
@@ -59,19 +58,13 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
 
     The kernel runs twice and the second time counts: drivers put off work until the first run.
     """
-    from ...compiler.core.enclosure import round_up
-    from ...compiler.variants import plan_model
-    from ...kernels import denoise_on, open_executor
-    from ...kernels.run.denoise_on import images_of
-    from ...refimpl.metrics import largest_error
-
-    with open_executor(name) as executor:
+    with kernels.open_executor(name) as executor:
         schedule = executor.schedule_for((frame.height, frame.width))
         plan = plan_model(model, name, kernel.profile, schedule)
         # The bound is that of the network's kernel: its images are the reference's.
         images = images_of(model, frame)
-        first = denoise_on(executor, model, frame, images=images)
-        second = denoise_on(executor, model, frame, images=images)
+        first = kernels.denoise_on(executor, model, frame, images=images)
+        second = kernels.denoise_on(executor, model, frame, images=images)
     everywhere = plan.bound.output
     run = Run(
         name,
@@ -87,9 +80,5 @@ def run_one(name: str, kernel: Artifact, model: Model, frame: Frame, truth: Any)
 
 def frame_bound(plan: Plan, frame: Frame) -> float | None:
     """Return the bound on the largest error of a plan's kernel in this frame, or None where it has none."""
-    import numpy as np
-
-    from ...kernels.run.denoise_on import images_of
-
     largest = float(plan.expected(images_of(plan.model, frame)).bound.max())
     return largest if np.isfinite(largest) else None

@@ -1,16 +1,12 @@
 """The score of a picture in every metric, for people and for programs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ...refimpl.errors import InputError
-
-if TYPE_CHECKING:
-    from ..files.images import Image
+from ...refimpl.metrics import METRICS, inside
+from ..files.images import Image
 
 
 @dataclass(frozen=True)
@@ -32,8 +28,6 @@ def measure(image: Image, reference: Image) -> tuple[Score, ...]:
 
     In the penumbra too, where the reference has the layers that it is computed from.
     """
-    from ...refimpl.metrics import METRICS, inside
-
     scores = []
     for metric in METRICS.values():
         try:

@@ -6,24 +6,24 @@
    as they are: nothing is built, nothing is fetched; its Content-Security-Policy forbids it to.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import jinja2
+
+from ...kernels.run.page import Animation, networks_of, page_data
+from ...kernels.run.webassembly import compiler
+from ...models.data.scene_source import scene_source
 from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.network.denoise import Model
 from ..common import options
 from ..common.inputs import learned_scene, load_model, load_scene
 from ..common.packages import need
-
-if TYPE_CHECKING:
-    from ...kernels.run.page import Animation
-    from ...refimpl.network.denoise import Model
 
 FOLDER = "templates"
 """Folder of the template and its parts, beside this module."""
@@ -54,9 +54,6 @@ LEAD = (
 
 def build_page(animation: Animation, model: Model, fast: Model | None = None) -> str:
     """Return the page of an animation and a model; `fast` is a model for the variants of low rank."""
-    from ...kernels.run.page import networks_of, page_data
-    from ...kernels.run.webassembly import compiler
-
     networks = networks_of(model, fast, processor=bool(compiler()) and not model.is_whole)
     return render_page(page_data(animation, networks))
 
@@ -71,9 +68,6 @@ def page_of(model: Path, scene: str | None, assignments: Sequence[str], fast: Pa
 
 def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
     """Return a canonical scene at the times of a page, or the scene in a file, which is still."""
-    from ...kernels.run.page import Animation
-    from ...models.data.scene_source import scene_source
-
     still = scene_source(name, options.parse_parameters(assignments)).still
     if still is not None:
         return Animation((0.0,), (still,))
@@ -89,7 +83,6 @@ def animation_of(name: str, assignments: Sequence[str] = ()) -> Animation:
 
 def render_page(data: dict[str, Any]) -> str:
     """Return the page that shows such data."""
-    import jinja2
 
     def part(name: str) -> str:
         return (resources.files(__package__) / FOLDER / name).read_text(encoding="utf-8")

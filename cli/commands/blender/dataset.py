@@ -4,21 +4,17 @@ Blender renders to a file beside the data set; what is read of it, as of any oth
 project's own form, with the same manifest, checksums and resumption as other data sets [dataset_files.py].
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ....models.blender.plan import Request, Shot, plan
+from ....models.blender.session import Blender
 from ....models.data.frame_plan import KINDS
+from ....refimpl.frame import Frame
 from ...common.inputs import check_input
 from ...common.terminal import progress, say
 from ...files import dataset_files, exr
-
-if TYPE_CHECKING:
-    from ....models.blender.plan import Shot
-    from ....models.blender.session import Blender
-    from ....refimpl.frame import Frame
 
 PASSES = ("color", "albedo", "normal", "depth", "position")
 """Layers of a noisy picture: what Cycles has passes of."""
@@ -26,9 +22,6 @@ PASSES = ("color", "albedo", "normal", "depth", "position")
 
 def make(folder: Path, file: Path, view_layer: str, blender: str | None, **numbers: Any) -> None:
     """Make what is missing in the folder; `numbers` are those of a request of this file."""
-    from ....models.blender.plan import Request, plan
-    from ....models.blender.session import Blender
-
     check_input(file)
     with Blender(file, view_layer, blender) as opened:
         request = Request(file.name, dataset_files.sum_of(file).sha256, opened.animation, **numbers)
@@ -68,8 +61,6 @@ def _render(store: dataset_files.Store[Shot], blender: Blender) -> None:
 
 def _read(path: Path, shot: Shot) -> Frame:
     """Return what Blender has rendered as a frame of a data set."""
-    from ....refimpl.frame import Frame
-
     frame, animation = exr.read_frame(path), shot.request.animation
     wanted = PASSES if shot.name.endswith(f"{KINDS[0]}.exr") else PASSES[:1]
     return Frame(

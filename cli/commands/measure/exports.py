@@ -1,21 +1,20 @@
 """`wamnet bench exports`: all targets of `wamnet export`, compiled, run and checked against their bound."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
+from ....kernels.bench.workload import random_model
+from ....kernels.export.check import HEAD, Verdict, check
+from ....kernels.export.package import Request, export
+from ....kernels.export.targets import NAMES, ONNX, TARGETS
+from ....models.data.scene_source import scene_source
 from ....refimpl.errors import ExecutorUnavailable, InputError
+from ....refimpl.light.scene import Scene
+from ....refimpl.network.denoise import Model
 from ...common.inputs import load_model
 from ...common.options import option
 from .shared import SceneShown, head, names_of, row
-
-if TYPE_CHECKING:
-    from ....kernels.export.check import Verdict
-    from ....refimpl.light.scene import Scene
-    from ....refimpl.network.denoise import Model
 
 STATUS_WRONG = 1
 """Exit status when something that was tried is wrong."""
@@ -42,11 +41,6 @@ def exports(
     wamnet bench exports
     wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places
     """
-    from ....kernels.bench.workload import random_model
-    from ....kernels.export.check import HEAD
-    from ....kernels.export.targets import NAMES
-    from ....models.data.scene_source import scene_source
-
     # Of a scene that moves, a time when its parts are turned.
     shown = scene_source(scene).at(TIME_S)
     chosen = tuple(NAMES) if targets is None else names_of("--targets", targets, NAMES)
@@ -64,17 +58,11 @@ def exports(
 
 def places_of(language: str, every: bool) -> list[str]:
     """Return the requested places of the weights; nothing is the usual one."""
-    from ....kernels.export.targets import ONNX, TARGETS
-
     return [*TARGETS[language].places] if every and language != ONNX else [""]
 
 
 def judged(model: Model, language: str, place: str, scene: Scene | None) -> Verdict:
     """Return the verdict of one export; a limit or a missing translator is one too."""
-    from ....kernels.export.check import Verdict, check
-    from ....kernels.export.package import Request, export
-    from ....kernels.export.targets import ONNX
-
     try:
         return check(export(Request(model, language, None if language == ONNX else scene, weights=place)))
     except ExecutorUnavailable as error:

@@ -1,20 +1,24 @@
 """`wamnet bench render` and `wamnet bench primitives`: samples per second of path tracers."""
 
-from __future__ import annotations
-
 import os
 import statistics
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+from ....kernels import open_executor
+from ....kernels.bench import paths
+from ....kernels.bench.crowd import KINDS, crowd
+from ....kernels.bench.fresh import empty_caches
+from ....kernels.bench.paths import distance
+from ....kernels.devices.kernel import Part
+from ....kernels.measure import Entry, environment, measure, take_turns
+from ....refimpl.light.render import Job
+from ....refimpl.light.transport import Settings
 from ...common.options import SCENES, option, parse_names, usage
 from ...common.terminal import progress, say
 from .shared import NUMPY, Repeats, Square, check_counts, counts_of, extent, head, names_of, row, say_facts
-
-if TYPE_CHECKING:
-    from ....kernels.measure import Entry
 
 Spp = Annotated[int, usage("Samples per pixel.")]
 
@@ -41,12 +45,6 @@ def render(
     wamnet bench render --size 512 --spp 2 --repeats 5
     wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16
     """
-    from ....kernels.bench import paths
-    from ....kernels.bench.fresh import empty_caches
-    from ....kernels.measure import measure
-    from ....refimpl.light.render import Job
-    from ....refimpl.light.transport import Settings
-
     kinds, shown = names_of("--by", by, paths.BY), parse_names(scenes) or [scenes]
     usual = f"1,{len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1}"
     processes = counts_of("--workers", usual if workers is None else workers, "1,2")
@@ -72,8 +70,6 @@ def render(
 
 def _agreement(entries: Sequence[Entry]) -> Iterator[str]:
     """Yield how far the mean colours are from the first one's."""
-    from ....kernels.bench.paths import distance
-
     first, *others = entries
     yield ""
     for each in others:
@@ -104,12 +100,6 @@ def primitives(
     wamnet bench primitives
     wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000
     """
-    from ....kernels import open_executor
-    from ....kernels.bench import paths
-    from ....kernels.bench.crowd import KINDS, crowd
-    from ....kernels.devices.kernel import Part
-    from ....kernels.measure import environment, take_turns
-
     given = names_of("--executors", executors, paths.BUILT)
     scenes, numbers = names_of("--kinds", kinds, KINDS), counts_of("--counts", counts, "30,100")
     check_counts([size], spp=(spp, 4), repeats=(repeats, 5))

@@ -1,12 +1,19 @@
 """`wamnet bench pipeline`: whole pictures of a scene that moves, by one pipeline and by other means."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
+from ....kernels import EXECUTORS, open_executor
+from ....kernels.bench import peers, pipelines
+from ....kernels.bench.fresh import first_picture
+from ....kernels.bench.pipelines import MOVING
+from ....kernels.bench.workload import paper_model
+from ....kernels.measure import Entry, measure
+from ....models.data.scene_source import scene_source
 from ....refimpl.errors import ExecutorUnavailable, InputError
+from ....refimpl.light.transport import Settings
+from ....refimpl.network.dataset import FEATURES
+from ....refimpl.network.denoise import Model
 from ...common.options import option
 from ...common.terminal import say
 from .shared import (
@@ -21,10 +28,6 @@ from .shared import (
     row,
     say_facts,
 )
-
-if TYPE_CHECKING:
-    from ....kernels.measure import Entry
-    from ....refimpl.network.denoise import Model
 
 
 def pipeline(
@@ -51,13 +54,6 @@ def pipeline(
     wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
     wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32
     """
-    from ....kernels import EXECUTORS
-    from ....kernels.bench import pipelines
-    from ....kernels.bench.workload import paper_model
-    from ....models.data.scene_source import scene_source
-    from ....refimpl.light.transport import Settings
-    from ....refimpl.network.dataset import FEATURES
-
     scene_source(scene)
     given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
     others = names_of("--peers", peers, pipelines.PEERS) if peers else ()
@@ -86,11 +82,6 @@ def _entries(
     rays: int,
 ) -> list[Entry]:
     """Return all rows of a size: what takes turns, then first pictures; note what others are, or lack."""
-    from ....kernels import open_executor
-    from ....kernels.bench import peers, pipelines
-    from ....kernels.bench.fresh import first_picture
-    from ....kernels.measure import Entry, measure
-
     with ExitStack() as stack, ExitStack() as pipes:
         found: list[Entry] = []
         opened = [stack.enter_context(open_executor(name)) for name in given]
@@ -119,8 +110,6 @@ def _entries(
 
 def _show(found: Sequence[Entry], size: int) -> None:
     """Print the rows of a size; pictures a second are those of whole pictures that were not the first."""
-    from ....kernels.bench.pipelines import MOVING
-
     ours = next(each.times.median for each in found if each.name == MOVING)
     for each in found:
         ms, median = [1e3 * second for second in each.seconds], each.times.median

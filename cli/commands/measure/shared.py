@@ -3,12 +3,11 @@
 Rows are Markdown, which a record is made of (experiments/publish.py); progress is on standard error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Annotated
 
+from ....kernels.bench.workload import check_size
 from ....refimpl.errors import InputError
 from ...common.options import SCENES, parse_names, usage
 from ...common.terminal import say
@@ -48,8 +47,6 @@ def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
 
 def check_counts(sizes: Iterable[int] = (), **counts: tuple[int, int]) -> None:
     """Refuse sizes of which no picture is made, and numbers of things that make none: (value, example)."""
-    from ....kernels.bench.workload import check_size
-
     for size in sizes:
         check_size(size)
     for name, (value, example) in counts.items():

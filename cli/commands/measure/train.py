@@ -1,10 +1,11 @@
 """`wamnet bench train`: milliseconds of a training step, by each trainer."""
 
-from __future__ import annotations
-
 from functools import partial
 
+from ....kernels.bench import training
+from ....kernels.measure import measure
 from ....refimpl.errors import InputError
+from ....refimpl.network.train import PRESETS
 from ...common.options import option
 from ...common.terminal import progress, say
 from ...reports import machine
@@ -35,10 +36,6 @@ def train(
     wamnet bench train --presets paper,short --repeats 5
     wamnet bench train --trainers numpy,opencl,torch --presets paper
     """
-    from ....kernels.bench import training
-    from ....kernels.measure import measure
-    from ....refimpl.network.train import PRESETS
-
     names = names_of("--presets", presets, PRESETS)
     given = training.trainers() if trainers is None else names_of("--trainers", trainers, training.TRAINERS)
     check_counts([size], frames=(frames, 4), repeats=(repeats, 5))

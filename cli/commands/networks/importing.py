@@ -1,19 +1,15 @@
 """`wamnet import`: a network of another program becomes a model, which compiles as any other."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ....models.importing.network import Found, import_network
+from ....models.model_file import save_model
 from ....refimpl.errors import InputError
 from ...common.inputs import check_input
 from ...common.options import argument, option
 from ...common.terminal import say
 from ...files.outputs import check_output
-
-if TYPE_CHECKING:
-    from ....models.importing.network import Found
 
 SUFFIX = ".safetensors"
 """How the names of models end."""
@@ -46,9 +42,6 @@ def import_model(
     wamnet import guided.onnx --range 0:1 --range normal=-1:1
     wamnet import filter.onnx --border zero
     """
-    from ....models.importing.network import import_network
-    from ....models.model_file import save_model
-
     check_input(network)
     if network.suffix == SUFFIX:
         raise InputError("network", str(network), "holds weights, no graph", "use torch.onnx.export")

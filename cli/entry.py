@@ -12,15 +12,13 @@ import os
 import signal
 import sys
 
-BY_SIGNALS = (130, 143)
-"""Exit statuses after SIGINT and SIGTERM."""
-
 
 def run() -> int:
     """Import and run the command line; return its exit status."""
     _open_streams()
     status = _run()
-    if status in BY_SIGNALS:
+    # After SIGINT and SIGTERM.
+    if status in (130, 143):
         # Python kills itself by SIGINT, whatever the status, if an interrupt that was handled long ago has
         # passed through `exec` of a text, as dataclasses use while modules are imported.
         atexit._run_exitfuncs()

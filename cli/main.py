@@ -29,18 +29,6 @@ from .common.default_command import CommandWithOthers
 from .common.request import spread
 from .common.terminal import tell
 
-STATUS_BAD_INPUT = 2
-"""Exit status when a file, an option or the machine is not as it must be."""
-
-STATUS_TERMINATED = 143
-"""Exit status after the signal to end: 128 + SIGTERM."""
-
-STATUS_INTERRUPTED = 130
-"""Exit status after Ctrl-C: 128 + SIGINT, as shells report it."""
-
-AGAIN_S = 0.01
-"""Seconds after which a dropped interrupt is sent again: by then the object is gone."""
-
 VERSION = "--version"
 """The option that runs no command."""
 
@@ -51,7 +39,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "train": ("train", "train"),
     "import": ("networks.importing", "import_model"),
     "compile": ("compile", "compile_model"),
-    "listing": ("listing", "listing"),
+    "listing": ("compile", "listing"),
     "export": ("export", "export"),
     "certify": ("certify", "certify"),
     "denoise": ("denoise", "denoise"),
@@ -64,13 +52,16 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "conformance": ("conformance", "conformance"),
     "demo": ("demo", "demo"),
     "bench": ("bench", "bench"),
-    "bench render": ("measure.paths", "render"),
-    "bench train": ("measure.train", "train"),
-    "bench pipeline": ("measure.pipeline", "pipeline"),
-    "bench exports": ("measure.exports", "exports"),
-    "bench primitives": ("measure.paths", "primitives"),
+    "bench render": ("measure", "render"),
+    "bench train": ("measure", "train"),
+    "bench pipeline": ("measure", "pipeline"),
+    "bench exports": ("measure", "exports"),
+    "bench primitives": ("measure", "primitives"),
 }
 """Each command's module in `commands`, and function; one of a group follows the group."""
+
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit statuses after Ctrl-C and SIGTERM, as shells report them: 128 + the signal."""
 
 DISTRIBUTIONS: Mapping[str, str] = {"verify-renderer": "wamnet-verify", "course": "wamnet-course"}
 """Distribution of each command that joins through an entry point of the group `ENTRY_POINTS`."""
@@ -172,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line (by default the process's) and return its exit status."""
     with _losing_no_interrupt(), _ending_on_sigterm() as terminated:
         status = _run(arguments)
-        return STATUS_TERMINATED if status == STATUS_INTERRUPTED and terminated else status
+        return TERMINATED if status == INTERRUPTED and terminated else status
 
 
 @contextmanager
@@ -202,8 +193,8 @@ def _losing_no_interrupt() -> Iterator[None]:
 
     def again(unraisable: Any) -> None:
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
-            # Not from here, where it would be dropped too; the main thread may sleep.
-            clock = threading.Timer(AGAIN_S, signal.pthread_kill, (main, signal.SIGINT))
+            # Not from here, where it would be dropped too, but a little later; the main thread may sleep.
+            clock = threading.Timer(0.01, signal.pthread_kill, (main, signal.SIGINT))
             clock.daemon = True
             clock.start()
             return
@@ -235,25 +226,20 @@ def _run(arguments: Sequence[str] | None) -> int:
         where = f": {error.filename}" if error.filename else ""
         return _fail(f"{error.strerror or error}{where}")
     except (KeyboardInterrupt, typer.Abort):
-        status = STATUS_INTERRUPTED
+        status = INTERRUPTED
     except Exception as error:
         # A wrong option: typer's own exceptions have this method, wherever their class lives.
         if not hasattr(error, "format_message"):
             raise
-        return _fail(_usage(error))
-    if status == STATUS_INTERRUPTED:
+        context = getattr(error, "ctx", None)
+        command, wrong = context.command_path if context else "wamnet", error.format_message()
+        return _fail(f"{wrong.replace('Value error, ', '').rstrip('.')}; see {command} --help")
+    if status == INTERRUPTED:
         tell("interrupted")
     return status if isinstance(status, int) else 0
-
-
-def _usage(error: Any) -> str:
-    """Return what is wrong with an option, and where help is."""
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context else "wamnet"
-    return f"{error.format_message().replace('Value error, ', '').rstrip('.')}; see {command} --help"
 
 
 def _fail(message: str) -> int:
     """Say in one line on standard error what is wrong."""
     tell(f"error: {message}")
-    return STATUS_BAD_INPUT
+    return 2

@@ -46,7 +46,7 @@ from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import images, movie
 from ..files.alone import working_in
-from ..files.outputs import check_output, check_parent, check_real_folder
+from ..files.outputs import check_output, check_parent, check_real_folder, visible
 from ..reports import machine
 
 
@@ -70,14 +70,14 @@ class Film:
     fps: float = option("Frames per second.", 10.0)
     size: int = option("Width and height of each image, in pixels.", 128)
     reference_spp: int = option("Paths per pixel of a reference image shown alongside; 0 for none.", 0)
-    seed: options.Seed = 0
+    seed: int = option("seed", 0)
     feature_spp: int | None = option(
         "N  Stratified camera rays per pixel for the features. [default: equivalent to those in training]"
     )
 
 
 def animate(
-    model: options.ModelFile,
+    model: Path = option("model", ...),
     scene: str | None = option(
         "Canonical scene, or scene file (.json), which is static. [default: the model's training scene]"
     ),
@@ -86,12 +86,12 @@ def animate(
     ),
     *,
     wanted: Film,
-    parameters: options.Parameters = None,
+    parameters: list[str] | None = option("parameters"),
     view: options.View,
-    executor: options.Executor = "auto",
-    renderer: options.Renderer = "auto",
-    rank: options.CutRank = 0,
-    context: options.OpenGLContext = None,
+    executor: options.ExecutorChoice = option("executor", "auto"),
+    renderer: options.ExecutorChoice = option("renderer", "auto"),
+    rank: int = option("rank", 0),
+    context: options.ContextName | None = option("context"),
 ) -> None:
     """Render and denoise an animation: noisy, denoised and reference images side by side.
 
@@ -110,8 +110,10 @@ def animate(
     _check_names(output, model, wanted.fps)
     model = model_path(model)
     network = load_model(model)
+    if rank:
+        check_rank(rank, network.window.size, *network.siren.widths[:2])
     by = chosen(executor), chosen(renderer, work="renderer")
-    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *cut_facts(network, rank)]
+    facts = [hashlib.sha256(model.read_bytes()).hexdigest(), *by, *([f"rank {rank}"] if rank else [])]
     named = scene or learned_scene(network), _parameters(parameters), view
     shots = plan_shots(folder, named, wanted, network, facts)
     if is_film:
@@ -124,19 +126,14 @@ def animate(
     ):
         made, watch = _draw(shots, folder, network, by, rank)
         if is_film:
-            _join(output, shots, wanted.fps)
+            movie.write_movie(output, [shot.path for shot in shots], wanted.fps)
+            for shot in shots:
+                shot.path.unlink()
     if is_film:
         with suppress(OSError):  # there is more in it than the pictures that have become the film
             folder.rmdir()
     watch.report(output)
     say(f"{output}: {len(shots)} frames, {made} of them rendered now")
-
-
-def _join(output: Path, shots: Sequence[Shot], fps: float) -> None:
-    """Make a film of the pictures, and remove them."""
-    movie.write_movie(output, [shot.path for shot in shots], fps)
-    for shot in shots:
-        shot.path.unlink()
 
 
 def _draw(
@@ -148,32 +145,19 @@ def _draw(
     # It was another process's until now.
     left = missing(folder, shots)
     remove_temporaries(folder)
-    for line in _said_of(left, renderer):
-        say(line)
-    with (
-        open_executor(executor) as runner,
-        progress("rendering", len(left), "frames") as advance,
-    ):
-        together = _one_device(executor, renderer, shots[0].noisy, watch.model.features)
+    if left:
+        jobs = [job for shot in left for job in (shot.noisy, shot.reference) if job is not None]
+        pixels, samples = left[0].noisy.width * left[0].noisy.height, sum(job.samples for job in jobs)
+        said_of_rendering(left[0].scene, samples, pixels, renderer, None)
+    with open_executor(executor) as runner, progress("rendering", len(left), "frames") as advance:
+        # One device does both, from what the paths of a pixel have seen.
+        features, noisy = network.features, shots[0].noisy
+        beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
+        together = renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
         draw = draw_frames if together else partial(draw_apart, film=shots)
         for _ in draw(left, watch, runner, renderer, with_rank(FULL, rank)):
             advance(1)
     return len(left), watch
-
-
-def _one_device(executor: str, renderer: str, noisy: Job, features: Sequence[str]) -> bool:
-    """Tell whether a pipeline can draw: one device does both, from what the paths of a pixel have seen."""
-    beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
-    return renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
-
-
-def _said_of(shots: Sequence[Shot], renderer: str) -> list[str]:
-    """Return the sentence about large work."""
-    if not shots:
-        return []
-    jobs = [job for shot in shots for job in (shot.noisy, shot.reference) if job is not None]
-    pixels = shots[0].noisy.width * shots[0].noisy.height
-    return said_of_rendering(shots[0].scene, sum(job.samples for job in jobs), pixels, renderer, None)
 
 
 def _check_names(output: Path, model: Path, fps: float) -> None:
@@ -203,14 +187,6 @@ def _say_what_is_not_learned(output: Path, shots: Sequence[Shot], model: Model) 
         say(f"{output}: {len(unlike)} of {len(shots)} frames differ from the training frames: {sentence}")
 
 
-def cut_facts(network: Model, rank: int) -> list[str]:
-    """Return what a cut of the first layer adds to a picture's origin; refuse a rank that it cannot have."""
-    if not rank:
-        return []
-    check_rank(rank, network.window.size, *network.siren.widths[:2])
-    return [f"rank {rank}"]
-
-
 def plan_shots(
     folder: Path,
     named: tuple[str, dict[str, Any], options.View],
@@ -237,14 +213,11 @@ def plan_shots(
 
 def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
     """Return the pictures that are not there or damaged; refuse a folder with anything else in it."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
+    found = visible(folder)
     check_parent(folder)
     known = {shot.path: shot for shot in shots}
     there = {}
-    for path in sorted(folder.iterdir()) if folder.exists() else []:
-        if path.name.startswith("."):
-            continue
+    for path in found:
         origin = images.read_origin(path) if path in known else ""
         if path not in known or origin not in (None, known[path].origin):
             rule = f"holds something else: {path.name}"
@@ -268,13 +241,13 @@ def draw_apart(
     from ...kernels.run.before import Film, wants
 
     film = film or shots
-    frames, model = Frames([shot.scene for shot in film]), watch.model
+    frames, model, render = Frames([shot.scene for shot in film]), watch.model, render_frame.render_frame
     wanted = {shot.path for shot in shots}
     before = Film(renderer, [shot.scene for shot in film]) if wants(model.features) else None
     # The history of a missing picture is made of all pictures before it.
     count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
     for shot in shots if before is None else film[:count]:
-        frame = render_frame.render_frame(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
+        frame = render(renderer, shot.scene, shot.noisy, workers=None, frames=frames).frame
         if before is not None:
             frame = before.add(shot.scene, shot.noisy, frame)
         if shot.path not in wanted:
@@ -284,10 +257,7 @@ def draw_apart(
         denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
         reference = None
         if shot.reference is not None:
-            job = shot.reference
-            reference = render_frame.render_frame(
-                renderer, shot.scene, job, workers=None, frames=frames
-            ).frame
+            reference = render(renderer, shot.scene, shot.reference, workers=None, frames=frames).frame
         write_shot(shot, model, noisy, denoised, reference)
         yield
 

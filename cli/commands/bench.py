@@ -21,13 +21,10 @@ from ..common.inputs import load_model, trained_scene
 from ..common.options import ExecutorName, argument, option, parse_names
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files.alone import working_in
-from ..files.outputs import check_output, replacing, unwritable, write_text
+from ..files.outputs import check_output, replacing, visible, write_text
 from ..reports import bench_report, machine
 from . import bench_forms, bench_frames
 from .bench_frames import Frames
-
-PEER_PACKAGES = ("torch", "onnxruntime", "onnx", "openvino", "tinygrad", "halide", "pyoidn")
-"""Packages of peers whose versions the result names."""
 
 QUICK = {"size": 256, "repeats": 3, "budget": 4.0, "frames": 2, "reference_spp": 64, "steps": 500}
 """What --quick takes for options that are not given: some 25 s on two cores."""
@@ -216,7 +213,8 @@ def bench(wanted: Wanted) -> None:
     """
     packages.need("matplotlib", "for the plots")
     output = wanted.output
-    check_folder(output)
+    for name in (JSON_NAME, TEXT_NAME) if visible(output) or output.exists() else ():
+        check_output(output / name)
     wanted.check_numbers()
     name, network = wanted.network()
     wanted.check(network)
@@ -242,10 +240,7 @@ def measure(
         everybody = contenders.of_machine(tools, request.size, request.quick and not only, forms)
         taking_part = contenders.chosen(everybody, only, executors)
         sizes = sorted({request.size, *request.sizes})
-        for line in said_of_measuring(len(taking_part), sizes, request.budget_s):
-            say(line)
-        if output:
-            make_folder(output)
+        said_of_measuring(len(taking_part), sizes, request.budget_s)
         contest = Contest(request, taking_part, tools, told=advance)
         hint = f"{output}: has the results so far" if output else "nothing is kept"
         with hint_on_interrupt(lambda: hint):
@@ -264,30 +259,14 @@ def measure(
 def _finished(contest: Contest, command: str, interrupted: bool) -> dict[str, Any]:
     """Return a contest's data with what is known of the run."""
     text = command or " ".join(["wamnet", *map(shlex.quote, sys.argv[1:])])
+    peers = ("torch", "onnxruntime", "onnx", "openvino", "tinygrad", "halide", "pyoidn")
     return {
         **contest.as_data(),
         "command": text,
         "interrupted": interrupted,
         "machine": machine.describe(),
-        "versions": machine.versions(PEER_PACKAGES),
+        "versions": machine.versions(peers),
     }
-
-
-def check_folder(output: Path) -> None:
-    """Refuse an output folder in which the results cannot be written."""
-    if output.exists() and not output.is_dir():
-        raise InputError("output folder", str(output), "is a file", "choose another with -o")
-    if output.is_dir():
-        for name in (JSON_NAME, TEXT_NAME):
-            check_output(output / name)
-
-
-def make_folder(output: Path) -> None:
-    """Make the output folder, before anything is measured."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(output, error, "output folder") from None
 
 
 def write(data: dict[str, Any], output: Path) -> None:
@@ -302,8 +281,11 @@ def write(data: dict[str, Any], output: Path) -> None:
 
 def tell(data: dict[str, Any], output: Path) -> None:
     """Print the table, what was left out, and where the results are."""
-    heads, rows = bench_report.short_table(data)
-    table(f"{data['size_px']}x{data['size_px']}", heads, rows)
+    heads, rows = bench_report.speed_table(data)
+    # A terminal has no room for more.
+    kept = [k for k, head in enumerate(heads) if head not in ("range", "frames/s", "compile, s")]
+    shown = [tuple(row[k] for k in kept) for row in rows]
+    table(f"{data['size_px']}x{data['size_px']}", [heads[k] for k in kept], shown)
     for line in bench_report.notes(data):
         say(line)
     say(f"results: {output / JSON_NAME}, {output / TEXT_NAME}")

@@ -8,6 +8,7 @@
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,9 +38,6 @@ QUICK_FORMS = ("full", "rank16", "window8+rank16")
 FURTHER = "further"
 """Name of the whole network after as many more steps."""
 
-SEED = 2
-"""Seed of the minibatches: not that of the model's own training."""
-
 
 def planned(model: Model, names: Sequence[str], steps: int) -> dict[str, Variant]:
     """Return the forms that this model can have, by the names of variants, not trained yet."""
@@ -58,11 +56,7 @@ def folder_of(model: Model, output: Path) -> Path:
 
 
 def trained(
-    model: Model,
-    forms: dict[str, Variant],
-    pairs: Sequence[tuple[Frame, Frame]],
-    folder: Path,
-    executor: str,
+    model: Model, forms: dict[str, Variant], pairs: Sequence[tuple[Frame, Frame]], folder: Path, executor: str
 ) -> list[Variant]:
     """Return the forms after training on pairs of frames, which is done where the folder lacks it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -90,16 +84,18 @@ def recipe_of(model: Model, steps: int) -> Recipe:
     """Return the recipe that a model was trained by, or the best preset, with other steps."""
     text = model.info.get("recipe")
     known = recipe_from_json(text) if text else PRESETS["best"]
-    return replace(known, steps=steps, seed=SEED, log_every=max(1, min(known.log_every, steps)))
+    # Another seed than that of the model's own training.
+    return replace(known, steps=steps, seed=2, log_every=max(1, min(known.log_every, steps)))
 
 
 def _kept(path: Path, begin: TrainState) -> TrainState:
     """Return the state of an earlier run of the same recipe on the same frames, or the first one."""
-    if not path.exists():
-        return begin
-    try:
+    with suppress(InputError):
         found = load_checkpoint(path)
-    except InputError:
-        return begin
-    same = (found.recipe, found.digest, found.normalization)
-    return found if same == (begin.recipe, begin.digest, begin.normalization) else begin
+        if (found.recipe, found.digest, found.normalization) == (
+            begin.recipe,
+            begin.digest,
+            begin.normalization,
+        ):
+            return found
+    return begin

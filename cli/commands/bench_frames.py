@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...compiler.scenes.encode_kernel import sees
-from ...models.data.frame_plan import Request, plan
+from ...models.data.frame_plan import KINDS, Request, plan
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame
 from ...refimpl.light.render import FEATURE_SAMPLER
@@ -29,14 +29,8 @@ from . import dataset
 
 Pair = tuple[Frame, Frame]
 
-SPP_OF_NUMPY = 32
-"""Most samples of a reference where no kernel runs: more would take an hour."""
-
 TEST_SEED = 1 << 31
 """Seed of the test frames: training sets of fewer than a thousand million frames never have it."""
-
-TRAINING_SEED = 1 << 30
-"""Seed of the frames that forms are trained on."""
 
 TRAINING_PX = 256
 """Width and height of the training frames: those of the models that ship with the package."""
@@ -46,9 +40,6 @@ TRAINING_FRAMES = 64
 
 TRAINING_SPP = 32
 """Samples of a training target: many targets teach more than few clean ones."""
-
-PICTURES = ("noisy", "target")
-"""Keys of a frame in a manifest that speak of files."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +87,8 @@ def _draw(frame: Mapping[str, Any], noisy: Frame, model: Model) -> dict[str, Any
     A frame at a time that training had is named too: it may show what was learned.
     """
     known = model.info.get("trained_on_time", "").split(", ")
-    found = {key: value for key, value in frame.items() if key not in (*PICTURES, "split")}
-    seeds = {f"{kind}_seed": frame[kind]["seed"] for kind in PICTURES}
+    found = {key: value for key, value in frame.items() if key not in (*KINDS, "split")}
+    seeds = {f"{kind}_seed": frame[kind]["seed"] for kind in KINDS}
     unlike = unlike_training(model, noisy.info)
     return {**found, **seeds, "time_in_training": str(frame["time_s"]) in known, "unlike_training": unlike}
 
@@ -133,7 +124,8 @@ def _first(model: Model, name: str, otherwise: int) -> int:
 def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Frames:
     """Return test frames (size, size) of the model's scene, rendered where they are missing."""
     executor = fastest(work="renderer")
-    spp = min(spp, SPP_OF_NUMPY) if executor == "numpy" else spp
+    # Where no kernel runs more samples would take an hour.
+    spp = min(spp, 32) if executor == "numpy" else spp
     # A data set has a training frame at least; the shortest one.
     numbers = {"frames": 1, "test_frames": count, "spp": 1, "test_spp": spp}
     place = folder / f"frames-{trained_scene(model)}-{size}"
@@ -146,7 +138,7 @@ def for_training(model: Model, folder: Path) -> Sequence[Pair]:
     executor = fastest(work="renderer")
     place = folder / f"training-{trained_scene(model)}-{TRAINING_PX}"
     numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": TRAINING_SPP, "size_px": TRAINING_PX}
-    _make(place, request_for(model, executor, seed=TRAINING_SEED, **numbers))
+    _make(place, request_for(model, executor, seed=1 << 30, **numbers))
     return of_folder(place, model, "train").pairs
 
 

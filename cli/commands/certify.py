@@ -14,13 +14,7 @@ from ...compiler.reading.trusted import trusted_lines
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
 from ..common.options import argument, option
-from ..common.terminal import progress, say, table
-
-STATUS_REFUSED = 1
-"""Exit status when a step of a certificate does not hold, or a source computes another program."""
-
-STATUS_UNCHECKED = 3
-"""Exit status when the certificate holds and nothing is known of the source; bad files exit with 2."""
+from ..common.terminal import STATUS_WRONG, progress, say, table
 
 ASSUMED = (
     "assumed: compiler and device keep to the language's standard and IEEE 754's float32, rounded to "
@@ -70,46 +64,32 @@ def certify(
             say(ASSUMED)
     except Refused as step:
         say(f"rejected: {step}")
-        raise typer.Exit(STATUS_REFUSED) from None
+        raise typer.Exit(STATUS_WRONG) from None
     except Unread as error:
         say(f"source: not checked: the checker does not support {error}")
-        raise typer.Exit(STATUS_UNCHECKED) from None
+        raise typer.Exit(3) from None
 
 
 def show(held: Any) -> None:
     """Print what a certificate proves, and its table."""
     if held["schema"] == INTEGERS:
-        table(*sums_table(held))
+        # A partial sum of each affine map, in any order.
+        most = [max(each) for each in held["sums"].values()]
+        sums = [(str(layer), f"{value:.8g}", f"{value / 2**24:.3f}") for layer, value in enumerate(most)]
+        table("Sums of integers", ("layer", "largest partial sum", "of 2^24"), sums)
         say("holds: no operation rounds; every value equals the reference's, for all integer images")
         return
-    table(*layers_table(held))
-    bound = max(held["bound"]["output"])
-    say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps_of(bound)}")
-
-
-def sums_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:
-    """Return title, heads and rows: how large a partial sum of each affine map may be, in any order."""
-    rows = [
-        [str(layer), f"{max(sums):.8g}", f"{max(sums) / 2**24:.3f}"]
-        for layer, sums in enumerate(held["sums"].values())
-    ]
-    return "Sums of integers", ("layer", "largest partial sum", "of 2^24"), rows
-
-
-def layers_table(held: Any) -> tuple[str, tuple[str, ...], list[list[str]]]:
-    """Return title, heads and rows: what each layer makes itself, and how much of it reaches the outputs."""
-    reaches = [output["layer_bounds"] for output in held["outputs"]]
-    rows = []
+    # What each layer makes itself, and how much of it reaches the outputs.
+    outputs, rows = held["outputs"], list[tuple[str, ...]]()
     for number, layer in enumerate(held["layers"]):
-        share = [f"{reach[number]:.2e}" for reach in reaches]
+        share = [f"{output['layer_bounds'][number]:.2e}" for output in outputs]
         own = f"{max(layer['rounding_bound']):.2e}"
         sine = f"{held['sine']['error_bound']:.2e}" if number + 1 < len(held["layers"]) else ""
-        rows.append([str(number), f"{layer['argument_bound']:.4g}", own, sine, *share])
-    rows.append(["all", "", "", "", *(f"{output['error_bound']:.2e}" for output in held["outputs"])])
-    heads = ("layer", "values up to", "rounding", "sine", *(f"output {o['output']}" for o in held["outputs"]))
-    return "Where the error comes from", heads, rows
-
-
-def steps_of(bound: float) -> str:
-    """Say how much this is of half an 8-bit step, which decides between two neighbouring levels."""
-    return f"{bound * 510:.2g} of half an 8-bit step"
+        rows.append((str(number), f"{layer['argument_bound']:.4g}", own, sine, *share))
+    rows.append(("all", "", "", "", *(f"{output['error_bound']:.2e}" for output in outputs)))
+    heads = ("layer", "values up to", "rounding", "sine", *(f"output {o['output']}" for o in outputs))
+    table("Where the error comes from", heads, rows)
+    # Half an 8-bit step decides between two neighbouring levels.
+    bound = max(held["bound"]["output"])
+    steps = f"{bound * 510:.2g} of half an 8-bit step"
+    say(f"holds: |output - reference| <= {bound:g} for all images in their ranges, {steps}")

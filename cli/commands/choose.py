@@ -4,20 +4,17 @@ The curve is a file's, or the user's cache folder's, or measured then and there 
 """
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...compiler import variants
 from ...kernels import cache, open_executor
-from ...kernels.devices.executor import Executor
 from ...kernels.run import curve, measure_curve
-from ...kernels.run.curve import Choice, Curve, Limits
+from ...kernels.run.curve import Curve, Limits
 from ...refimpl.errors import NO_VALUE, InputError
-from ...refimpl.frame import Frame
 from ...refimpl.network.denoise import Model
 from ..common.options import option
-from ..common.request import given
+from ..common.request import KernelRequest, given
 from ..common.terminal import progress, say
 from ..files import dataset_files
 
@@ -48,98 +45,73 @@ class Request:
     size: int | None = option("N  Frame size for the times: N x N pixels. [default: 1024]")
 
     @property
+    def limits(self) -> Limits:
+        """Return the limits."""
+        return Limits(self.max_error, self.max_ms, self.max_loss_db)
+
+    @property
     def limited(self) -> bool:
         """Return whether anything is to be chosen."""
-        return not (self.max_error is self.max_ms is self.max_loss_db is None)
+        return self.limits != Limits(None, None, None)
 
+    def check(self, variant: str | None) -> None:
+        """Refuse options that contradict each other, or have nothing to act on."""
+        named = list(given(self))
+        if variant is not None and named:
+            rule = f"{named[0]} chooses a variant itself"
+            raise InputError("--variant", variant, rule, "leave out one of them")
+        if named and not self.limited:
+            rule, remedy = "a choice needs --max-error, --max-ms or --max-loss-db", f"leave out {named[0]}"
+            raise InputError("list of options", ", ".join(named), rule, f"{remedy}, or give a limit")
+        if self.curve is not None and (self.frames is not None or self.size is not None):
+            rule = "its points are measured already"
+            raise InputError("--curve", str(self.curve), rule, "leave out --frames and --size")
+        if self.size is not None and not SMALLEST_PX <= self.size <= LARGEST_PX:
+            rule = f"must be from {SMALLEST_PX} to {LARGEST_PX}"
+            raise InputError("--size", self.size, rule, "for example --size 1024")
+        curve.check_limits(self.limits)
 
-def check_request(request: Request, variant: str | None) -> None:
-    """Refuse options that contradict each other, or have nothing to act on."""
-    named = list(given(request))
-    if variant is not None and named:
-        rule = f"{named[0]} chooses a variant itself"
-        raise InputError("--variant", variant, rule, "leave out one of them")
-    if named and not request.limited:
-        rule = "a choice needs --max-error, --max-ms or --max-loss-db"
-        raise InputError("list of options", ", ".join(named), rule, f"leave out {named[0]}, or give a limit")
-    if request.curve is not None and (request.frames is not None or request.size is not None):
-        rule = "its points are measured already"
-        raise InputError("--curve", str(request.curve), rule, "leave out --frames and --size")
-    if request.size is not None and not SMALLEST_PX <= request.size <= LARGEST_PX:
-        rule = f"must be from {SMALLEST_PX} to {LARGEST_PX}"
-        raise InputError("--size", request.size, rule, "for example --size 1024")
-    curve.check_limits(_limits(request))
+    def choose(self, model: Model, network: KernelRequest, executor: str) -> KernelRequest:
+        """Return a request with the variant and the schedule that the limits ask for; say which, and why."""
+        found = self._curve(model, network.profile, executor)
+        points = [
+            each
+            for each in found.points
+            if each.executor == executor and network.schedule in (None, each.schedule)
+        ]
+        choice = curve.choose(points, self.limits)
+        height, width = found.size
+        say(f"chosen: {choice.point.text} ({width}x{height} on {found.device})")
+        for point, rules in choice.rejected:
+            say(f"not {point.variant}, schedule {point.schedule}: {rules}")
+        return replace(network, variant=choice.point.variant, schedule=choice.point.schedule)
 
-
-def choose(
-    model: Model, request: Request, executor: str, profile: str, schedule: str | None
-) -> tuple[str, str]:
-    """Return the variant and the schedule that the limits ask for, and say what was chosen and why."""
-    found = _curve(model, request, executor, profile)
-    points = [point for point in found.points if point.executor == executor]
-    if schedule is not None:
-        points = [point for point in points if point.schedule == schedule]
-    choice = curve.choose(points, _limits(request))
-    _say(choice, found)
-    return choice.point.variant, choice.point.schedule
-
-
-def _limits(request: Request) -> Limits:
-    """Return the limits of a request."""
-    return Limits(request.max_error, request.max_ms, request.max_loss_db)
-
-
-def _say(choice: Choice, found: Curve) -> None:
-    """Say what was chosen, and which rule each other point broke."""
-    height, width = found.size
-    say(f"chosen: {choice.point.text} ({width}x{height} on {found.device})")
-    for point, rules in choice.rejected:
-        say(f"not {point.variant}, schedule {point.schedule}: {rules}")
-
-
-def _curve(model: Model, request: Request, executor: str, profile: str) -> Curve:
-    """Return the curve to choose from."""
-    if request.curve is not None:
-        found = curve.read(request.curve)
-        wanted = Curve(variants.digest_of(model), found.device, found.size, profile, ())
-        curve.check_fits(found, wanted, str(request.curve))
+    def _curve(self, model: Model, profile: str, executor: str) -> Curve:
+        """Return the curve to choose from: a file's, the cache folder's, or one that is measured and kept."""
+        digest = variants.digest_of(model)
+        if self.curve is not None:
+            found = curve.read(self.curve)
+            wanted = Curve(digest, found.device, found.size, profile, ())
+            curve.check_fits(found, wanted, str(self.curve))
+            return found
+        if self.frames is None:
+            rule = "missing, and errors are measured on frames"
+            raise InputError("--frames", NO_VALUE, rule, "name a data set, or a curve with --curve")
+        pairs = dataset_files.read_pairs(self.frames, "test")
+        if not pairs:
+            rule = "has no test frames"
+            raise InputError("--frames", str(self.frames), rule, "give a data set made with --test 1 or more")
+        of_frames = hashlib.sha256((self.frames / dataset_files.MANIFEST).read_bytes()).hexdigest()
+        names, size = measure_curve.names_for(model), (self.size or 1024, self.size or 1024)
+        with open_executor(executor) as runner:
+            wanted = Curve(digest, runner.device, size, profile, ())
+            key = curve.key_of(wanted, runner.name, of_frames, names)
+            if (kept := curve.cached(key, wanted)) is not None:
+                say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
+                return kept
+            with progress(f"measuring {len(names)} variants", 1.0) as advance:
+                found = measure_curve.measure(runner, model, size, profile, pairs, names, on_done=advance)
+        path = cache.write_json(key, found.as_data())
+        where = f"cached in {path}" if path else "not cached: no cache folder is writable"
+        say(f"curve: {len(found.points)} points, measured now, {where}")
         return found
-    if request.frames is None:
-        rule = "missing, and errors are measured on frames"
-        raise InputError("--frames", NO_VALUE, rule, "name a data set, or a curve with --curve")
-    pairs, digest = _frames(request.frames)
-    with open_executor(executor) as runner:
-        return _kept_or_measured(model, runner, profile, request.size or 1024, pairs, digest)
-
-
-def _frames(folder: Path) -> tuple[list[tuple[Frame, Frame]], str]:
-    """Return the pairs on which errors are measured, a data set's test frames, and a name for them."""
-    pairs = dataset_files.read_pairs(folder, "test")
-    if not pairs:
-        rule = "has no test frames"
-        raise InputError("--frames", str(folder), rule, "give a data set made with --test 1 or more")
-    manifest = (folder / dataset_files.MANIFEST).read_bytes()
-    return pairs, hashlib.sha256(manifest).hexdigest()
-
-
-def _kept_or_measured(
-    model: Model,
-    runner: Executor,
-    profile: str,
-    side: int,
-    pairs: Sequence[tuple[Frame, Frame]],
-    digest: str,
-) -> Curve:
-    """Return the curve from the cache folder, or measure it and keep it; say which."""
-    names = measure_curve.names_for(model)
-    wanted = Curve(variants.digest_of(model), runner.device, (side, side), profile, ())
-    key = curve.key_of(wanted, runner.name, digest, names)
-    if (kept := curve.cached(key, wanted)) is not None:
-        say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
-        return kept
-    with progress(f"measuring {len(names)} variants", 1.0) as advance:
-        found = measure_curve.measure(runner, model, (side, side), profile, pairs, names, on_done=advance)
-    path = cache.write_json(key, found.as_data())
-    where = f"cached in {path}" if path else "not cached: no cache folder is writable"
-    say(f"curve: {len(found.points)} points, measured now, {where}")
-    return found

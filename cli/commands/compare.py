@@ -1,31 +1,29 @@
 """`wamnet compare`: how far a picture is from its reference, in every metric, and a kernel's paths."""
 
 import json
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import typer
 
+from ... import kernels
+from ...kernels.judge.compare_images import ImageReport, check_samples, compare_images
+from ...kernels.judge.compare_paths import PathReport, View
+from ...kernels.judge.compare_paths import compare_paths as compare_paths_of
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ..common import options
+from ..common.inputs import load_scene
 from ..common.options import ExecutorName, argument, option
-from ..common.terminal import table, tell
+from ..common.terminal import STATUS_WRONG, progress, say, table, tell
 from ..files.images import read_image
-from ..reports.compare_paths import compare_paths
 from ..reports.scores import as_data, measure
 
 PANEL = "Paths"
 """Title of the options that go with `--paths`."""
-
-OF_PATHS = ("executor", "width", "height", "sample", "spp", "seed", "max_depth")
-"""Options that go only with `--paths`."""
-
-OF_SCENE = ("time", "parameters")
-"""Options of the scene."""
-
-OF_PICTURES = ("image", "reference", "exposure")
-"""Arguments and options of pictures."""
 
 
 def compare(
@@ -33,7 +31,7 @@ def compare(
     image: Path | None = argument("IMAGE  Image to compare (.exr or .png).", None),
     reference: Path | None = argument("REFERENCE  Reference image.", None),
     as_json: bool = option("--json  Print JSON instead of a table.", False),
-    exposure: options.Exposure = 0.0,
+    exposure: float = option("exposure", 0.0),
     paths: str | None = option(
         "SCENE  Compare a kernel's paths in this scene with the reference's, instead of two images.",
         rich_help_panel=PANEL,
@@ -44,9 +42,9 @@ def compare(
     sample: int = option("Index of the sample to compare.", 0, rich_help_panel=PANEL),
     spp: int = option("Paths per pixel of the reference image.", 64, rich_help_panel=PANEL),
     seed: int = option("Random seed.", 0, rich_help_panel=PANEL),
-    max_depth: int = option("Maximum number of bounces per path.", 5, rich_help_panel=PANEL),
-    time: options.Time = None,
-    parameters: options.Parameters = None,
+    max_depth: int = option("max_depth", 5, rich_help_panel=PANEL),
+    time: float | None = option("time"),
+    parameters: list[str] | None = option("parameters"),
 ) -> None:
     """Compare an image with its reference, or a kernel's paths with the reference path tracer's.
 
@@ -66,13 +64,14 @@ def compare(
     wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3
     """
     if paths is None:
-        options.refuse_given(context, (*OF_PATHS, *OF_SCENE), "without --paths SCENE")
+        of_paths = ("executor", "width", "height", "sample", "spp", "seed", "max_depth", "time", "parameters")
+        options.refuse_given(context, of_paths, "without --paths SCENE")
         if image is None or reference is None:
             rule = "needs IMAGE and REFERENCE, or --paths SCENE"
             raise InputError("wamnet compare", NO_VALUE, rule, "see wamnet compare --help")
         compare_pictures(image, reference, exposure, as_json)
         return
-    options.refuse_given(context, OF_PICTURES, "with --paths")
+    options.refuse_given(context, ("image", "reference", "exposure"), "with --paths")
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
     compare_paths(paths, executor.value, job, time, parameters or [], as_json)
 
@@ -89,3 +88,70 @@ def compare_pictures(image: Path, reference: Path, exposure: float, as_json: boo
         typer.echo(json.dumps({"image": str(image), "reference": str(reference), **as_data(scores)}))
     else:
         table(f"{image} against {reference}", ("metric", "value"), [(s.metric, str(s)) for s in scores])
+
+
+def compare_paths(
+    name: str, executor: str, job: Job, time: float | None, parameters: Sequence[str], as_json: bool
+) -> None:
+    """Compare the paths of the job's first sample, and the picture; end with status 1 if they disagree."""
+    scene = load_scene(name, time, parameters)
+    check_samples(job)
+    view = View(job.width, job.height, job.first_sample, job.seed)
+    with kernels.open_executor(executor) as device:
+        with progress(f"comparing paths of {name}", job.settings.max_depth + 1, "bounces") as advance:
+            paths = compare_paths_of(device, scene, job.settings, view, on_progress=advance)
+        with progress(f"rendering {name}", job.width * job.height * job.spp, "samples") as advance:
+            image = compare_images(device, scene, job, on_progress=advance)
+    if as_json:
+        parts = {key: {**asdict(r), "passed": r.passed} for key, r in (("paths", paths), ("image", image))}
+        typer.echo(json.dumps({"scene": name, "device": device.device, **_finite(parts)}))
+    else:
+        _print(f"{name} on {device.device}", paths, image)
+    if not (paths.passed and image.passed):
+        raise typer.Exit(STATUS_WRONG)
+
+
+def _finite(data: Any) -> Any:
+    """Return data with None instead of numbers that JSON does not know."""
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not abs(data) < float("inf") else data
+
+
+def _print(title: str, paths: PathReport, image: ImageReport) -> None:
+    """Print counts by depth, errors by quantity and depth, and the verdicts."""
+    rows = [
+        (d.depth, d.paths, d.undecided, d.different, d.unexplained, d.parted, f"{d.moved['point']:.1e}")
+        for d in paths.depths
+    ]
+    view = paths.view
+    table(
+        f"Paths of {title}, {view.width}x{view.height}, sample {view.sample}, seed {view.seed}",
+        ("depth", "paths", "undecided", "different", "unexplained", "parted", "moved"),
+        [tuple(map(str, row)) for row in rows],
+    )
+    depths = paths.depths
+    table(
+        "Largest error / bound of a step, by depth",
+        ("quantity", *(str(d.depth) for d in depths), "median bound"),
+        [
+            (
+                quantity,
+                *(f"{d.gaps[quantity].ratio:.2f}" for d in depths),
+                f"{depths[-1].gaps[quantity].bound:.1e}",
+            )
+            for quantity in depths[0].gaps
+        ],
+    )
+    for example in paths.examples:
+        say(f"unexplained: {example}")
+    count = view.width * view.height
+    say(f"random numbers: {count - paths.wrong_words} of {count} paths have the reference's, to the bit")
+    kernel, reference = image.spp
+    say(
+        f"picture: {kernel} against {reference} spp, least p-value {image.least:.2g} of {image.comparisons}, "
+        f"at least {image.level:.2g} expected (significance {image.significance:g})"
+    )
+    say("passed" if paths.passed and image.passed else "FAILED: the kernel is not the reference")

@@ -1,4 +1,4 @@
-"""`wamnet compile`: from a model or a scene to the source of a kernel and its manifest.
+"""`wamnet compile` and `wamnet listing`: from a model or a scene to the source of a kernel and its manifest.
 
 A name of a canonical scene, or a file that ends in .json, is a scene; anything else is a model: a file, or
 one that ships with the package, as in model:minicubes.
@@ -13,7 +13,9 @@ from typing import Any
 from ... import models
 from ...compiler import artifact
 from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_plan
+from ...compiler.compile import compile_plan, compile_program
+from ...compiler.core.listing import as_text, lines_of
+from ...compiler.core.lower import lower
 from ...compiler.scenes import lower_scene, path_kernel
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.targets import Language, language_named
@@ -22,27 +24,22 @@ from ...kernels.run import tune
 from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...refimpl.light.scenes import CANONICAL
 from ...refimpl.light.transport import Settings
-from ...refimpl.network.denoise import Model
 from ...refimpl.reading import parse_json, read_file
-from ..common import options
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
 from ..common.options import Sampler, Target, argument, option
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
-from ..files.outputs import check_parent, unwritable
-from .choose import Request, check_request, choose
-
-HERE_SIZE, HERE_PICTURES = (1024, 1024), 1000
-"""What a kernel for this machine is chosen for: the paper's pictures (height, width), and many of them."""
+from ..files.outputs import check_output, check_parent, unwritable, visible, write_text
+from .choose import Request
 
 
 @dataclass(frozen=True)
 class OfScene:
     """What only the kernel of a scene has."""
 
-    time: options.Time = None
-    parameters: options.Parameters = None
+    time: float | None = option("time")
+    parameters: list[str] | None = option("parameters")
     max_depth: int | None = option("Maximum number of bounces per path (scenes only). [default: 5]")
     sampler: Sampler | None = option("Sampler (scenes only). [default: pcg4d]")
     lanes: int | None = option("Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs. [default: 1]")
@@ -50,8 +47,7 @@ class OfScene:
     def compiled(self, name: str, language: Language, profile: str) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
         scene = load_scene(name, self.time, self.parameters or [])
-        for line in said_of_compiling(scene):
-            say(line)
+        said_of_compiling(scene)
         settings = Settings() if self.max_depth is None else Settings(max_depth=self.max_depth)
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)
@@ -68,7 +64,9 @@ def compile_model(
     *,
     of_scene: OfScene,
     network: KernelRequest,
-    here: options.Here = False,
+    here: bool = option(
+        "--here  Use the best schedule for this machine: the tuned one, or else the built-in choice.", False
+    ),
     limits: Request,
 ) -> None:
     """Compile a model or a scene to a kernel: source, weights, and a manifest of its interface.
@@ -115,31 +113,26 @@ def _write(kernel: Artifact, folder: Path) -> None:
         say(f"no certificate: {kernel.plan.unproven}")
 
 
-def _chosen_here(model: Model, executor: str, network: KernelRequest) -> str:
-    """Return the schedule of a variant for this machine's device, and say why."""
-    refuse(given(network, "schedule"), "--here chooses another", "leave one of them out")
-    plan = network.plan(model, executor)
-    with open_executor(executor) as runner:
-        schedule, reason = tune.choose(runner, plan, HERE_SIZE, HERE_PICTURES)
-        say(f"schedule {schedule} for {runner.device}: {reason}")
-    return schedule
-
-
 def _compiled_model(
     path: Path, language: Language, network: KernelRequest, limits: Request, here: bool
 ) -> Artifact:
     """Return the kernel of a model: of a variant that is named, or that keeps limits, or of all of it."""
-    check_request(limits, network.variant)
+    limits.check(network.variant)
     model = load_model(path, imported=True)
     if limits.limited:
         if model.is_imported:
             rule = "limits are measured on frames, which an imported network does not read"
             raise InputError("limits", NO_VALUE, rule, "leave them out")
         refuse({"--here": NO_VALUE if here else None}, "limits choose the schedule too")
-        variant, schedule = choose(model, limits, language.name, network.profile, network.schedule)
-        network = replace(network, variant=variant, schedule=schedule)
+        network = limits.choose(model, network, language.name)
     elif here:
-        network = replace(network, schedule=_chosen_here(model, language.name, network))
+        # For many of the paper's images.
+        refuse(given(network, "schedule"), "--here chooses another", "leave one of them out")
+        with open_executor(language.name) as runner:
+            plan = network.plan(model, language.name)
+            schedule, reason = tune.choose(runner, plan, (1024, 1024), 1000)
+            say(f"schedule {schedule} for {runner.device}: {reason}")
+        network = replace(network, schedule=schedule)
     return compile_plan(network.plan(model, language))
 
 
@@ -160,8 +153,7 @@ def _check_name(name: str, of_scenes: Mapping[str, Any]) -> None:
 
 def check_folder(folder: Path, name: str, of_scene: bool = False) -> None:
     """Refuse a folder where a kernel cannot be, or that holds files of another program, kind or target."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "is a file", "choose another name with -o")
+    visible(folder)
     check_parent(folder)
     path = folder / artifact.MANIFEST_NAME
     data: Any = None
@@ -170,18 +162,17 @@ def check_folder(folder: Path, name: str, of_scene: bool = False) -> None:
     with suppress(InputError):
         data = parse_json(read_file(path), "manifest", "choose another folder")
     kinds = {artifact.SCHEMA: "a model's kernel", path_kernel.SCHEMA: "a scene's kernel"}
-    data = data if isinstance(data, dict) else {}
-    schema = data.get("schema")
+    schema, target = (data.get(key) if isinstance(data, dict) else None for key in ("schema", "target"))
+    wanted = path_kernel.SCHEMA if of_scene else artifact.SCHEMA
     if schema not in kinds:
         rule = f"its {artifact.MANIFEST_NAME} is not one that wamnet wrote"
-        raise InputError("output folder", str(folder), rule, "choose another with -o")
-    wanted = path_kernel.SCHEMA if of_scene else artifact.SCHEMA
-    if schema != wanted:
+    elif schema != wanted:
         rule = f"holds {kinds[schema]}, and this is {kinds[wanted]}"
-        raise InputError("output folder", str(folder), rule, "choose another with -o")
-    if data.get("target") != name:
-        rule = f"holds a kernel for {data.get('target')}, and this one is for {name}"
-        raise InputError("output folder", str(folder), rule, "choose another with -o")
+    elif target != name:
+        rule = f"holds a kernel for {target}, and this one is for {name}"
+    else:
+        return
+    raise InputError("output folder", str(folder), rule, "choose another with -o")
 
 
 def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
@@ -190,3 +181,43 @@ def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
         return artifact.write(kernel, folder)
     except OSError as error:
         raise unwritable(folder, error, "output folder") from None
+
+
+def listing(
+    model: str = argument("MODEL  Trained model (.safetensors), canonical scene or scene file (.json)."),
+    target: Target = option("Target language.", ...),
+    output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
+    profile: str = option("profile", "ieee"),
+) -> None:
+    """Print a kernel interleaved with the lines of the reference that it came from.
+
+    Denoisers use the plain schedule; scenes trace one path at a time. Only -o writes a file.
+
+    Examples:
+    wamnet listing model.safetensors --target glsl
+    wamnet listing minicubes --target opencl --profile native -o minicubes.txt
+    """
+    if output is not None:
+        check_output(output, inputs=[Path(model)])
+    language = language_named(target)
+    if is_scene(model):
+        scene = load_scene(model, None, [])
+        programs = lower_scene.lower_scene(scene, Settings(), language.forms, keep_places=True)
+        path_kernel = compile_path(programs, language, profile)
+        lines = lines_of(path_kernel.source, path_kernel.programs.parts)
+    else:
+        program = lower(load_model(Path(model), imported=True), keep_places=True)
+        kernel = compile_program(program, language, profile)
+        lines = lines_of(kernel.source, {"": kernel.programs})
+    text = as_text(lines, _reference)
+    if output is not None:
+        write_text(output, text)
+        text = str(output)
+    for line in text.rstrip("\n").split("\n"):
+        say(line)
+
+
+def _reference(place: str) -> str:
+    """Return the text of a place, refimpl/network/siren.py:122."""
+    path, _, line = place.rpartition(":")
+    return (Path(__file__).parents[2] / path).read_text(encoding="utf-8").splitlines()[int(line) - 1]

@@ -19,20 +19,13 @@ from ...spec.conformance.case import FOLDER, Case
 from ...spec.conformance.protocol import Session
 from ...spec.conformance.report import about, counts, first_blamed
 from ...spec.conformance.run import PASS, UNSUPPORTED, Verdict
-from ..common import options
 from ..common.options import option
 from ..common.request import given
-from ..common.terminal import progress, say, table
+from ..common.terminal import STATUS_WRONG, progress, say, table
 from ..files.outputs import check_output, write_text
-
-STATUS_FAILED = 1
-"""Exit status when a case fails."""
 
 SHOWN_FAILURES = 10
 """Failures that are printed in full; the reports hold all."""
-
-REFERENCE = "reference"
-"""Name that stands for the reference among the executors."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +36,7 @@ class Tested:
     executor: str | None = option(
         "NAME  Test a backend of wamnet instead (numpy, opencl, opengl, c), or [bold]reference[/]."
     )
-    profile: options.Profile = "ieee"
+    profile: str = option("profile", "ieee")
     words: list[str] | None = option(
         "-k WORD  Run only cases whose ID contains this word, or that have this clause or flag. Repeatable."
     )
@@ -64,16 +57,13 @@ class Tested:
         return shlex.join(["wamnet", "conformance", *words, "-k"])
 
 
-@dataclass(frozen=True)
-class Reports:
-    """What is written of it."""
-
-    as_json: Path | None = option("--json FILE  Write a JSON report.")
-    junit: Path | None = option("FILE  Write a JUnit report.")
-    write: Path | None = option("DIR  Regenerate the vectors from the reference and exit.")
-
-
-def conformance(*, tested: Tested, reports: Reports) -> None:
+def conformance(
+    *,
+    tested: Tested,
+    as_json: Path | None = option("--json FILE  Write a JSON report."),
+    junit: Path | None = option("FILE  Write a JUnit report."),
+    write: Path | None = option("DIR  Regenerate the vectors from the reference and exit."),
+) -> None:
     """Test a program against the spec's vectors and their error bounds.
 
     The program reads one JSON request per line and writes one answer per line; spec/conformance.md has
@@ -84,25 +74,32 @@ def conformance(*, tested: Tested, reports: Reports) -> None:
     wamnet conformance --program "./mine --fast" --junit report.xml
     wamnet conformance --program ./mine --track mine.json
     """
-    if reports.write is not None:
+    if write is not None:
         if given(tested, "program", "executor"):
             rule = "it makes vectors and asks nobody"
-            raise InputError("--write", str(reports.write), rule, "leave --program and --executor out")
-        say(f"wrote {all_vectors.write(reports.write)} files to {reports.write}")
+            raise InputError("--write", str(write), rule, "leave --program and --executor out")
+        say(f"wrote {all_vectors.write(write)} files to {write}")
         return
     profile, track, words = tested.profile, tested.track, tested.words or ()
     profile_named(profile)
     command = _command(tested.program, tested.executor)
-    _check_options(tested.timeout, [path for path in (track, reports.as_json, reports.junit) if path])
+    if not 0.0 < tested.timeout < math.inf:
+        raise InputError("--timeout", tested.timeout, "must be a positive number of seconds", "60 is usual")
+    for path in filter(None, (track, as_json, junit)):
+        check_output(path)
     cases = run.chosen(run.read_vectors(tested.vectors or FOLDER), words)
-    _check_words(cases, words)
+    if not cases:
+        rule = "no case has such an id, clause or flag"
+        raise InputError("-k", " ".join(words), rule, "for example -k random, -k RNG-3 or -k random.block/0")
     before = None if track is None else report.read_track(track)
-    verdicts = _asked(command, cases, profile, tested.timeout)
+    total = sum(map(len, cases.values()))
+    with Session(command, tested.timeout) as session, progress("testing", total, "cases") as advance:
+        verdicts = list(run.run(session, cases, profile, advance))
     name = tested.program or f"executor {tested.executor}"
-    if reports.as_json is not None:
-        write_text(reports.as_json, report.to_json(name, profile, verdicts, tested.again))
-    if reports.junit is not None:
-        write_text(reports.junit, report.to_junit(name, verdicts, tested.again))
+    if as_json is not None:
+        write_text(as_json, report.to_json(name, profile, verdicts, tested.again))
+    if junit is not None:
+        write_text(junit, report.to_junit(name, verdicts, tested.again))
     _print_counts(name, profile, verdicts)
     failed = [verdict for verdict in verdicts if verdict.failed]
     if track is not None and before is not None:
@@ -115,7 +112,7 @@ def conformance(*, tested: Tested, reports: Reports) -> None:
     if track is not None and (before is None or not failed):
         write_text(track, report.track_text(before, verdicts))
     if failed:
-        raise typer.Exit(STATUS_FAILED)
+        raise typer.Exit(STATUS_WRONG)
 
 
 def _command(program: str | None, executor: str | None) -> list[str]:
@@ -133,34 +130,10 @@ def _command(program: str | None, executor: str | None) -> list[str]:
         if not command:
             raise InputError("--program", program, "is not a command", "name a program")
         return command
-    if executor not in (REFERENCE, *EXECUTORS, *RUNNERS):
-        known = dict.fromkeys((REFERENCE, *EXECUTORS, *RUNNERS))
+    if executor not in ("reference", *EXECUTORS, *RUNNERS):
+        known = dict.fromkeys(("reference", *EXECUTORS, *RUNNERS))
         raise InputError("--executor", executor, "unknown", choice(str(executor), known))
     return [sys.executable, "-m", "wamnet.spec.conformance.program", "--executor", str(executor)]
-
-
-def _check_options(timeout: float, outputs: Sequence[Path]) -> None:
-    """Refuse what could not be done at the end."""
-    if not 0.0 < timeout < math.inf:
-        raise InputError("--timeout", timeout, "must be a positive number of seconds", "60 is usual")
-    for path in outputs:
-        check_output(path)
-
-
-def _check_words(cases: Mapping[str, Sequence[Case]], words: Sequence[str]) -> None:
-    """Refuse words that choose nothing."""
-    if not cases:
-        rule = "no case has such an id, clause or flag"
-        raise InputError("-k", " ".join(words), rule, "for example -k random, -k RNG-3 or -k random.block/0")
-
-
-def _asked(
-    command: Sequence[str], cases: Mapping[str, Sequence[Case]], profile: str, timeout: float
-) -> list[Verdict]:
-    """Ask all cases and return the verdicts."""
-    total = sum(map(len, cases.values()))
-    with Session(command, timeout) as session, progress("testing", total, "cases") as advance:
-        return list(run.run(session, cases, profile, advance))
 
 
 def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:

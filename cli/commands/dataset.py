@@ -6,13 +6,14 @@
    [`compared`].
 3. What is missing or damaged is made by this process, or on a cluster [`make`]; the bytes of every file are
    the same.
-4. `--from-blender` makes frames of a Blender file in place of a scene [blender/dataset.py].
+4. `--from-blender` makes frames of a Blender file in place of a scene [`make_from_blender`].
 5. `--check` compares every file with its checksum and changes nothing [`check`].
 """
 
 import dataclasses
 import os
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ import typer
 from ... import kernels
 from ...kernels.run import before
 from ...kernels.run.render_frame import shares_work
+from ...models.blender import plan as film_plan
+from ...models.blender.session import Blender
 from ...models.data import frame_plan
 from ...models.data.frame_plan import KINDS, FramePlan, Request, Task, plan
 from ...models.data.scene_source import SceneSource, scene_source
@@ -30,16 +33,16 @@ from ...refimpl.frame import Frame
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
+from ..common.inputs import check_input
 from ..common.options import argument, option
 from ..common.terminal import hint_on_interrupt, progress, say
-from ..files import dataset_files
-from .blender.dataset import make as make_from_blender
+from ..files import dataset_files, exr
+
+PASSES = ("color", "albedo", "normal", "depth", "position")
+"""Layers of a noisy picture of Blender: what Cycles has passes of."""
 
 LIMITS = "LOW:HIGH"
 """How a range is written."""
-
-LEAST_SAMPLES = 1 << 20
-"""Samples below which one process is sooner done than a cluster has started (about five seconds)."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Frames:
     spp: int = option("Paths per pixel of each target; noisy frames have 1.", 64)
     test_spp: int = option("Paths per pixel of each test target. [default: same as --spp]", 0)
     arc_s: float = option("--arc  Seconds at the end of the animation to hold out from training.", 0.0)
-    seed: options.Seed = 0
+    seed: int = option("seed", 0)
 
 
 @dataclass(frozen=True)
@@ -87,17 +90,17 @@ class OfScene:
     """Further fields of a request that only a scene has."""
 
     size_px: int = option("--size  Width and height in pixels.", 64)
-    feature_spp: options.FeatureSpp = 0
-    seen: options.Seen = False
-    shadow_rays: options.ShadowRays = 0
+    feature_spp: int = option("feature_spp", 0)
+    seen: bool = option("seen", False)
+    shadow_rays: int = option("shadow_rays", 0)
     start_s: float = option("--start  Start time of the animation, in seconds.", 0.0)
     seconds: float = option("Duration of the animation, in seconds; minicubes rotate in 8 s.", 8.0)
     before: int = option(
         "N  Earlier frames (24 per second) to accumulate into history layers of each noisy frame.", 0
     )
-    max_depth: int = option("Maximum number of bounces per path.", 5)
-    executor: options.Renderer = "auto"
-    sampler: options.SamplerName = "pcg4d"
+    max_depth: int = option("max_depth", 5)
+    executor: options.ExecutorChoice = option("renderer", "auto")
+    sampler: options.Sampler = option("sampler", "pcg4d")
 
 
 @dataclass(frozen=True)
@@ -112,13 +115,6 @@ class OfBlender:
     )
 
 
-OF_SCHEDULER = "the scheduler's workers may have no other"
-"""Why only NumPy is chosen for them."""
-
-OF_TIMES = ("start_s", "seconds", "arc_s")
-"""Options that mean nothing for a static scene."""
-
-
 def dataset(
     command: typer.Context,
     scene: str | None = argument(
@@ -129,8 +125,8 @@ def dataset(
     frames: Frames,
     of_scene: OfScene,
     ranges: Ranges,
-    parameters: options.Parameters = None,
-    context: options.OpenGLContext = None,
+    parameters: list[str] | None = option("parameters"),
+    context: options.ContextName | None = option("context"),
     workers: int | None = option("Number of worker processes. [default: one per core]"),
     scheduler: str | None = option("ADDRESS  Address of a running Dask scheduler; its workers are used."),
     from_blender: Path | None = option("FILE  Render frames of this Blender file instead of a scene."),
@@ -166,10 +162,14 @@ def dataset(
         with hint_on_interrupt(lambda: f"{output}: the same command resumes"):
             make_from_blender(output, from_blender, **vars(of_blender), **vars(frames))
     else:
-        source = scene_source(scene or _missing_scene(), options.parse_parameters(parameters or []))
+        if scene is None:
+            raise InputError("argument SCENE", NO_VALUE, "missing", f"choose one of {options.SCENES}")
+        source = scene_source(scene, options.parse_parameters(parameters or []))
         options.refuse_given(command, blender, "without --from-blender")
         if source.still is not None:
-            options.refuse_given(command, OF_TIMES, "for a scene file, which is static")
+            options.refuse_given(
+                command, ("start_s", "seconds", "arc_s"), "for a scene file, which is static"
+            )
         fields: dict[str, Any] = {**vars(frames), **vars(of_scene), **ranges.limits()}
         _make_from_scene(output, source, fields, workers, scheduler)
 
@@ -179,25 +179,17 @@ def _make_from_scene(
 ) -> None:
     """Make the data set of a scene and the other fields of a request."""
     request = Request(source.name, source.parameters, still=source.still, **fields)
-    _check_workers(workers, scheduler)
-    executor = chosen(request.executor, because=OF_SCHEDULER if scheduler else "")
-    request = replace(request, executor=executor)
-    with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
-        make(folder, request, plan(request), workers, scheduler)
-
-
-def _missing_scene() -> str:
-    """Refuse a command without a scene."""
-    raise InputError("argument SCENE", NO_VALUE, "missing", f"choose one of {options.SCENES}")
-
-
-def _check_workers(workers: int | None, scheduler: str | None) -> None:
-    """Refuse numbers of processes that mean nothing."""
     if scheduler is not None and workers is not None:
         rule = "a running scheduler has its own workers"
         raise InputError("--workers", workers, rule, "leave out --workers or --scheduler")
     if workers is not None and workers < 1:
         raise InputError("workers", workers, "at least one process must work", "use 1 or more")
+    executor = chosen(
+        request.executor, because="the scheduler's workers may have no other" if scheduler else ""
+    )
+    request = replace(request, executor=executor)
+    with hint_on_interrupt(lambda: f"{folder}: the same command resumes"):
+        make(folder, request, plan(request), workers, scheduler)
 
 
 def make(
@@ -205,22 +197,22 @@ def make(
 ) -> None:
     """Make what is missing in the folder; on a cluster if there is more than one worker (None: per core)."""
     nearest = compared(frames)
-    known = 0
-    if (folder / dataset_files.MANIFEST).exists():
-        known = dataset_files.bytes_of(dataset_files.read_manifest(folder))
-    elif scheduler is None:
+    if scheduler is None and not (folder / dataset_files.MANIFEST).exists():
         # A device that is missing here is reported before a folder needs it.
         kernels.open_executor(request.executor).close()
-    with (
-        progress("checking", known, "bytes") as look,
-        dataset_files.Store.open(folder, request, frames, look, nearest) as store,
-    ):
+    with dataset_files.Store.open(folder, request, frames, nearest) as store:
         made, again = len(store.missing), [name for name, what in store.missing.items() if what == "damaged"]
         for name in again:
             say(f"{folder / name}: damaged, rendered again")
         if made:
             _render(store, request, frames[0], workers, scheduler)
-    for line in [*summed_up(nearest), *store.summary(made)]:
+    for split, d in nearest.items():
+        say(
+            f"{split} frames differ from the nearest training frame in {100 * d['differing']:.0f} % of the "
+            f"pixels at least; nearest time {d['time_s']:.3f} s, camera {d['camera_deg']:.2f} degrees, "
+            f"distance {100 * d['distance']:.2f} %, lights {d['lamps']:.3f}"
+        )
+    for line in store.summary(made):
         say(line)
 
 
@@ -232,34 +224,20 @@ def compared(frames: Sequence[FramePlan]) -> dict[str, dict[str, float]]:
     return {split: comparison.as_data() for split, comparison in found.items()}
 
 
-def summed_up(nearest: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return a sentence for each split of test frames: how far training is, each number by itself."""
-    return [
-        f"{split} frames differ from the nearest training frame in {100 * d['differing']:.0f} % of the "
-        f"pixels at least; nearest time {d['time_s']:.3f} s, camera {d['camera_deg']:.2f} degrees, distance "
-        f"{100 * d['distance']:.2f} %, lights {d['lamps']:.3f}"
-        for split, d in nearest.items()
-    ]
-
-
 def _render(
-    store: dataset_files.Store[Task],
-    request: Request,
-    first: FramePlan,
-    workers: int | None,
-    scheduler: str | None,
+    store: dataset_files.Store, request: Request, first: FramePlan, workers: int | None, scheduler: str | None
 ) -> None:
     """Do the tasks that are left in the store; the scene of the `first` frame says what they take."""
     tasks = store.tasks()
     total = sum(task.samples for task in tasks)
     if workers is None:
-        alone = total < LEAST_SAMPLES or shares_work(request.executor)
+        # One process is sooner done with few samples than a cluster has started (about five seconds).
+        alone = total < 1 << 20 or shares_work(request.executor)
         workers = 1 if alone else len(os.sched_getaffinity(0))
     if not tasks:
         return
     shown, pixels = first.pictures[KINDS[0]].scene, request.size_px**2
-    for line in said_of_rendering(shown, total, pixels, request.executor, workers):
-        say(line)
+    said_of_rendering(shown, total, pixels, request.executor, workers)
     with progress("rendering", total, "samples") as advance:
         if scheduler is None and workers == 1:
             cluster.do_here(tasks, lambda task: before.carry_out(task, advance), store.put)
@@ -288,3 +266,57 @@ def check(folder: Path, scene: str | None = None) -> None:
         say(f"{folder / name}: {what}")
     dataset_files.refuse_wrong(folder, wrong)
     say(f"{folder}: {2 * len(manifest['frames'])} images match {dataset_files.MANIFEST}")
+
+
+# ---- of a Blender file -------------------------------------------------------------------------------------
+
+
+def make_from_blender(folder: Path, file: Path, view_layer: str, blender: str | None, **numbers: Any) -> None:
+    """Make what is missing in the folder; `numbers` are those of a request of this file.
+
+    Blender renders to a file beside the data set; what is read of it, as of any other program's, is kept in
+    the project's own form, with the same manifest, checksums and resumption as other data sets.
+    """
+    check_input(file)
+    with Blender(file, view_layer, blender) as opened:
+        animation, digest = opened.animation, dataset_files.sum_of(file).sha256
+        request = film_plan.Request(file.name, digest, animation, **numbers)
+        with dataset_files.Store.open(folder, request, film_plan.plan(request)) as store:
+            made = len(store.missing)
+            if made:
+                _render_by_blender(store, opened)
+    shown = f"frames {animation.first} to {animation.last} of {animation.scene}"
+    say(f"{file}: {shown}, view layer {animation.view_layer}, by Cycles of Blender {animation.version}")
+    for line in store.summary(made):
+        say(line)
+
+
+def _render_by_blender(store: dataset_files.Store, blender: Blender) -> None:
+    """Render what is left in the store."""
+    tasks = store.tasks()
+    with (
+        progress("rendering", sum(shot.samples for shot in tasks), "samples") as advance,
+        tempfile.TemporaryDirectory(prefix="wamnet-blender-") as scratch,
+    ):
+        path = Path(scratch, "picture.exr")
+        for shot in tasks:
+            blender.render(shot, path)
+            store.put(shot, _read(path, shot))
+            path.unlink()
+            advance(shot.samples)
+
+
+def _read(path: Path, shot: film_plan.Shot) -> Frame:
+    """Return what Blender has rendered as a frame of a data set."""
+    frame, animation = exr.read_frame(path), shot.request.animation
+    wanted = PASSES if shot.name.endswith(f"{KINDS[0]}.exr") else PASSES[:1]
+    return Frame(
+        {name: frame[name] for name in wanted},
+        {
+            "renderer": f"Cycles, Blender {animation.version}",
+            "scene": f"{shot.request.blend}: {animation.scene}",
+            "film_frame": str(shot.frame),
+            "spp": str(shot.spp),
+            "seed": str(shot.seed),
+        },
+    )

@@ -49,7 +49,7 @@ from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files import dataset_files, exr, images
 from ..files.alone import working_in
 from ..files.images import Image
-from ..files.outputs import write_text
+from ..files.outputs import visible, write_text
 from ..reports import report
 from ..reports.report import Plan, Results, Unseen
 from ..reports.runs import Run, run_all
@@ -71,17 +71,8 @@ PLAN_NAME = "plan.json"
 DATA_SET = "frames"
 """Folder of the data set, in the folder of the results."""
 
-SHOWN_FIRST = ("opencl", "opengl", "numpy")
-"""Whose picture the report shows: that of a compiled kernel, if one ran here."""
-
 REPEATS = 3
 """Times of each contender that the report shows."""
-
-BUDGET_S = 3.0
-"""Seconds a picture that a contender of the report may take."""
-
-FORM_STEPS = 1000
-"""Steps of each form of the network that the report compares: a second on a device."""
 
 _Result = TypeVar("_Result")
 
@@ -170,8 +161,6 @@ def begun(plan: Plan, folder: Path) -> Iterator[None]:
     Nobody else makes a demonstration there until the block has ended.
     """
     Job(plan.size_px, plan.size_px)  # Refuses a size that cannot be rendered.
-    if folder.exists() and not folder.is_dir():
-        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
     text = json.dumps(asdict(plan), indent=2) + "\n"
     _check_note(folder, text)
     with working_in(folder, "making a demonstration"):
@@ -185,7 +174,7 @@ def _check_note(folder: Path, text: str) -> bool:
 
     What is hidden is a lock, or a file of a run that was killed before it had noted its plan.
     """
-    if not folder.is_dir() or all(path.name.startswith(".") for path in folder.iterdir()):
+    if not visible(folder):
         return False
     try:
         found = read_file(folder / PLAN_NAME).decode("utf-8", "replace")
@@ -201,8 +190,7 @@ def carry_out(plan: Plan, output: Path) -> Results:
     """Do all steps in the folder `output` and return what they have found."""
     seconds: dict[str, float] = {}
     say(f"renderer {plan.renderer}, trainer {plan.trainer}: the fastest available")
-    for line in said_of_learning(plan.train_frames, plan.size_px**2):
-        say(line)
+    said_of_learning(plan.train_frames, plan.size_px**2)
     _timed(seconds, "rendering", lambda: render_frames(plan, output))
     times, pairs = zip(*_pairs(output, "train"), strict=True)
     model, state, per_step = _timed(seconds, "training", lambda: train_network(plan, pairs, output))
@@ -307,7 +295,7 @@ def run_kernels(
         write_kernel(kernel, output / "kernels" / target)
     with progress("running", len(compiled), "kernels") as advance:
         images, runs = run_all(model, frames[0], compiled, advance)
-    by = next(name for name in SHOWN_FIRST if name in images)
+    by = next(name for name in ("opencl", "opengl", "numpy") if name in images)
     with kernels.open_executor(by) as executor:
         others = [kernels.denoise_on(executor, model, frame).image for frame in frames[1:]]
     return [images[by], *others], by, runs
@@ -321,11 +309,11 @@ def measure_speed(plan: Plan, results: Results, output: Path) -> dict[str, Any]:
     model, forms = results.model, []
     shown = bench_frames.of_folder(output / DATA_SET, model)
     if plan.trainer != "numpy":
-        wanted = bench_forms.planned(model, bench_forms.QUICK_FORMS, FORM_STEPS)
+        wanted = bench_forms.planned(model, bench_forms.QUICK_FORMS, 1000)
         pairs = bench_frames.of_folder(output / DATA_SET, model, "train").pairs
         forms = bench_forms.trained(model, wanted, pairs, bench_forms.folder_of(model, output), plan.trainer)
     facts: dict[str, Any] = {"pairs": shown.pairs, "frames": shown.as_data(), "name": f"demo, {plan.scene}"}
-    request = Request(model, plan.size_px, REPEATS, budget_s=BUDGET_S, quick=True, **facts)
+    request = Request(model, plan.size_px, REPEATS, budget_s=3.0, quick=True, **facts)
     return bench.measure(request, command="wamnet demo", forms=forms)
 
 

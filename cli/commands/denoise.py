@@ -22,7 +22,6 @@ from ...refimpl.encoding import from_display
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.frame import Frame, not_finite
 from ...refimpl.network.dataset import FEATURES
-from ...refimpl.network.denoise import Model
 from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
@@ -82,7 +81,11 @@ class Job:
         noisy = exr.read_frame(path, False, self.notes.add, self.layers.view_layer)
         because, remedy = "the model was trained with it", "render or export that layer too"
         exr.need_layers(path, noisy, model.features, because, remedy, self.layers.view_layer)
-        _note_what_is_no_number(path, noisy, model, self.notes)
+        layers = {layer for name in model.features for layer in FEATURES[name].layers}
+        for layer, count in not_finite(noisy).items():
+            if layer in layers:
+                rule = "NaN is read as 0, an infinity as the end of the range"
+                self.notes.add(f"{path}: {count} pixels of {layer} are not finite: {rule}")
         check_domain(path, noisy, model, self.layers.anyway, self.notes.add)
         return noisy, self.denoiser.images(noisy)
 
@@ -101,7 +104,7 @@ class Job:
 
 
 def denoise(
-    model: options.ModelFile,
+    model: Path = option("model", ...),
     frames: list[Path] = argument(
         "FRAME...  Noisy frames with the layers that the model reads (.exr); shot.*.exr and shot.%04d.exr "
         "are sequences."
@@ -111,12 +114,12 @@ def denoise(
         "frames, a folder or a pattern with %04d for the frame number.",
         Path("denoised.png"),
     ),
-    executor: options.Executor = "auto",
+    executor: options.ExecutorChoice = option("executor", "auto"),
     *,
     kernel: KernelRequest,
-    rank: options.CutRank = 0,
+    rank: int = option("rank", 0),
     layers: Layers,
-    context: options.OpenGLContext = None,
+    context: options.ContextName | None = option("context"),
 ) -> None:
     """Denoise frames with a trained model.
 
@@ -183,17 +186,17 @@ def _denoise_all(job: Job, paths: Sequence[Path], outputs: Sequence[Path], outpu
     tasks = [(path, out, _origin(path, how)) for path, out in zip(paths, outputs, strict=True)]
     missing = [task for task in tasks if not task[2] or read_origin(task[1]) != task[2]]
 
-    def work(read: tuple[Frame, Images]) -> Any:
-        return job.denoiser.image(read[1])
-
-    def write(task: tuple[Path, Path, str], encoded: Any) -> None:
-        job.write(task[1], task[0], encoded, task[2])
-
     with (
         hint_on_interrupt(lambda: f"{output}: the same command resumes"),
         progress("denoising", len(missing), "frames") as advance,
     ):
-        failed = overlapped(missing, lambda task: job.read(task[0]), work, write, advance)
+        failed = overlapped(
+            missing,
+            lambda task: job.read(task[0]),
+            lambda read: job.denoiser.image(read[1]),
+            lambda task, encoded: job.write(task[1], task[0], encoded, task[2]),
+            advance,
+        )
     job.notes.say()
     seconds = time.perf_counter() - start
     done, there = len(missing) - len(failed), len(tasks) - len(missing)
@@ -229,15 +232,6 @@ def read_origin(path: Path) -> str | None:
     if not path.exists():
         return None
     return images.read_origin(path) if path.suffix.lower() == ".png" else exr.read_origin(path)
-
-
-def _note_what_is_no_number(path: Path, noisy: Frame, model: Model, notes: Notes) -> None:
-    """Note pixels that are read as something else."""
-    layers = {layer for name in model.features for layer in FEATURES[name].layers}
-    for layer, count in not_finite(noisy).items():
-        if layer in layers:
-            rule = "NaN is read as 0, an infinity as the end of the range"
-            notes.add(f"{path}: {count} pixels of {layer} are not finite: {rule}")
 
 
 def executors() -> None:

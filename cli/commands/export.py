@@ -8,11 +8,11 @@ import typer
 
 from ...compiler.artifact import schedule_text
 from ...kernels.export import check as checking
+from ...kernels.export import speed
 from ...kernels.export.hosts.table import host_named
 from ...kernels.export.motion import TIME, Motion
 from ...kernels.export.package import Export, Request, with_speed
 from ...kernels.export.package import export as exported
-from ...kernels.export.speed import check_measured, measure
 from ...models.data.frame_plan import animation_times
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.scene import Scene
@@ -21,7 +21,7 @@ from ..common import options
 from ..common.inputs import load_model, load_scene
 from ..common.options import option
 from ..common.request import KernelRequest, given, refuse
-from ..common.terminal import say
+from ..common.terminal import STATUS_WRONG, say
 from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
 
@@ -42,9 +42,6 @@ HTML, PAGE_NAME = "html", "index.html"
 
 SECONDS, FPS = 8.0, 10.0
 """Length of a table of times, and times a second, if nobody asks for others."""
-
-STATUS_WRONG = 1
-"""Exit status when an export was written, and what runs it here finds it off, or refuses it."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +66,10 @@ class Shown:
         "SCENE  Also export the path tracer for this scene: a canonical scene or a file (.json). [default: "
         "denoiser only]"
     )
-    time: options.Time = None
-    parameters: options.Parameters = None
-    max_depth: int = option("Maximum number of bounces per path.", 5)
-    sampler: options.SamplerName = "pcg4d"
+    time: float | None = option("time")
+    parameters: list[str] | None = option("parameters")
+    max_depth: int = option("max_depth", 5)
+    sampler: options.Sampler = option("sampler", "pcg4d")
     moving: str | None = option(
         "LIST  Scene parameters to pass at run time instead of baking in: time, camera, lights, positions. "
         "[default: none: the scene is baked in]"
@@ -131,26 +128,19 @@ class Into:
         return self.target
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What is done with an export here."""
-
-    check: bool = option(
-        "--check  Compile and run the export here, and compare its output with the reference.", False
-    )
-    measure: bool = option(
-        "--measure  Measure the time per frame on this machine and report it in the README.", False
-    )
-
-
 def export(
-    model: options.ModelFile,
+    model: Path = option("model", ...),
     *,
     into: Into,
     output: Path | None = option("-o --output FOLDER  New output folder. [default: HOST or TARGET]"),
     shown: Shown,
     kernel: Kernel,
-    tried: Tried,
+    check: bool = option(
+        "--check  Compile and run the export here, and compare its output with the reference.", False
+    ),
+    measure: bool = option(
+        "--measure  Measure the time per frame on this machine and report it in the README.", False
+    ),
 ) -> None:
     """Export a denoiser for another program: kernels, a manifest, a README and a reference test image.
 
@@ -175,30 +165,33 @@ def export(
     folder = output or Path(host or target)
     if target == HTML:
         of_kernels = given(kernel, "weights", "variant", "schedule")
-        of_kernels |= given(shown, "time", "moving", "seconds", "fps") | given(tried)
+        of_kernels |= given(shown, "time", "moving", "seconds", "fps") | {
+            "--check": check or None,
+            "--measure": measure or None,
+        }
         refuse(of_kernels, "a web page has its own")
         page = webpage.page_of(model, shown.scene, shown.parameters or [], None)
         _write(folder, {PAGE_NAME: page.encode()})
         return
     check_new_folder(folder)
     shown.check()
-    made = _export(model, target, host or "", shown, kernel, tried.measure)
+    made = _export(model, target, host or "", shown, kernel, measure)
     _write(folder, made.contents())
     _tell(made)
-    if tried.check:
+    if check:
         _checked(made)
 
 
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
     """Return the export that the options ask for; `measured`: it says how long it takes."""
     if measured:
-        check_measured(target)
+        speed.check_measured(target)
     settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
     motion = shown.motion()
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
     how = (kernel.profile, kernel.weights or "", kernel.network(), settings, kernel.schedule or "")
     made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
-    return with_speed(made, measure(made).facts()) if measured else made
+    return with_speed(made, speed.measure(made).facts()) if measured else made
 
 
 def _tell(made: Export) -> None:
@@ -227,9 +220,8 @@ def _checked(made: Export) -> None:
     for name, value in zip(checking.HEAD, verdict.cells(), strict=True):
         say(f"{name}: {value}")
     if verdict.bound == 0:
-        say(
-            f"SHA-256 of the image: {verdict.digest}; the reference's: {checking.digest_of(made.pair.output)}"
-        )
+        wanted = checking.digest_of(made.pair.output)
+        say(f"SHA-256 of the image: {verdict.digest}; the reference's: {wanted}")
     if not verdict.holds:
         say(f"wrong: {verdict.wrong}")
         raise typer.Exit(STATUS_WRONG)

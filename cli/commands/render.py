@@ -2,7 +2,6 @@
 
 import time as clock
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -23,7 +22,7 @@ from ..files.outputs import check_output, write_text
 
 
 def render(
-    scene: options.SceneName,
+    scene: str = option("scene", ...),
     output: Path | None = option(
         "-o --output FILE  Output: frame with all layers (.exr), or its colour only (.png). [default: "
         "SCENE.exr]"
@@ -31,21 +30,21 @@ def render(
     width: int = option("Width in pixels.", 256),
     height: int = option("Height in pixels.", 256),
     spp: int = option("Paths per pixel: 1 is noisy, 1024 is smooth.", 1),
-    feature_spp: options.FeatureSpp = 0,
-    seen: options.Seen = False,
-    shadow_rays: options.ShadowRays = 0,
-    seed: options.Seed = 0,
-    time: options.Time = None,
-    parameters: options.Parameters = None,
+    feature_spp: int = option("feature_spp", 0),
+    seen: bool = option("seen", False),
+    shadow_rays: int = option("shadow_rays", 0),
+    seed: int = option("seed", 0),
+    time: float | None = option("time"),
+    parameters: list[str] | None = option("parameters"),
     *,
     view: options.View,
-    max_depth: int = option("Maximum number of bounces per path.", 5),
-    sampler: options.SamplerName = "pcg4d",
+    max_depth: int = option("max_depth", 5),
+    sampler: options.Sampler = option("sampler", "pcg4d"),
     dtype: FloatType = option("Floating-point type of the computation; files store float32.", "float32"),
-    executor: options.Renderer = "auto",
-    context: options.OpenGLContext = None,
+    executor: options.ExecutorChoice = option("renderer", "auto"),
+    context: options.ContextName | None = option("context"),
     workers: int | None = option("Number of worker processes (NumPy only). [default: one per core]"),
-    exposure: options.Exposure = 0.0,
+    exposure: float = option("exposure", 0.0),
 ) -> None:
     """Path-trace a scene: colour, albedo, normal, depth, position and ray direction.
 
@@ -67,40 +66,28 @@ def render(
     check_output(path, (".exr", ".png"), [Path(scene)])
     settings = Settings(max_depth=max_depth, sampler=sampler)
     job = Job(width, height, spp, seed, settings, dtype, 0, feature_spp, seen, shadow_rays=shadow_rays)
-    tracer = _tracer(executor, workers, dtype)
-    for line in said_of_rendering(loaded, job.samples, width * height, tracer, workers):
-        say(line)
+    because = "kernels compute in float32" if dtype == "float64" else ""
+    tracer = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
+    if workers is not None and render_frame.shares_work(tracer):
+        rule = f"{tracer} shares the work by itself"
+        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
+    said_of_rendering(loaded, job.samples, width * height, tracer, workers)
     started = clock.perf_counter()
     with progress(f"rendering {scene}", job.samples, "samples") as advance:
         frame = render_frame.render_frame(tracer, loaded, job, workers=workers, on_progress=advance).frame
     taken = f"{clock.perf_counter() - started:.1f} s"
-    write_picture(path, frame, exposure)
-    say(f"{path}: {width}x{height} pixels, {spp} spp, {taken}")
-
-
-def _tracer(executor: str, workers: int | None, dtype: FloatType) -> str:
-    """Return the executor that traces the paths; reject one that shares the work by itself."""
-    because = "kernels compute in float32" if dtype == "float64" else ""
-    name = chosen(executor, because="--workers are processes of NumPy" if workers is not None else because)
-    if workers is not None and render_frame.shares_work(name):
-        rule = f"{name} shares the work by itself"
-        raise InputError("workers", workers, rule, "leave it out, or use --executor numpy")
-    return name
-
-
-def write_picture(path: Path, frame: Any, exposure: float) -> None:
-    """Write all layers of a frame as EXR, or its colour at an exposure as PNG, as the name says."""
     if path.suffix.lower() == ".exr":
         exr.write_frame(path, frame)
     else:
         images.write_png(path, to_display(frame["color"], exposure))
+    say(f"{path}: {width}x{height} pixels, {spp} spp, {taken}")
 
 
 def scene(
-    name: options.SceneName,
+    name: str = option("scene", ...),
     output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
-    time: options.Time = None,
-    parameters: options.Parameters = None,
+    time: float | None = option("time"),
+    parameters: list[str] | None = option("parameters"),
     *,
     view: options.View,
 ) -> None:

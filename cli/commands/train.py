@@ -9,15 +9,14 @@ from time import monotonic
 from typing import Any
 
 from ... import kernels
-from ...compiler import variants
 from ...compiler.core import sine
-from ...compiler.variants import amplitude_of, parse
+from ...compiler.variants import amplitude_of, parse, vary
 from ...kernels.run.trainer import model_of_run
 from ...models import model_file
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Frame
 from ...refimpl.network.denoise import Model
-from ...refimpl.network.domain import LEAST_FRAMES, of_model
+from ...refimpl.network.domain import LEAST_FRAMES, Domain, of_model
 from ...refimpl.network.siren import Siren
 from ...refimpl.network.train import PRESETS, Recipe, TrainState, check_recipe, whole_of, with_activation
 from ..common import options
@@ -29,9 +28,6 @@ from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files, exr
 from ..files.alone import alone_at
 from ..files.outputs import check_output
-
-WHOLE = "whole8"
-"""The variant that --whole is short for."""
 
 CHECKPOINT_INTERVAL_S = 30.0
 """Seconds between two checkpoints: what a power cut may cost. Ctrl-C costs nothing."""
@@ -72,7 +68,9 @@ class Wanted:
         "whole10 round the weights to integers at the end; with --from and without --steps they only round."
     )
     whole: bool = option("--whole  Short for --variant whole8: an 8-bit integer network.", False)
-    activation: options.ActivationName = None
+    activation: str | None = option(
+        "NAME  Hidden-layer activation: sine or relu. [default: the preset's: sine]"
+    )
     steps: int | None = option("Number of training steps. [default: the preset's]")
     seed: int | None = option("Random seed of the initial weights and of sampling.")
 
@@ -90,7 +88,7 @@ class Wanted:
         """Return the name of the variant, if one is named; a resumed run has its own."""
         if self.variant is not None and self.whole:
             raise InputError("--variant", self.variant, "--whole is short for whole8", "give one of them")
-        name = WHOLE if self.whole else self.variant
+        name = "whole8" if self.whole else self.variant
         if name is not None and state is not None:
             raise InputError("--variant", name, "a resumed run keeps the checkpoint's", "leave it out")
         return name
@@ -105,7 +103,12 @@ def train(
         "--resume  Resume from the checkpoint next to the model, with the checkpoint's recipe.", False
     ),
     restart: bool = option("--restart  Start again and overwrite the checkpoint of an earlier run.", False),
-    executor: options.Trainer = "auto",
+    executor: options.TrainerName = option(
+        "Backend that trains: numpy is the reference, opencl a compiled training step; [bold]auto[/] is the "
+        "fastest available.",
+        "auto",
+        envvar=options.EXECUTOR_VARIABLE,
+    ),
 ) -> None:
     """Train a network on noisy frames and their references, or on a data set.
 
@@ -124,13 +127,16 @@ def train(
     """
     inputs, targets, begin = pairs.inputs or [], pairs.targets or [], wanted.begin
     check_output(output, (".safetensors",), [*inputs, *targets])
-    check_output(checkpoint_path(output))
     saved = checkpoint_path(output)
+    check_output(saved)
     # Two runs would leave a model of one and a checkpoint of the other.
     with alone_at(output, "training a model"), alone_at(saved, "training a model"):
         check_begin(saved, wanted.preset, resume, restart)
         state = model_file.load_checkpoint(saved) if resume else None
-        recipe, network = wanted.recipe(state), _first_network(begin, state)
+        if begin is not None and state is not None:
+            rule = "a resumed run continues from its checkpoint"
+            raise InputError("--from", str(begin), rule, "leave it out")
+        recipe, network = wanted.recipe(state), load_model(begin).siren if begin else None
         name = wanted.network(state)
         if name is not None:
             recipe, network = _of_variant(
@@ -138,10 +144,12 @@ def train(
             )
         frames = read_training(pairs.dataset, inputs, targets, recipe.features)
         if begin is not None and name is not None and whole_bits(name) and wanted.steps is None:
-            _round_only(begin, frames, output, recipe)
+            model_file.save_model(output, whole_of(load_model(begin), frames, recipe.whole, recipe.seed))
+            say(f"{output}: {begin} in integers, rounded on {len(frames)} frames")
             return
         state = _fit_to_the_end(recipe, frames, output, state, network, chosen(executor, trains=True))
-        _say_what_there_is(output, state.step)
+        say(f"{output}: {state.step} steps; checkpoint in {saved}")
+        say(f"{output}: {_said_of_domain(of_model(load_model(output)))}")
 
 
 def whole_bits(name: str) -> int | None:
@@ -166,24 +174,9 @@ def _of_variant(
     return varied(recipe, load_model(begin), name)
 
 
-def _round_only(begin: Path, pairs: Sequence[tuple[Frame, Frame]], output: Path, recipe: Recipe) -> None:
-    """Write a model in integers, rounded on the frames and not trained, and say so."""
-    model_file.save_model(output, whole_of(load_model(begin), pairs, recipe.whole, recipe.seed))
-    say(f"{output}: {begin} in integers, rounded on {len(pairs)} frames")
-
-
-def _first_network(begin: Path | None, state: TrainState | None) -> Siren | None:
-    """Return the network to begin with, if one is named."""
-    if begin is None:
-        return None
-    if state is not None:
-        raise InputError("--from", str(begin), "a resumed run continues from its checkpoint", "leave it out")
-    return load_model(begin).siren
-
-
 def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     """Return the recipe and the first network with which a variant of a model is trained."""
-    varied, amplitude = variants.vary(variants.parse(name), model).floats
+    varied, amplitude = vary(parse(name), model).floats
     if varied.degree != sine.DEGREE:
         rule = "the degree of a sine is chosen when a kernel is compiled, not trained"
         raise InputError("--variant", name, rule, "leave it out of the name here")
@@ -254,21 +247,17 @@ def choose_recipe(preset: str, state: TrainState | None, choices: dict[str, Any]
 def read_training(
     dataset: Path | None, inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
 ) -> list[tuple[Frame, Frame]]:
-    """Read the pairs to train on: a data set's, or those of the named frames; one of the two."""
+    """Read the pairs to train on: a data set's, or those of the named frames; one of the two.
+
+    Noisy frames must have the layers of the features.
+    """
     if dataset is None and not inputs and not targets:
         raise InputError("training frames", NO_VALUE, "missing", "give -i and -t, or --dataset")
-    if dataset is None:
-        return read_pairs(inputs, targets, features)
-    if inputs or targets:
+    if dataset is not None and (inputs or targets):
         rule = "cannot be combined with -i and -t"
         raise InputError("--dataset", str(dataset), rule, "choose one of them")
-    return dataset_files.read_pairs(dataset, tell=say)
-
-
-def read_pairs(
-    inputs: Sequence[Path], targets: Sequence[Path], features: Sequence[str]
-) -> list[tuple[Frame, Frame]]:
-    """Read the noisy frames, which must have the layers of the features, and their references."""
+    if dataset is not None:
+        return dataset_files.read_pairs(dataset, tell=say)
     if len(inputs) != len(targets):
         rule = f"each --input needs its --target, and there are {len(inputs)} inputs"
         raise InputError("number of targets", len(targets), rule, "repeat -i and -t in the same order")
@@ -332,19 +321,11 @@ def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
         yield partial(kernels.train_on, device)
 
 
-def _say_what_there_is(path: Path, steps: int) -> None:
-    """Say what a run has written, and what the model states as its domain."""
-    say(f"{path}: {steps} steps; checkpoint in {checkpoint_path(path)}")
-    say(f"{path}: {_said_of_domain(path)}")
-
-
-def _said_of_domain(path: Path) -> str:
+def _said_of_domain(domain: Domain | None) -> str:
     """Return what a model states as its domain."""
-    domain = of_model(load_model(path))
     if domain is None:
-        return (
-            f"no domain, for which {LEAST_FRAMES} frames are needed: a frame unlike them may pass unnoticed"
-        )
+        lacks = f"no domain, for which {LEAST_FRAMES} frames are needed"
+        return f"{lacks}: a frame unlike them may pass unnoticed"
     share = f"of frames like them 1 in {1.0 / domain.rate:.0f} is farther"
     return f"its domain is that of {domain.frames} frames, up to distance {domain.threshold:.3g}; {share}"
 

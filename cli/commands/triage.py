@@ -39,16 +39,12 @@ from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
-from ..common import options
 from ..common.inputs import load_model, model_path
 from ..common.options import argument, option
-from ..common.terminal import progress, say, table
+from ..common.terminal import STATUS_WRONG, progress, say, table
 from ..files import exr
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
-
-STATUS_DEVIATES = 1
-"""Exit status when a kernel is beyond its bound."""
 
 SCHEMA = "wamnet-triage-1"
 """Name and version of the report's form; described in spec/triage.md."""
@@ -65,7 +61,7 @@ class Chosen:
         "NAME  Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable. [default: all "
         "available]"
     )
-    profile: options.Profile = "ieee"
+    profile: str = option("profile", "ieee")
     schedules: str = option(
         "NAME  Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
         "picked",
@@ -76,7 +72,7 @@ class Chosen:
 
 
 def triage(
-    model: options.ModelFile,
+    model: Path = option("model", ...),
     frame: Path = argument("FRAME  Frame with the layers that the model reads (.exr)."),
     *,
     chosen: Chosen,
@@ -113,7 +109,7 @@ def triage(
         return
     keep(output, task, verdicts, found, model)
     say(f"{output}: reproducer written; {output / README} has the command")
-    raise typer.Exit(STATUS_DEVIATES)
+    raise typer.Exit(STATUS_WRONG)
 
 
 @dataclass(frozen=True)
@@ -162,8 +158,12 @@ def _judged(task: Task, runners: Sequence[apart.Apart]) -> list[Verdict]:
     # The schedule that an executor would pick is not that of the kept kernel.
     instead = {task.kept.kernel.target: task.kept.schedule} if task.kept else {}
     kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled, instead)
-    if task.kept:
-        task.kept.check_ran(kernels)
+    if task.kept and not any(kernel.artifact is task.kept.kernel for kernel in kernels):
+        # Nobody may take the verdicts of others for its own.
+        target, schedule = task.kept.kernel.target, task.kept.schedule
+        rule = f"none of the kernels to run is of {target} in schedule {schedule}, as it is"
+        remedy = f"choose --executor {target}, and leave out --schedules"
+        raise InputError("--kernel", str(task.kept.folder), rule, remedy)
     judge, verdicts = Judge(task.images), []
     with progress("running", len(kernels), "kernels") as advance:
         for kernel in kernels:
@@ -292,26 +292,26 @@ def _number(value: float) -> float | str:
 
 def _readme(task: Task, report: dict[str, Any], odd: Sequence[Kernel]) -> str:
     """Return the text that says what this is, and the commands that repeat it."""
-    lines = [
-        "# A kernel beyond its bound",
-        "",
-        f"{report['conclusion']}.",
-        "",
-        "In this folder:",
-        "",
-        "```sh",
-    ]
-    lines += [shlex.join(_command(task, kernel, kept=True)) for kernel in odd]
-    lines += [
-        "```",
-        "",
-        "With the kernel that the compiler makes now, in place of the kept one:",
-        "",
-        "```sh",
-    ]
-    lines += [shlex.join(_command(task, kernel, kept=False)) for kernel in odd]
-    lines += ["```", "", f"{REPORT} holds what was found, expected and promised, devices and versions.", ""]
-    return "\n".join(lines)
+    kept, made = ("\n".join(shlex.join(_command(task, kernel, it)) for kernel in odd) for it in (True, False))
+    return f"""\
+# A kernel beyond its bound
+
+{report["conclusion"]}.
+
+In this folder:
+
+```sh
+{kept}
+```
+
+With the kernel that the compiler makes now, in place of the kept one:
+
+```sh
+{made}
+```
+
+{REPORT} holds what was found, expected and promised, devices and versions.
+"""
 
 
 def _command(task: Task, kernel: Kernel, kept: bool) -> list[str]:
@@ -341,15 +341,6 @@ class Kept:
         )
         return self.kernel if same else made
 
-    def check_ran(self, kernels: Sequence[Kernel]) -> None:
-        """Refuse kernels among which the kept one is not: nobody may take their verdicts for its own."""
-        if not any(kernel.artifact is self.kernel for kernel in kernels):
-            rule = (
-                f"none of the kernels to run is of {self.kernel.target} in schedule {self.schedule}, as it is"
-            )
-            way_out = f"choose --executor {self.kernel.target}, and leave out --schedules"
-            raise InputError("--kernel", str(self.folder), rule, way_out)
-
 
 def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     """Return the kernel whose manifest and files are in a folder.
@@ -372,11 +363,6 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
     if made.manifest["schedule"] != manifest["schedule"]:
         rule = f"the compiler makes no kernel of this model for {target} in schedule {schedule} any more"
         raise InputError("--kernel", str(folder), rule, "compile the model again")
-    return Kept(folder, _with_files(made, folder))
-
-
-def _with_files(made: Artifact, folder: Path) -> Artifact:
-    """Return an artifact with the source and the weights in a folder instead of its own."""
     content = read_file(folder / made.source_name, "--kernel")
     raw = read_file(folder / artifact.WEIGHTS_NAME, "--kernel")
     if len(raw) != 4 * made.weights.size:
@@ -384,12 +370,10 @@ def _with_files(made: Artifact, folder: Path) -> Artifact:
         raise InputError(f"--kernel: length of {artifact.WEIGHTS_NAME}", len(raw), rule, "restore the file")
     with refusing(f"--kernel: {made.source_name}", str(folder), "must be UTF-8", "restore the file"):
         source = content.decode("utf-8")
-    own = {made.source_name: ir.sha256(content), artifact.WEIGHTS_NAME: ir.sha256(raw)}
-    files = {**made.manifest["files"], **own}
-    sizes = {**made.manifest[SIZES], made.source_name: len(content), artifact.WEIGHTS_NAME: len(raw)}
-    return replace(
-        made,
-        source=source,
-        weights=np.frombuffer(raw, "<f4").astype(np.float32),
-        manifest={**made.manifest, "digest": ir.sha256(content, raw), "files": files, SIZES: sizes},
-    )
+    files = {made.source_name: content, artifact.WEIGHTS_NAME: raw}
+    facts: dict[str, Any] = {"digest": ir.sha256(content, raw)}
+    facts["files"] = {**made.manifest["files"], **{name: ir.sha256(data) for name, data in files.items()}}
+    facts[SIZES] = {**made.manifest[SIZES], **{name: len(data) for name, data in files.items()}}
+    weights = np.frombuffer(raw, "<f4").astype(np.float32)
+    manifest = {**made.manifest, **facts}
+    return Kept(folder, replace(made, source=source, weights=weights, manifest=manifest))

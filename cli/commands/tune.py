@@ -1,12 +1,12 @@
 """`wamnet tune`: measure a denoiser's schedules on this machine, and remember the fastest."""
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
 from ...compiler.variants import FULL, plan_model, with_rank
-from ...kernels import cache, open_executor
+from ...kernels import cache as cache_folders
+from ...kernels import open_executor
 from ...kernels.bench.workload import paper_model
 from ...kernels.run import tune as tuning
 from ...kernels.run.tune import Table
@@ -30,8 +30,8 @@ def tune(
     ),
     executor: ExecutorName = option("Backend that runs the kernel.", ExecutorName.opencl),
     size: int = option("Width and height of the image, in pixels.", 512),
-    rank: options.CutRank = 0,
-    context: options.OpenGLContext = None,
+    rank: int = option("rank", 0),
+    context: options.ContextName | None = option("context"),
     force: bool = option("--force  Ignore cached measurements.", False),
     cache: Path | None = option(
         "--cache DIR  Folder for the measurements; other commands use it if WAMNET_CACHE names it. [default: "
@@ -52,7 +52,12 @@ def tune(
         os.environ["WAMNET_CACHE"] = str(cache)
     network = load_model(model) if model else paper_model()
     square = (size, size)
-    with _alone(), open_executor(executor.value) as runner:
+    # Another process that tunes would measure this one's load; without a cache there is nothing to share.
+    folder = cache_folders.folder()
+    kept = folder is not None and cache_folders.writable(folder)
+    remedy = "wait for it, or choose another with --cache"
+    alone = alone_in(folder, "tuning", remedy) if folder and kept else nullcontext()
+    with alone, open_executor(executor.value) as runner:
         plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
         known = None if force else tuning.remembered(runner, tuning.Subject.of(plan), square)
         found = known or tuning.tune(runner, plan, square)
@@ -62,18 +67,6 @@ def tune(
         say(f"measured on {found.day}; --force measures again")
     for count, (schedule, reason) in picks.items():
         say(f"for {count} image{'s' if count > 1 else ''}: {schedule}; {reason}")
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    """Keep out another process that tunes on this machine: each would measure the other's load."""
-    folder = cache.folder()
-    # A cache that cannot be written costs time, never a run.
-    if folder is None or not cache.writable(folder):
-        yield
-        return
-    with alone_in(folder, "tuning", "wait for it, or choose another with --cache"):
-        yield
 
 
 def show(found: Table) -> None:

@@ -26,9 +26,6 @@ from ..reports.webpage import page_of
 HOST = "127.0.0.1"
 """Where the page is served: only to this machine."""
 
-NAMES = (HOST, "localhost", "[::1]")
-"""What a browser on this machine calls it."""
-
 MOST_CONNECTIONS = 16
 """Connections that are answered at once: a browser opens six."""
 
@@ -36,12 +33,9 @@ LONGEST_CONNECTION_S = 10.0
 """Seconds after which a connection is closed, whatever it waits for: some megabytes go to the same machine in
 far less."""
 
-LARGEST_PORT = 65535
-"""Ports have 16 bits."""
-
 
 def view(
-    model: options.ModelFile,
+    model: Path = option("model", ...),
     scene: str | None = option(
         f"SCENE  Canonical scene ({options.SCENES}) or scene file (.json). [default: the model's training "
         "scene]"
@@ -50,7 +44,7 @@ def view(
         "MODEL  Model for the fast variant, fine-tuned at rank 16; its first layer is reduced to rank 16. "
         "[default: same as MODEL]"
     ),
-    parameters: options.Parameters = None,
+    parameters: list[str] | None = option("parameters"),
     port: int = option("Port to serve the page on; 0 picks a free one.", 0),
     browser: bool = option("Open a browser.", True),
     output: Path | None = option(
@@ -66,8 +60,8 @@ def view(
     wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
     wamnet view model.safetensors -o page.html
     """
-    if not 0 <= port <= LARGEST_PORT:
-        raise InputError("--port", port, f"must be from 0 to {LARGEST_PORT}", "for example --port 8080")
+    if not 0 <= port <= 65535:
+        raise InputError("--port", port, "must be from 0 to 65535", "for example --port 8080")
     if output is not None:
         check_output(output, (".html", ".htm"), [path for path in (model, fast) if path])
     page = page_of(model, scene, parameters or [], fast)
@@ -160,7 +154,9 @@ def handler_of(page: bytes) -> type[BaseHTTPRequestHandler]:
             """Send the head of an answer; tell whether the page comes after it."""
             port = self.server.server_address[1]  # type: ignore[index]
             hosts = self.headers.get_all("Host") or []
-            if len(hosts) != 1 or hosts[0].strip(" \t").lower() not in [f"{name}:{port}" for name in NAMES]:
+            # What a browser on this machine calls it.
+            names = [f"{name}:{port}" for name in (HOST, "localhost", "[::1]")]
+            if len(hosts) != 1 or hosts[0].strip(" \t").lower() not in names:
                 self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
                 return False
             if self.path != "/":

@@ -30,9 +30,6 @@ PURPOSE = "to share the work (one process, --workers 1, needs it not)"
 CONNECT_S = 10.0
 """Seconds in which a scheduler must answer and have a worker: longer than a network's hiccup."""
 
-UNDER_WAY_PER_THREAD = 3
-"""Tasks under way for each of the workers' threads: one at work, one waiting, one whose result travels."""
-
 
 def do_here(
     tasks: Sequence[_Task], do: Callable[[_Task], _Result], on_result: Callable[[_Task, _Result], None]
@@ -68,7 +65,8 @@ def do_on_cluster(
     try:
         while True:
             threads = max(1, sum(client.nthreads().values()))
-            for task in islice(waiting, max(0, UNDER_WAY_PER_THREAD * threads - len(under_way))):
+            # For each thread one at work, one waiting, one whose result travels.
+            for task in islice(waiting, max(0, 3 * threads - len(under_way))):
                 future = client.submit(call, cloudpickle.dumps((do, task)), pure=False)
                 under_way[future] = task
                 finished.add(future)
@@ -107,20 +105,13 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
                 yield client
         finally:
             if cluster is not None:
+                # When all else is closed Dask asserts that each worker is, too. The successor of a lost one
+                # may not be: it has no process, and Dask would wait for it once more at the end of Python.
                 with signals_wait():
-                    _close(distributed, cluster)
-
-
-def _close(distributed: Any, cluster: Any) -> None:
-    """Close a cluster, whatever its workers do.
-
-    When all else is closed Dask asserts that each worker is, too. The successor of a lost worker may not be:
-    it was never started and has no process. At the end of Python Dask would wait for it once more.
-    """
-    try:
-        cluster.close()
-    except AssertionError:
-        cluster.status = distributed.Status.closed
+                    try:
+                        cluster.close()
+                    except AssertionError:
+                        cluster.status = distributed.Status.closed
 
 
 def _local(distributed: Any, workers: int) -> Any:

@@ -7,6 +7,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -68,12 +69,12 @@ class Watch:
     """The distances of an animation's pictures from the domain that a model states; of none without one."""
 
     model: Model
-    domain: Domain | None = field(init=False)
     pictures: list[tuple[str, Distance]] = field(default_factory=list, init=False)
 
-    def __post_init__(self) -> None:
-        """Read the domain."""
-        self.domain = of_model(self.model)
+    @cached_property
+    def domain(self) -> Domain | None:
+        """Return the domain."""
+        return of_model(self.model)
 
     @property
     def features(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 1. Every path meets every primitive at each bounce, so rendering takes a time in proportion to samples times
    primitives; the reference also starts some operations for each primitive and tile [`seconds_of`].
-2. Memory goes into the primitives' tables and the layers of the picture [`bytes_of`].
+2. Memory goes into the primitives' tables and the layers of the picture [`said_of_rendering`].
 3. From a stated size on a sentence says both [`said_of_rendering`], [`said_of_compiling`],
    [`said_of_measuring`], [`said_of_learning`].
 
@@ -17,18 +17,13 @@ from collections.abc import Sequence
 
 from ...refimpl.light.render import TILE_PIXELS
 from ...refimpl.light.scene import Scene, primitives
+from .terminal import say
 
 MANY_PRIMITIVES = 100_000
-"""From so many primitives on a sentence is said."""
-
-MANY_SAMPLES = 10**9
-"""From so many samples (of all pixels and pictures) on a sentence is said."""
+"""From so many primitives on, 10**9 samples or half an hour of measurements, a sentence is said."""
 
 MANY_PIXELS = 10**8
 """From so many pixels that are in memory at once on a sentence is said."""
-
-LONG_S = 1800.0
-"""From so many seconds of measurements on a sentence is said."""
 
 _PAIR_BYTES = 92
 """Bytes of a pixel to learn from: 20 channels of a noisy frame and the colour of its target, in float32."""
@@ -50,66 +45,48 @@ _PRIMITIVE_BYTES, _PIXEL_BYTES = 2_000, 500
 their means, and the frame."""
 
 
-def primitives_of(scene: Scene) -> int:
-    """Return the number of things in a scene that a ray can meet."""
-    return primitives(scene) + (scene.room is not None)
-
-
-def seconds_of(primitives: int, samples: int, pixels: int, executor: str, workers: int) -> float:
+def seconds_of(count: int, samples: int, pixels: int, executor: str, workers: int) -> float:
     """Return how long rendering may take, of pictures of so many pixels each."""
     if executor != "numpy":
-        return primitives * samples * _KERNEL_SAMPLE_S
+        return count * samples * _KERNEL_SAMPLE_S
     tiles = samples / pixels * math.ceil(pixels / TILE_PIXELS)
-    return primitives * (samples * _NUMPY_SAMPLE_S + tiles * _NUMPY_START_S) / max(workers, 1)
+    return count * (samples * _NUMPY_SAMPLE_S + tiles * _NUMPY_START_S) / max(workers, 1)
 
 
-def bytes_of(primitives: int, pixels: int) -> int:
-    """Return about how much memory a process of rendering takes."""
-    return primitives * _PRIMITIVE_BYTES + pixels * _PIXEL_BYTES
-
-
-def said_of_rendering(
-    scene: Scene, samples: int, pixels: int, executor: str, workers: int | None
-) -> list[str]:
-    """Return the sentence about large work, if it is large; `pixels` are those of one picture."""
-    count = primitives_of(scene)
-    if count < MANY_PRIMITIVES and samples < MANY_SAMPLES:
-        return []
+def said_of_rendering(scene: Scene, samples: int, pixels: int, executor: str, workers: int | None) -> None:
+    """Say what large work takes; `pixels` are those of one picture."""
+    count = primitives(scene) + (scene.room is not None)
     seconds = seconds_of(count, samples, pixels, executor, workers or len(os.sched_getaffinity(0)))
-    work = f"{count:,} primitives and {samples:,} samples"
-    return [f"{work}: {_about(seconds, bytes_of(count, pixels))}; Ctrl-C stops it"]
+    if count >= MANY_PRIMITIVES or samples >= 10**9:
+        size = count * _PRIMITIVE_BYTES + pixels * _PIXEL_BYTES
+        _say(f"{count:,} primitives and {samples:,} samples", seconds, size)
 
 
-def said_of_compiling(scene: Scene) -> list[str]:
-    """Return the sentence about a large scene that is to be compiled, if it is large."""
-    count = primitives_of(scene)
-    if count < MANY_PRIMITIVES:
-        return []
-    return [f"{count:,} primitives: {_about(count * _COMPILE_S, bytes_of(count, 0))}; Ctrl-C stops it"]
+def said_of_compiling(scene: Scene) -> None:
+    """Say what it takes to compile a large scene."""
+    if (count := primitives(scene) + (scene.room is not None)) >= MANY_PRIMITIVES:
+        _say(f"{count:,} primitives", count * _COMPILE_S, count * _PRIMITIVE_BYTES)
 
 
-def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) -> list[str]:
-    """Return the sentence about a large benchmark of pictures of these sides, if it is large."""
+def said_of_measuring(contenders: int, sizes: Sequence[int], budget_s: float) -> None:
+    """Say what a large benchmark of pictures of these sides takes."""
     seconds, pixels = contenders * len(sizes) * budget_s, max(sizes) ** 2
-    if seconds < LONG_S and pixels < MANY_PIXELS:
-        return []
-    work = f"{contenders} program{'s' if contenders > 1 else ''} and images of up to {pixels:,} pixels"
-    return [
-        f"{work}: {_about(seconds, pixels * _PICTURE_BYTES)} at most, compilation left out; Ctrl-C stops it"
-    ]
+    if seconds >= 1800.0 or pixels >= MANY_PIXELS:
+        work = f"{contenders} program{'s' if contenders > 1 else ''} and images of up to {pixels:,} pixels"
+        _say(work, seconds, pixels * _PICTURE_BYTES, " at most, compilation left out")
 
 
-def said_of_learning(frames: int, pixels: int) -> list[str]:
-    """Return the sentence about the memory of many pixels to learn from, if they are many."""
-    if frames * pixels < MANY_PIXELS:
-        return []
-    size = f"{frames * pixels * _PAIR_BYTES // 2**20:,} MiB of memory"
-    return [f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C stops it"]
+def said_of_learning(frames: int, pixels: int) -> None:
+    """Say how much memory many pixels to learn from take."""
+    if frames * pixels >= MANY_PIXELS:
+        size = f"{frames * pixels * _PAIR_BYTES // 2**20:,} MiB of memory"
+        say(f"{frames} frames of {pixels:,} pixels to learn from: by a rule of thumb {size}; Ctrl-C stops it")
 
 
-def _about(seconds: float, size: int) -> str:
-    """Return an estimate in units that people think in."""
-    return f"by a rule of thumb about {duration(seconds)} and {max(1, size // 2**20):,} MiB of memory"
+def _say(work: str, seconds: float, size: int, more: str = "") -> None:
+    """Say an estimate in units that people think in."""
+    about = f"about {duration(seconds)} and {max(1, size // 2**20):,} MiB of memory"
+    say(f"{work}: by a rule of thumb {about}{more}; Ctrl-C stops it")
 
 
 def duration(seconds: float) -> str:

@@ -3,16 +3,13 @@
 from ...kernels.devices import registry
 from .terminal import say
 
-AUTO = "auto"
-"""The name that leaves the choice to the rule [kernels/devices/registry.py: fastest]."""
-
 
 def chosen(executor: str, *, because: str = "", trains: bool = False, work: str = "executor") -> str:
     """Return the name of an executor; of `auto` the fastest one, which is printed with the reason.
 
     `because`: why NumPy must do the work, if it must. `trains`: the executor has to train.
     """
-    return fastest(because=because, trains=trains, work=work) if executor == AUTO else executor
+    return fastest(because=because, trains=trains, work=work) if executor == "auto" else executor
 
 
 def fastest(*, because: str = "", trains: bool = False, work: str = "executor") -> str:

@@ -9,11 +9,10 @@ import colorsys
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from enum import Enum
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
@@ -27,9 +26,6 @@ SCENES = "minicubes, glossy, vitrine, daylight, cornell, furnace, lone_light, em
 
 MODELS = "minicubes, cornell, glossy, minicubes-basic, cornell-basic, glossy-basic"
 """Names of the models that ship with the package, for help texts; equal to the files in models."""
-
-LARGEST_EXPOSURE_STOPS = 64.0
-"""Brightest and darkest exposure: a factor of 2**64; far past it float32 ends."""
 
 
 def _finite(value: float | None) -> float | None:
@@ -61,9 +57,9 @@ def _context(command: typer.Context, value: ContextName | None) -> ContextName |
 
 def _stops(value: float) -> float:
     """Refuse an exposure that is not a number or that leaves no picture."""
-    if not abs(value) <= LARGEST_EXPOSURE_STOPS:
-        rule = f"must be from {-LARGEST_EXPOSURE_STOPS:g} to {LARGEST_EXPOSURE_STOPS:g} stops"
-        raise InputError("--exposure", value, rule, "for example --exposure 1")
+    # Far past a factor of 2**64 float32 ends.
+    if not abs(value) <= 64.0:
+        raise InputError("--exposure", value, "must be from -64 to 64 stops", "for example --exposure 1")
     return value
 
 
@@ -116,10 +112,11 @@ def usage(line: str, kind: Any = typer.Option, **how: Any) -> Any:
 def option(line: str, default: Any = None, kind: Any = typer.Option, **how: Any) -> Any:
     """Return an option [`usage`] for a field of a request, or for a command's parameter [`request.spread`].
 
-    The default `...` means that it is needed.
+    The line may be the name of one in [`SHARED`]. The default `...` means that it is needed.
     """
     default = MISSING if default is ... else default
-    return field(default=default, metadata={"option": usage(line, kind, **how)})
+    how = {"kind": kind, **HOW.get(line, {}), **how}
+    return field(default=default, metadata={"option": usage(SHARED.get(line, line), **how)})
 
 
 def argument(line: str, default: Any = ..., **how: Any) -> Any:
@@ -131,115 +128,45 @@ EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
 """Environment variable that names the executor where the caller does not, for results that must not depend on
 the machine."""
 
-Executor = Annotated[
-    ExecutorChoice,
-    usage(
-        "--executor  Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
-        "executors[/] lists.",
-        envvar=EXECUTOR_VARIABLE,
-    ),
-]
-Renderer = Annotated[
-    ExecutorChoice,
-    usage(
-        "Backend that traces the paths: [bold]auto[/] is the fastest available.",
-        envvar=EXECUTOR_VARIABLE,
-    ),
-]
-OpenGLContext = Annotated[
-    ContextName | None,
-    usage(
-        "--context  OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main memory. "
-        "[default: the first one available, or WAMNET_OPENGL_CONTEXT]",
-        callback=_context,
-    ),
-]
-Exposure = Annotated[
-    float, usage("--exposure  Exposure in stops; +1 doubles the brightness.", callback=_stops)
-]
-ModelFile = Annotated[
-    Path, usage(f"MODEL  Trained model (.safetensors), or bundled model ({MODELS}).", typer.Argument)
-]
-Profile = Annotated[
-    str,
-    usage(
-        "--profile  Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
-        "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine."
-    ),
-]
-Trainer = Annotated[
-    TrainerName,
-    usage(
-        "--executor  Backend that trains: numpy is the reference, opencl a compiled training step; "
-        "[bold]auto[/] is the fastest available.",
-        envvar=EXECUTOR_VARIABLE,
-    ),
-]
-ActivationName = Annotated[
-    str | None, usage("NAME  Hidden-layer activation: sine or relu. [default: the preset's: sine]")
-]
-CutRank = Annotated[
-    int,
-    usage(
-        "--rank R  Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
-        "rows then columns. Loses little quality after fine-tuning. [default: no cut]"
-    ),
-]
-Variant = Annotated[
-    str | None,
-    usage(
-        "--variant NAME  Cheaper network: [bold]full[/], or any of without-FEATURE, windowN, hiddenN, rankN "
-        "and sineN joined by +, as in window8+rank16; or whole8, an 8-bit integer network, bit-identical on "
-        "every device. [default: full]"
-    ),
-]
-Here = Annotated[
-    bool,
-    usage("--here  Use the best schedule for this machine: the tuned one, or else the built-in choice."),
-]
-Schedule = Annotated[
-    str | None,
-    usage("--schedule NAME  Kernel schedule: [bold]plain[/] is human-readable, the others are faster."),
-]
-Seed = Annotated[int, usage("--seed  Random seed.")]
-Time = Annotated[
-    float | None, usage("--time  Time in the animation, in seconds. [default: 0]", callback=_finite)
-]
-Parameters = Annotated[
-    list[str] | None,
-    usage(
-        "--set NAME=VALUE  Parameter of a canonical scene: one number, or three separated by commas. "
-        "Repeatable."
-    ),
-]
-SamplerName = Annotated[
-    Sampler,
-    usage(
-        "--sampler  Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many samples."
-    ),
-]
-FeatureSpp = Annotated[
-    int,
-    usage(
-        "--feature-spp N  Stratified camera rays per pixel for the features; 4 give smooth edges, and each "
-        "costs a fraction of a path. [default: same as --spp]"
-    ),
-]
-ShadowRays = Annotated[
-    int,
-    usage(
-        "--shadow-rays N  Also write the layer direct: direct light with its soft shadows, by N shadow rays "
-        "per camera ray."
-    ),
-]
-Seen = Annotated[
-    bool,
-    usage(
-        "--seen  Also write specular features, traced through mirrors and glass: seen_albedo, seen_normal, "
-        "..."
-    ),
-]
-SceneName = Annotated[str, usage(f"SCENE  Canonical scene ({SCENES}) or scene file (.json).", typer.Argument)]
+SHARED: Mapping[str, str] = {
+    "model": f"MODEL  Trained model (.safetensors), or bundled model ({MODELS}).",
+    "scene": f"SCENE  Canonical scene ({SCENES}) or scene file (.json).",
+    "executor": "--executor  Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
+    "executors[/] lists.",
+    "renderer": "Backend that traces the paths: [bold]auto[/] is the fastest available.",
+    "context": "--context  OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main "
+    "memory. [default: the first one available, or WAMNET_OPENGL_CONTEXT]",
+    "profile": "--profile  Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
+    "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
+    "rank": "--rank R  Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
+    "rows then columns. Loses little quality after fine-tuning. [default: no cut]",
+    "seed": "--seed  Random seed.",
+    "time": "--time  Time in the animation, in seconds. [default: 0]",
+    "exposure": "--exposure  Exposure in stops; +1 doubles the brightness.",
+    "parameters": "--set NAME=VALUE  Parameter of a canonical scene: one number, or three separated by "
+    "commas. Repeatable.",
+    "max_depth": "Maximum number of bounces per path.",
+    "sampler": "--sampler  Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many "
+    "samples.",
+    "feature_spp": "--feature-spp N  Stratified camera rays per pixel for the features; 4 give smooth edges, "
+    "and each costs a fraction of a path. [default: same as --spp]",
+    "shadow_rays": "--shadow-rays N  Also write the layer direct: direct light with its soft shadows, by N "
+    "shadow rays per camera ray.",
+    "seen": "--seen  Also write specular features, traced through mirrors and glass: seen_albedo, "
+    "seen_normal, ...",
+}
+"""Lines of help that several commands have, by name."""
+
+HOW: Mapping[str, Mapping[str, Any]] = {
+    "model": {"kind": typer.Argument},
+    "scene": {"kind": typer.Argument},
+    "executor": {"envvar": EXECUTOR_VARIABLE},
+    "renderer": {"envvar": EXECUTOR_VARIABLE},
+    "context": {"callback": _context},
+    "time": {"callback": _finite},
+    "exposure": {"callback": _stops},
+}
+"""What else typer is told of them."""
 
 
 def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:
@@ -298,32 +225,25 @@ def parse_lights(texts: Sequence[str], own: Sequence[Vector]) -> tuple[Vector, .
     colors = dict(enumerate(own, start=1))
     chosen: set[int] = set()
     for text in texts:
-        number, color = _parse_light(text)
+        index, _, value = text.partition("=")
+        try:
+            number, color = int(index), [float(part) for part in value.split(",")]
+            red, green, blue = color
+        except ValueError:
+            rule = "must be N=R,G,B: a light's number and its colour"
+            raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2") from None
+        if not (all(map(math.isfinite, color)) and min(color) >= 0.0 and max(color) > 0.0):
+            rule = "its channels must be finite, 0 or more, and not all 0"
+            raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2")
         if number not in colors:
             rule = f"the scene's lights are 1 to {len(own)}" if own else "the scene has no lights"
             raise InputError("--light", text, rule, "choose another" if own else "leave it out")
         if number in chosen:
             raise InputError("--light", text, f"light {number} already has a colour", "give one per light")
         chosen.add(number)
-        hue, saturation, _ = colorsys.rgb_to_hsv(*color)
+        hue, saturation, _ = colorsys.rgb_to_hsv(red, green, blue)
         colors[number] = lamp_color(own[number - 1], hue, saturation)
     return tuple(colors.values()) if texts else ()
-
-
-def _parse_light(text: str) -> tuple[int, Vector]:
-    """Return a lamp's number and its colour."""
-    number, _, value = text.partition("=")
-    try:
-        red, green, blue = (float(part) for part in value.split(","))
-        found = int(number)
-    except ValueError:
-        rule = "must be N=R,G,B: a light's number and its colour"
-        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2") from None
-    color = (red, green, blue)
-    if not (all(map(math.isfinite, color)) and min(color) >= 0.0 and max(color) > 0.0):
-        rule = "its channels must be finite, 0 or more, and not all 0"
-        raise InputError("--light", text, rule, "for example --light 1=1,0.4,0.2")
-    return found, color
 
 
 def parse_names(text: str) -> tuple[str, ...]:

@@ -24,17 +24,19 @@ if TYPE_CHECKING:
 class KernelRequest:
     """How a network is compiled; None for the usual schedule and for the full network."""
 
-    profile: options.Profile = "ieee"
-    schedule: options.Schedule = None
-    variant: options.Variant = None
+    profile: str = options.option("profile", "ieee")
+    schedule: str | None = options.option(
+        "NAME  Kernel schedule: [bold]plain[/] is human-readable, the others are faster."
+    )
+    variant: str | None = options.option(
+        "NAME  Cheaper network: [bold]full[/], or any of without-FEATURE, windowN, hiddenN, rankN and sineN "
+        "joined by +, as in window8+rank16; or whole8, an 8-bit integer network, bit-identical on every "
+        "device. [default: full]"
+    )
 
     def network(self, rank: int = 0) -> str:
         """Return the variant's name, which may be given as a rank instead."""
-        from ...compiler.kernel.interface import FULL
-
-        if not rank:
-            return self.variant or FULL
-        from ...compiler.variants import with_rank
+        from ...compiler.variants import FULL, with_rank
 
         return with_rank(self.variant or FULL, rank)
 

@@ -10,10 +10,10 @@
 
 import re
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from glob import has_magic
+from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
@@ -25,9 +25,6 @@ memory."""
 
 NUMBER = re.compile(r"%0?([1-9]?)d")
 """The place of a frame's number in a pattern, as in C: `%04d` has at least four digits."""
-
-SUFFIXES = (".exr", ".png")
-"""Suffixes of results, which no folder has."""
 
 Item = TypeVar("Item")
 Loaded = TypeVar("Loaded")
@@ -72,7 +69,7 @@ def is_many(frames: Sequence[Path], output: Path) -> bool:
 
 def _is_folder(output: Path) -> bool:
     """Tell whether an output names a folder, which may be there or not."""
-    return not output.suffix or (output.suffix.lower() not in SUFFIXES and output.is_dir())
+    return not output.suffix or (output.suffix.lower() not in (".exr", ".png") and output.is_dir())
 
 
 def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> list[Path]:
@@ -80,7 +77,9 @@ def outputs_of(frames: Sequence[Path], output: Path, suffix: str = ".exr") -> li
     if not is_many(frames, output):
         return [output]
     if NUMBER.search(output.name):
-        outputs = [_of_number(number, output) for number in _frame_numbers(frames, output)]
+        digits = int(NUMBER.findall(output.name)[0] or "1")
+        texts = [str(number).rjust(digits, "0") for number in _frame_numbers(frames, output)]
+        outputs = [output.with_name(NUMBER.sub(text, output.name, count=1)) for text in texts]
     elif _is_folder(output):
         outputs = [output / f"{frame.stem}{suffix}" for frame in frames]
     else:
@@ -116,14 +115,6 @@ def _frame_numbers(frames: Sequence[Path], pattern: Path) -> list[int]:
     return [int(digits[-place]) for digits in names]
 
 
-def _of_number(number: int, pattern: Path) -> Path:
-    """Return the name of a pattern with a number in it."""
-    place = NUMBER.search(pattern.name)
-    assert place is not None, "the caller has looked for it"
-    text = str(number).rjust(int(place[1] or "1"), "0")
-    return pattern.with_name(pattern.name[: place.start()] + text + pattern.name[place.end() :])
-
-
 def overlapped(
     items: Sequence[Item],
     read: Callable[[Item], Loaded],
@@ -136,7 +127,6 @@ def overlapped(
     Only the work is done in the caller's thread.
     """
     failed: list[tuple[Item, Exception]] = []
-    reading: deque[tuple[Item, Future[Loaded]]] = deque()
     writing: deque[tuple[Item, Future[None]]] = deque()
 
     def finish(count: int) -> None:
@@ -149,12 +139,9 @@ def overlapped(
                 failed.append((item, error))
             advance(1)
 
-    with _thread() as reader, _thread() as writer:
-        coming = iter(items)
-        for item in coming:
-            reading.append((item, reader.submit(read, item)))
-            if len(reading) == AHEAD:
-                break
+    with ThreadPoolExecutor(1) as reader, ThreadPoolExecutor(1) as writer:
+        coming = ((item, reader.submit(read, item)) for item in items)
+        reading = deque(islice(coming, AHEAD))
         while reading:
             item, loaded = reading.popleft()
             try:
@@ -165,18 +152,6 @@ def overlapped(
             else:
                 writing.append((item, writer.submit(write, item, result)))
             finish(AHEAD)
-            for following in coming:
-                reading.append((following, reader.submit(read, following)))
-                break
+            reading.extend(islice(coming, 1))
         finish(0)
     return failed
-
-
-@contextmanager
-def _thread() -> Iterator[ThreadPoolExecutor]:
-    """Yield a thread that takes work in order; what has not begun when the block ends early is dropped."""
-    pool = ThreadPoolExecutor(1)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)

@@ -10,14 +10,7 @@ from contextlib import ExitStack, contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -43,6 +36,9 @@ def _short(number: float, digits: int = 0) -> str:
     """Return a count or a rate of few characters."""
     return f"{number / 1e6:.1f}M" if number >= 1e6 else f"{number:,.{digits}f}"
 
+
+STATUS_WRONG = 1
+"""Exit status when what a command has checked is wrong: a kernel, a proof, a program, a path."""
 
 Advance = Callable[[float], None]
 """Called with the work done since the last call, in the unit of the total."""

@@ -72,7 +72,13 @@ def _locked(path: Path, refusal: InputError) -> Iterator[None]:
     finally:
         with signals_wait():
             if handle >= 0:
-                _unlock(path, handle)
+                try:
+                    # Somebody may have moved the whole folder away, with the lock in it.
+                    with suppress(OSError):
+                        if _is_file(path, handle):
+                            path.unlink()
+                finally:
+                    os.close(handle)
 
 
 def _lock(path: Path, refusal: InputError) -> int:
@@ -90,17 +96,6 @@ def _lock(path: Path, refusal: InputError) -> int:
         except BaseException:
             os.close(handle)
             raise
-        os.close(handle)
-
-
-def _unlock(path: Path, handle: int) -> None:
-    """Remove the file while it is still locked, and give the lock back."""
-    try:
-        # Somebody may have moved the whole folder away, with the lock in it.
-        with suppress(OSError):
-            if _is_file(path, handle):
-                path.unlink()
-    finally:
         os.close(handle)
 
 

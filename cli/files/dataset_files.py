@@ -14,8 +14,6 @@
    `unfinished/`, are refused before anything is written or removed [`check_work_folders`].
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -25,18 +23,20 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import IO, Any, Generic, Protocol, TypeVar
+from typing import Any
 
-from ...models.data.frame_plan import Rows, join, version
+from ...models.blender import plan as film_plan
+from ...models.data import frame_plan
+from ...models.data.frame_plan import KINDS, SPLITS, Rows, join
 from ...models.writing import TEMPORARY_NAME, is_regular, remove_temporaries
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame
-from ...refimpl.reading import BROKEN, parse_json, read_file
+from ...refimpl.reading import BROKEN, parse_json, read_file, refusing
+from ..common.terminal import progress
 from . import exr
 from .alone import working_in
-from .outputs import check_real_folder, write_text
+from .outputs import check_real_folder, visible, write_text
 
 SCHEMA = "wamnet-dataset-2"
 """Name and version of the manifest's form; described in spec/dataset_files.md."""
@@ -59,15 +59,6 @@ NAME = re.compile(r"(train|test|outside)/\d{5}-(noisy|target)\.exr")
 BAND = re.compile(r"(train|test|outside)-(\d{5}-(?:noisy|target))\.(\d+)-(\d+)\.([0-9a-f]{64})\.exr")
 """What a band's file is called: its picture, its rows [first, last), its SHA-256."""
 
-DIGEST = re.compile("[0-9a-f]{64}")
-"""A SHA-256."""
-
-SPLITS = ("train", "test", "outside")
-"""Folders of the pictures."""
-
-KINDS = ("noisy", "target")
-"""A frame's pictures in a manifest."""
-
 
 @dataclass(frozen=True)
 class Sum:
@@ -81,57 +72,10 @@ Sums = Mapping[str, Sum]
 """Pictures that were finished once, by name."""
 
 
-class Asked(Protocol):
-    """A request: all that determines a data set, except for the version."""
-
-    def as_data(self) -> dict[str, Any]:
-        """Return it as JSON's types."""
-
-
-class Band(Protocol):
-    """A task: rows [first, last) of a picture."""
-
-    @property
-    def picture(self) -> Pictured[Any]:
-        """Return the picture."""
-
-    @property
-    def rows(self) -> Rows:
-        """Return its rows."""
-
-
-BandT = TypeVar("BandT", bound=Band)
-"""Tasks of one kind of data sets."""
-
-Made_co = TypeVar("Made_co", bound=Band, covariant=True)
-"""Tasks, of what only gives them."""
-
-
-class Pictured(Protocol[Made_co]):
-    """A picture of a data set."""
-
-    @property
-    def name(self) -> str:
-        """Return the file's name within the data set, with slashes."""
-
-    @property
-    def height(self) -> int:
-        """Return the number of its rows."""
-
-    def tasks(self) -> Sequence[Made_co]:
-        """Return the tasks that make it, top to bottom."""
-
-
-class Planned(Protocol[Made_co]):
-    """A frame: its pictures by kind."""
-
-    @property
-    def pictures(self) -> Mapping[str, Pictured[Made_co]]:
-        """Return its pictures."""
-
-    def describe(self) -> dict[str, Any]:
-        """Return it as JSON's types: its split, and of each picture the name and what determines it."""
-
+Asked = frame_plan.Request | film_plan.Request
+Planned = frame_plan.FramePlan | film_plan.FilmFrame
+Pictured = frame_plan.Picture | film_plan.Shot
+Band = frame_plan.Task | film_plan.Shot
 
 Look = Callable[[int], None]
 """Called with a number of bytes that were just compared."""
@@ -187,7 +131,7 @@ def bytes_of(manifest: Mapping[str, Any]) -> int:
 
 def manifest_of(
     request: Asked,
-    frames: Sequence[Planned[Band]],
+    frames: Sequence[Planned],
     sums: Sums,
     nearest: Mapping[str, Mapping[str, float]] | None = None,
 ) -> dict[str, Any]:
@@ -200,7 +144,7 @@ def manifest_of(
         for kind in KINDS:
             known = sums.get(frame[kind]["file"])
             frame[kind] |= {"bytes": known and known.bytes, "sha256": known and known.sha256}
-    head = {"schema": SCHEMA, "wamnet": version(), "request": request.as_data()}
+    head = {"schema": SCHEMA, "wamnet": frame_plan.version(), "request": request.as_data()}
     complete = all(frame[kind]["sha256"] for frame in facts for kind in KINDS)
     return {**head, "complete": complete, "nearest": dict(nearest or {}), "frames": facts}
 
@@ -210,30 +154,19 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError("data set", str(folder), f"has no {MANIFEST}", "make one: wamnet dataset")
-    try:
-        manifest = parse_json(read_file(path), "manifest", "restore it")
-        schema = manifest["schema"]
-    except BROKEN:
-        raise _damaged(path) from None
-    if schema != SCHEMA:
-        raise InputError(f"{path}: schema", str(schema), f"must be {SCHEMA}", "use that version of wamnet")
-    try:
+    rule = "is not a manifest of a data set, or damaged"
+    with refusing("manifest", str(path), rule, "restore it, or make the data set in another folder"):
+        manifest: dict[str, Any] = parse_json(read_file(path), "manifest", "restore it")
+        if (schema := manifest["schema"]) != SCHEMA:
+            rule = f"must be {SCHEMA}"
+            raise InputError(f"{path}: schema", str(schema), rule, "use that version of wamnet")
         good = isinstance(manifest["request"], dict) and isinstance(manifest["wamnet"], str)
         good &= all(NAME.fullmatch(name) for name in _names(manifest)) and bool(manifest["frames"])
         good &= all(frame["split"] in SPLITS for frame in manifest["frames"])
         _sums_of(manifest)
-    except BROKEN:
-        good = False
-    if not good:
-        raise _damaged(path)
-    result: dict[str, Any] = manifest
-    return result
-
-
-def _damaged(path: Path) -> InputError:
-    """Return the refusal of a manifest that cannot be read."""
-    rule = "is not a manifest of a data set, or damaged"
-    return InputError("manifest", str(path), rule, "restore it, or make the data set in another folder")
+        if not good:
+            raise ValueError("something in it has another form")
+    return manifest
 
 
 def _names(manifest: Mapping[str, Any]) -> list[str]:
@@ -250,7 +183,7 @@ def _sums_of(manifest: Mapping[str, Any]) -> dict[str, Sum]:
 def _sum_in(entry: Mapping[str, Any]) -> Sum:
     """Return what an entry of a manifest or a journal states of a file."""
     length, digest = entry["bytes"], entry["sha256"]
-    if type(length) is not int or length < 0 or not DIGEST.fullmatch(digest):
+    if type(length) is not int or length < 0 or not re.fullmatch("[0-9a-f]{64}", digest):
         raise ValueError("it states no length and SHA-256 of a file")
     return Sum(length, digest)
 
@@ -270,19 +203,17 @@ def read_pairs(
     frames = [frame for frame in manifest["frames"] if frame["split"] == split]
     refuse_wrong(folder, verify(folder, {**manifest, "frames": frames}))
     pairs, said = [], Counter[str]()
+
+    def count(text: str) -> None:
+        said[text.partition(": ")[2]] += 1
+
     for frame in frames:
-        paths = [folder / frame[kind]["file"] for kind in KINDS]
-        noisy, target = (exr.read_frame(path, tell=partial(_count, said, path)) for path in paths)
+        noisy, target = (exr.read_frame(folder / frame[kind]["file"], tell=count) for kind in KINDS)
         pairs.append((noisy, Frame({"color": target["color"]}, target.info)))
-    for text, count in said.items():
+    for text, times in said.items():
         if tell is not None:
-            tell(f"{folder}, {count} of {2 * len(frames)} images: {text}")
+            tell(f"{folder}, {times} of {2 * len(frames)} images: {text}")
     return pairs
-
-
-def _count(said: Counter[str], path: Path, text: str) -> None:
-    """Count a sentence on a picture, whichever it is."""
-    said[text.removeprefix(f"{path}: ")] += 1
 
 
 def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
@@ -297,14 +228,14 @@ def refuse_wrong(folder: Path, wrong: Mapping[str, str]) -> None:
 # ---- making a data set -----------------------------------------------------------------------------------
 
 
-class Store(Generic[BandT]):
+class Store:
     """An open folder of a data set that is being made; made by [`Store.open`]."""
 
     def __init__(
         self,
         folder: Path,
         request: Asked,
-        frames: Sequence[Planned[BandT]],
+        frames: Sequence[Planned],
         before: Sums,
         nearest: Mapping[str, Mapping[str, float]],
     ) -> None:
@@ -323,17 +254,15 @@ class Store(Generic[BandT]):
         cls,
         folder: Path,
         request: Asked,
-        frames: Sequence[Planned[BandT]],
-        on_look: Look | None = None,
+        frames: Sequence[Planned],
         nearest: Mapping[str, Mapping[str, float]] | None = None,
-    ) -> Iterator[Store[BandT]]:
+    ) -> Iterator["Store"]:
         """Yield the store of a new data set, or of the same one begun before; refuse every other folder.
 
         When the block ends well and nothing is missing, the data set is finished.
         """
-        if folder.exists() and not folder.is_dir():
-            raise InputError("output folder", str(folder), "is a file", "choose another with -o")
-        if folder.is_dir() and not (folder / MANIFEST).exists() and _visible(folder):
+        # A run that was killed at its start leaves hidden files.
+        if visible(folder) and not (folder / MANIFEST).exists():
             rule = "holds something else"
             raise InputError("output folder", str(folder), rule, "choose a new or empty one with -o")
         check_work_folders(folder)
@@ -342,12 +271,13 @@ class Store(Generic[BandT]):
             # It was another process's until now.
             check_work_folders(folder)
             store = cls(folder, request, frames, before, nearest or {})
-            store._begin(on_look)
+            with progress("checking", sum(known.bytes for known in before.values()), "bytes") as look:
+                store._begin(look)
             yield store
             if not store.missing and store.unfinished.exists():
                 store._finish()
 
-    def _begin(self, on_look: Look | None) -> None:
+    def _begin(self, on_look: Look) -> None:
         """Find what is there; write down what is not, before any of it is made."""
         for name in self.pictures:
             path = self.folder / name
@@ -380,7 +310,7 @@ class Store(Generic[BandT]):
         elif _is_own(path):
             path.unlink()
 
-    def tasks(self) -> list[BandT]:
+    def tasks(self) -> list[Any]:
         """Return the tasks that are left."""
         return [
             task
@@ -401,7 +331,7 @@ class Store(Generic[BandT]):
         self._publish(task.picture, task.rows, band)
         self._join_if_whole(task.picture)
 
-    def _publish(self, picture: Pictured[Band], rows: Rows, band: Frame) -> None:
+    def _publish(self, picture: Pictured, rows: Rows, band: Frame) -> None:
         """Write a band under a name that ends in its checksum."""
         new = self.unfinished / NEW
         exr.write_frame(new, band)
@@ -410,7 +340,7 @@ class Store(Generic[BandT]):
         path = self.unfinished / f"{stem}.{first}-{last}.{sum_of(new).sha256}.exr"
         self._bands[picture.name][rows] = new.replace(path)
 
-    def _join_if_whole(self, picture: Pictured[Band]) -> None:
+    def _join_if_whole(self, picture: Pictured) -> None:
         """Finish a picture whose bands are all there; one that covers all rows is the picture."""
         bands, whole = self._bands[picture.name], (0, picture.height)
         if whole not in bands:
@@ -420,7 +350,8 @@ class Store(Generic[BandT]):
             self._publish(picture, whole, join(parts))
         path = bands[whole]
         known = Sum(path.stat().st_size, path.suffixes[-2][1:])
-        with _appending(self.unfinished / JOURNAL) as journal:
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+        with os.fdopen(os.open(self.unfinished / JOURNAL, flags, 0o666), "a", encoding="utf-8") as journal:
             line = {"file": picture.name, "bytes": known.bytes, "sha256": known.sha256}
             journal.write(json.dumps(line) + "\n")
         path.replace(self.folder / picture.name)
@@ -447,12 +378,7 @@ class Store(Generic[BandT]):
         write_text(self.folder / MANIFEST, json.dumps(manifest, indent=1, allow_nan=False) + "\n")
 
 
-def _visible(folder: Path) -> bool:
-    """Tell whether a folder has anything but hidden files, as a run leaves that was killed at its start."""
-    return any(not path.name.startswith(".") for path in folder.iterdir())
-
-
-def _known_before(folder: Path, request: Asked, frames: Sequence[Planned[Band]]) -> dict[str, Sum]:
+def _known_before(folder: Path, request: Asked, frames: Sequence[Planned]) -> dict[str, Sum]:
     """Return the sums in the manifest of a folder, or refuse it if it is another data set."""
     there, wanted = read_manifest(folder), manifest_of(request, frames, {})
     if there["wamnet"] != wanted["wamnet"]:
@@ -507,9 +433,3 @@ def _is_own(path: Path) -> bool:
     name = path.name
     known = name in (JOURNAL, NEW) or BAND.fullmatch(name) or TEMPORARY_NAME.fullmatch(name)
     return bool(known) and is_regular(path)
-
-
-def _appending(path: Path) -> IO[str]:
-    """Open a text file to add to it, but no link of its name."""
-    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-    return os.fdopen(os.open(path, flags, 0o666), "a", encoding="utf-8")

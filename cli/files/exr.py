@@ -56,9 +56,6 @@ OIIO_SPACE = "oiio:ColorSpace"
 OIIO_REC_709 = ("linear", "scene_linear", "lin_srgb", "lin_rec709", "lin_rec709_scene")
 """Its names of linear Rec. 709, lower case."""
 
-SQUARE = 1.0
-"""Aspect ratio of the pixels that a denoiser assumes, and a PNG has."""
-
 
 def write_frame(path: Path, frame: Frame, compress: bool = True) -> None:
     """Write a valid frame as float32, losslessly compressed or not at all, all of it or nothing."""
@@ -88,12 +85,12 @@ def write_denoised(
     selection = select(source, file.parts, view_layer)
     if "color" not in selection.layers:
         raise _missing(source, file, selection, "no colour is among them", "export it too")
-    deep = [part.text("name") for part in file.parts if part.deep]
+    deep = file.deep
     if keep and deep:
         rule = "parts with several samples per pixel cannot be kept"
         raise InputError(f"{source}: deep parts", ", ".join(deep), rule, "leave out --keep-layers")
     index = selection.layers["color"][0].part
-    matrix, _ = _matrix(source, file, index)
+    matrix, _ = primaries.to_rec_709(str(source), file.parts[index])
     own = np.asarray(color, np.float32)
     own = own if matrix is None else primaries.converted(own, np.linalg.inv(matrix))
     layer = selection.denoised_layer() if keep else ""
@@ -160,14 +157,22 @@ def read_frame(
     pixels = [channels for _, _, channels in _load(file)]
     layers = {name: _stack(path, name, planes, pixels) for name, planes in selection.layers.items()}
     for name in COLORS:
-        if name in layers and (matrix := _matrix(path, file, selection.layers[name][0].part)[0]) is not None:
+        if (
+            name in layers
+            and (matrix := primaries.to_rec_709(str(path), file.parts[selection.layers[name][0].part])[0])
+            is not None
+        ):
             layers[name] = primaries.converted(layers[name], matrix)
     attributes = file.parts[0].attributes
     info = {
         k.removeprefix(INFO_PREFIX): file.parts[0].text(k) for k in attributes if k.startswith(INFO_PREFIX)
     }
-    if "depth" in layers and not info and (missed := _without_misses(layers)):
-        notes.append(f"{missed} depths of {FARTHEST_DEPTH:g} or more are read as 0: nothing is hit there")
+    if "depth" in layers and not info:
+        # Many renderers write such depths where nothing is hit.
+        missed = np.isfinite(layers["depth"]) & (layers["depth"] >= FARTHEST_DEPTH)
+        layers["depth"] = np.where(missed, np.float32(0.0), layers["depth"])
+        if count := int(missed.sum()):
+            notes.append(f"{count} depths of {FARTHEST_DEPTH:g} or more are read as 0: nothing is hit there")
     if tell is not None and notes:
         tell(f"{path}: {'; '.join(notes)}")
     frame = Frame(layers, info)
@@ -208,7 +213,7 @@ def need_layers(
 def _missing(path: Path, file: File, selection: Selection, rule: str, way_out: str) -> InputError:
     """Return the error for a file without a layer that it needs."""
     names = unused(file.parts, selection)
-    deep = [part.text("name") for part in file.parts if part.deep]
+    deep = file.deep
     if deep:
         rule, way_out = "its pixels are deep: they have several samples each", "flatten it"
     elif {"Y", "RY", "BY"} <= {name for part in file.parts for name in part.channels}:
@@ -241,7 +246,7 @@ def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[s
     spaces: dict[str, None] = {}
     for name in COLORS:
         for plane in selection.layers.get(name, ())[:1]:
-            matrix, space = _matrix(path, file, plane.part)
+            matrix, space = primaries.to_rec_709(str(path), file.parts[plane.part])
             spaces |= {} if matrix is None else {space: None}
     if spaces:
         yield f"colours are converted to Rec. 709 from the primaries {' and '.join(spaces)}"
@@ -251,15 +256,15 @@ def _attribute_notes(path: Path, file: File, selection: Selection) -> Iterator[s
         yield f"{OIIO_SPACE} is {space}, and is not used: colours are taken for linear Rec. 709"
     with refusing(f"{path}: attributes", "damaged", "must be of OpenEXR's types", "export it again"):
         display = part.numbers("displayWindow", "<i4", part.window)
-        (aspect,) = part.numbers("pixelAspectRatio", "<f4", (SQUARE,))
+        (aspect,) = part.numbers("pixelAspectRatio", "<f4", (1.0,))
         (white,) = part.numbers("whiteLuminance", "<f4", (0.0,))
     if display != part.window:
         yield f"the image is the data window {_corners(part.window)}, not all of {_corners(display)}"
-    if aspect != SQUARE:
+    if aspect != 1.0:
         yield f"pixels have the aspect ratio {aspect:g}, which an .exr keeps and a .png does not"
     if white:
         yield f"whiteLuminance is {white:g} cd/m², and no value is scaled by it"
-    deep = [part.text("name") for part in file.parts if part.deep]
+    deep = file.deep
     if deep:
         yield f"deep parts are left out: {', '.join(deep)}"
 
@@ -268,11 +273,6 @@ def _corners(window: Sequence[float]) -> str:
     """Return a window as text."""
     left, top, right, bottom = (int(value) for value in window)
     return f"({left}, {top})-({right}, {bottom})"
-
-
-def _matrix(path: Path, file: File, index: int) -> tuple[Floats | None, str]:
-    """Return the matrix from a part's colours to Rec. 709, None for the identity, and their space."""
-    return primaries.to_rec_709(str(path), file.parts[index])
 
 
 def _load(file: File, pixels: bool = True) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
@@ -312,14 +312,6 @@ def _stack(path: Path, name: str, planes: Sequence[Plane], pixels: Sequence[Mapp
     for index, channel in enumerate(channels):
         layer[:, :, index] = channel
     return layer
-
-
-def _without_misses(layers: dict[str, Floats]) -> int:
-    """Put 0 for depths that many renderers write where nothing is hit; return how many there were."""
-    missed = np.isfinite(layers["depth"]) & (layers["depth"] >= FARTHEST_DEPTH)
-    if missed.any():
-        layers["depth"] = np.where(missed, np.float32(0.0), layers["depth"])
-    return int(missed.sum())
 
 
 class _Printed:

@@ -25,9 +25,6 @@ from ...refimpl.errors import InputError
 from ...refimpl.reading import refusing
 from ..common.inputs import check_input
 
-MAGIC = b"\x76\x2f\x31\x01"
-"""First bytes of every OpenEXR file."""
-
 PREFIX = 8
 """Bytes before the first header: those and the version with its flags."""
 
@@ -36,9 +33,6 @@ VERSION = 2
 
 LONG_NAMES, DEEP, MULTI_PART = 0x400, 0x800, 0x1000
 """Flags: names of up to 255 bytes, pixels of several samples, a list of headers."""
-
-LONGEST_NAME = 255
-"""Most bytes of a name of an attribute, type or channel."""
 
 PIXEL_FACTS = 16
 """Bytes after a channel's name: pixel type, a flag, its sampling in x and y."""
@@ -98,6 +92,11 @@ class File:
     end: int
     parts: Sequence[Part]
 
+    @property
+    def deep(self) -> list[str]:
+        """Return the names of the parts with several samples per pixel."""
+        return [part.text("name") for part in self.parts if part.deep]
+
     @contextmanager
     def in_utf8(self) -> Iterator[Path]:
         """Yield a path under which the package can read the file: its own, or that of a copy in UTF-8."""
@@ -147,7 +146,7 @@ def _read(path: Path) -> File:
         # A header may have megabytes, the pixels behind it far more.
         size = path.stat().st_size
         content = mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
-        if content[:4] != MAGIC:
+        if content[:4] != b"\x76\x2f\x31\x01":
             rule = "is not an OpenEXR image"
             raise InputError("input file", str(path), rule, "render or export it as .exr")
         if size <= PREFIX:
@@ -202,7 +201,7 @@ def _attributes(content: mmap.mmap | bytes, at: int) -> tuple[list[Attribute], i
 
 def _name(content: mmap.mmap | bytes, at: int) -> tuple[bytes, int]:
     """Return a name that ends in a zero byte, and where the next thing begins."""
-    end = content.find(b"\0", at, at + LONGEST_NAME + 1)
+    end = content.find(b"\0", at, at + 255 + 1)
     if end <= at:
         raise ValueError("a name is missing, or does not end")
     return bytes(content[at:end]), end + 1

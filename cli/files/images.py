@@ -74,18 +74,14 @@ def write_panels(path: Path, panels: Sequence[tuple[str, Floats]], origin: str) 
     drawing = need("PIL.ImageDraw", "to label")
     font = need("PIL.ImageFont", "to label").load_default()
     height, width, _ = panels[0][1].shape
-    whole = pillow.new("RGB", (_even(width * len(panels)), _even(height + LABEL_PX)))
+    sides = width * len(panels), height + LABEL_PX
+    whole = pillow.new("RGB", tuple(side + side % 2 for side in sides))
     for index, (label, encoded) in enumerate(panels):
         bar = pillow.new("RGB", (width, LABEL_PX))
         drawing.Draw(bar).text((3, 3), label, fill="white", font=font)
         whole.paste(bar, (width * index, 0))
         whole.paste(pillow.fromarray(encoding.to_8bit(encoded)), (width * index, LABEL_PX))
     _save(path, whole, origin)
-
-
-def _even(length: int) -> int:
-    """Return the length, or one more."""
-    return length + length % 2
 
 
 @contextmanager

@@ -107,11 +107,19 @@ def check_real_folder(folder: Path) -> bool:
     return True
 
 
+def visible(folder: Path) -> list[Path]:
+    """Return what is in a folder, in order, without hidden files; refuse anything else of its name."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
+    there = folder.iterdir() if folder.exists() else ()
+    return sorted(path for path in there if not path.name.startswith("."))
+
+
 def check_new_folder(folder: Path) -> None:
     """Refuse a folder that holds something, or could not be made."""
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise InputError("output folder", str(folder), "is a file", "choose another name with -o")
-    if folder.is_dir() and any(folder.iterdir()):
+    if folder.is_symlink():
+        raise InputError("output folder", str(folder), "is a file", "choose another with -o")
+    if visible(folder) or (folder.exists() and any(folder.iterdir())):
         raise InputError("output folder", str(folder), "is not empty", "choose another with -o")
     check_parent(folder)
 

@@ -35,9 +35,6 @@ ONCE = (b"IHDR", b"PLTE", b"cICP", b"iCCP", b"sRGB", b"gAMA", b"cHRM", b"sBIT", 
 MOST_BITS = 8
 """Most bits per channel."""
 
-CICP_SRGB = bytes([1, 13, 0, 1])
-"""Primaries of BT.709, transfer function of sRGB, RGB, full range."""
-
 UNIT = 100_000
 """What an integer of `gAMA` and `cHRM` is divided by."""
 
@@ -70,7 +67,8 @@ def in_srgb(path: Path, chunks: Mapping[bytes, bytes], picture: Any) -> tuple[Fl
     """Return display-encoded colour (H, W, 3) of sRGB of an RGB picture, and what it was converted from."""
     levels = np.asarray(picture)
     if b"cICP" in chunks:
-        if chunks[b"cICP"] != CICP_SRGB:
+        # Primaries of BT.709, transfer function of sRGB, RGB, full range.
+        if chunks[b"cICP"] != bytes([1, 13, 0, 1]):
             shown = ", ".join(map(str, chunks[b"cICP"]))
             raise InputError(f"{path}: cICP", shown, "only 1, 13, 0, 1 is read: sRGB", "convert it to sRGB")
     elif b"iCCP" in chunks:

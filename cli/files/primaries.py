@@ -37,18 +37,12 @@ SPACES: Mapping[str, tuple[str, tuple[float, ...]]] = {
 }
 """Names that `colorInteropID` gives to linear RGB, their names in messages, and their chromaticities."""
 
-NO_SPACE = ("", "unknown", "data")
-"""Values of `colorInteropID` that name no colour space."""
-
 STATED = ("chromaticities", "colorInteropID", "acesImageContainerFlag")
 """Attributes that state a file's primaries."""
 
 SAME_XY = 1e-3
 """Chromaticities that differ by no more are the same, as OpenEXR has it: programs round them to three
 digits or to five, and the colours differ by less than an 8-bit step."""
-
-LARGEST_CONDITION = 1e4
-"""Largest condition number of a matrix that is taken for a colour space; AP0's is 4."""
 
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 """From XYZ to cone responses."""
@@ -68,7 +62,8 @@ def conversion(chromaticities: Sequence[float], neutral: Sequence[float]) -> Flo
     adaptation = np.linalg.inv(BRADFORD) @ np.diag(cones[1] / cones[0]) @ BRADFORD
     source, target = (to_xyz(np.reshape(space, (4, 2))) for space in (chromaticities, REC_709))
     matrix: Floats = np.linalg.inv(target) @ adaptation @ source
-    if not np.isfinite(matrix).all() or not np.linalg.cond(matrix) <= LARGEST_CONDITION:
+    # The condition number of AP0 is 4.
+    if not np.isfinite(matrix).all() or not np.linalg.cond(matrix) <= 1e4:
         raise ValueError("the matrix of this space has no inverse")
     return matrix
 
@@ -81,7 +76,7 @@ def same(space: Sequence[float], other: Sequence[float]) -> bool:
 def to_rec_709(what: str, part: Part) -> tuple[Floats | None, str]:
     """Return the matrix from a part's RGB to Rec. 709, None for the identity, and the name of its space."""
     interop = part.text("colorInteropID")
-    if interop not in (*SPACES, *NO_SPACE):
+    if interop not in (*SPACES, "", "unknown", "data"):
         rule = f"the colour spaces that can be read are {', '.join(SPACES)}"
         raise InputError(f"{what}: colorInteropID", interop, rule, "convert its colours to one of them")
     container = "lin_ap0_scene" if "acesImageContainerFlag" in part.attributes else "lin_rec709_scene"

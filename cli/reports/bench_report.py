@@ -4,21 +4,15 @@ The data are those of spec/bench.md; here they are only written down and drawn.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ...compiler.schedules.names import split
-from ...refimpl.errors import InputError
-from ..files.outputs import replacing
 from . import plots
 
 Data = Mapping[str, Any]
 
 PRINTED = plots.PAPER
 """Theme of the plots that are files."""
-
-WIDE = ("range", "frames/s", "compile, s")
-"""Columns that a terminal has no room for."""
 
 NO_CACHE = "nothing is kept"
 """What a contender's `caches` says that leaves no compiled code on disk; equal to that of kernels."""
@@ -32,9 +26,6 @@ medians of interleaved frames, copies included. Errors are the largest differenc
 in float64: what a form leaves out counts. Predictions come from operations, sines and bytes
 (spec/bench.md)."""
 """What a reader of the first table should know."""
-
-OF_SGEMM_TOO_FAST = 1.05
-"""A share of sgemm above this does not come from noise: the measured library is slower than it could be."""
 
 
 def number(value: float | None, form: str = ".3g") -> str:
@@ -60,12 +51,6 @@ def cells(row: Data, columns: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _ranges(row: Data) -> str:
-    """Return the shortest and the longest time."""
-    ms = row["ms"]
-    return f"{number(ms['min'])} - {number(ms['max'])}" if ms else NONE
-
-
 def measured(data: Data) -> list[Data]:
     """Return the contenders that have a time, fastest first."""
     return sorted((row for row in data["contenders"] if row["ms"]), key=lambda row: row["ms"]["median"])
@@ -89,15 +74,10 @@ def speed_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     rows = []
     for row in measured(data):
         name = row["name"] + (" *" if row["name"] in data["front"]["error"] else "")
-        rows.append((name, number(part(row, "ms", "median")), _ranges(row), *cells(row, columns)))
+        ms = row["ms"]
+        extent = f"{number(ms['min'])} - {number(ms['max'])}"
+        rows.append((name, number(ms["median"]), extent, *cells(row, columns)))
     return ("contender", "ms", "range", *(head for head, *_ in columns)), rows
-
-
-def short_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the columns of the first table that a terminal has room for."""
-    heads, rows = speed_table(data)
-    kept = [k for k, head in enumerate(heads) if head not in WIDE]
-    return tuple(heads[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
 
 
 DETAILS = (
@@ -119,27 +99,17 @@ DETAILS = (
 """Columns of everything else that is known."""
 
 
-def detail_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return heads and rows of everything else that is known."""
-    rows = measured(data)
-    known = [each for each in DETAILS if any(cells(row, (each,)) != (NONE,) for row in rows)]
-    heads = ("contender", *(head for head, *_ in known))
-    return heads, [(row["name"], *cells(row, known)) for row in rows]
-
-
 def growth_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return heads and rows of the time at each size, and beside it the predicted one; dashes: left out."""
     columns = growth(data)
     heads = ("contender", *(f"{size}, ms (predicted)" for size in columns))
     names = dict.fromkeys(name for found in columns.values() for name in found)
-    return heads, [(name, *(_cell(found.get(name, {})) for found in columns.values())) for name in names]
 
+    def cell(row: Data) -> str:
+        shown = number(part(row, "ms", "median")), number(row.get("predicted_ms"))
+        return "{} ({})".format(*shown) if row.get("ms") else NONE
 
-def _cell(row: Data) -> str:
-    """Return a measured time with the predicted one; a dash where there is none."""
-    if not row.get("ms"):
-        return NONE
-    return f"{number(part(row, 'ms', 'median'))} ({number(row.get('predicted_ms'))})"
+    return heads, [(name, *(cell(found.get(name, {})) for found in columns.values())) for name in names]
 
 
 def growth(data: Data) -> dict[int, dict[str, Data]]:
@@ -163,12 +133,6 @@ def limits_text(data: Data) -> str:
     )
 
 
-def machine_text(data: Data) -> str:
-    """Return the machine and the versions of what ran."""
-    facts = [f"{name} {value}" for name, value in data["machine"].items()]
-    return ", ".join([*facts, *(f"{name} {value}" for name, value in data["versions"].items())])
-
-
 def network_text(data: Data) -> str:
     """Return the network and the picture."""
     network = data["network"]
@@ -187,7 +151,8 @@ def notes(data: Data) -> list[str]:
     for entry in data["sizes"]:
         left_out = [row for row in entry["contenders"] if not row["ms"]]
         lines += [f"{row['name']} at {entry['size_px']}: {row['reason']}" for row in left_out]
-    if any((row.get("of_sgemm") or 0.0) > OF_SGEMM_TOO_FAST for row in data["contenders"]):
+    # Less does not stand out of noise.
+    if any((row.get("of_sgemm") or 0.0) > 1.05 for row in data["contenders"]):
         lines.append(
             "a kernel is faster than sgemm: NumPy's OpenBLAS does not know this processor; "
             "OPENBLAS_CORETYPE=SkylakeX may double it where there is AVX-512"
@@ -209,14 +174,17 @@ def markdown(data: Data, pictures: Sequence[str]) -> str:
 def _lines(data: Data, pictures: Sequence[str]) -> Iterator[str]:
     """Yield the lines of the text."""
     yield from ("# Speed against error", "", network_text(data) + f" (`{data['command']}`).", "")
-    yield from (machine_text(data) + ".", "", limits_text(data), "")
+    facts = [f"{name} {value}" for of in ("machine", "versions") for name, value in data[of].items()]
+    yield from (", ".join(facts) + ".", "", limits_text(data), "")
     yield from _table(*speed_table(data))
     yield LEGEND
     yield ""
     yield from ("## Speed, loss and bounds", "", frames_text(data), "")
     yield from _table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])
     yield from (TABLE_LEGEND, "", "## Details", "")
-    yield from _table(*detail_table(data))
+    known = [each for each in DETAILS if any(cells(row, (each,)) != (NONE,) for row in measured(data))]
+    heads = ("contender", *(head for head, *_ in known))
+    yield from _table(heads, [(row["name"], *cells(row, known)) for row in measured(data)])
     if data["sizes"]:
         yield from ("## How cost grows", "")
         yield from _table(*growth_table(data))
@@ -260,21 +228,14 @@ def kind_of(row: Data, window: int) -> str:
     return "sine" if row.get("profile", "ieee") != "ieee" else "whole"
 
 
-def short_name(row: Data) -> str:
-    """Return a row's name without its executor, which the marker says, and without a variant's schedule."""
-    if row["kind"] != "kernel":
-        return str(row["name"])
-    target, schedule, form = split(row["name"])
-    return form or schedule or target
-
-
 def panels(data: Data, of: Sequence[tuple[str, str, str, bool]] = PANELS) -> list[plots.Panel]:
     """Return the panels of the picture that have something to show."""
     found = []
     for name, key, label, is_loss in of:
         marks = [
             plots.Mark(
-                short_name(row),
+                # Without the executor, which the marker says, and a variant without its schedule.
+                next(filter(None, reversed(split(row["name"])))) if row["kind"] == "kernel" else row["name"],
                 (row["ms"]["median"], row["ms"]["min"], row["ms"]["max"]),
                 part(row, name, key),
                 row.get("executor") or ("" if row.get("window") else "other"),
@@ -287,19 +248,6 @@ def panels(data: Data, of: Sequence[tuple[str, str, str, bool]] = PANELS) -> lis
         if any(mark.y is not None for mark in marks):
             found.append(plots.Panel(label, marks, is_loss))
     return found
-
-
-def picture(data: Data, path: Path, theme: plots.Theme = PRINTED) -> None:
-    """Draw speed against error from a benchmark's data (spec/bench.md) into a PNG file.
-
-    Raises InputError where no row has both a time and a loss or a bound.
-    """
-    shown = panels(data)
-    if not shown:
-        rule = "no row has a time and a loss or a bound"
-        raise InputError("benchmark", str(path), rule, "measure a trained model: wamnet bench")
-    with replacing(path) as new:
-        new.write_bytes(plots.trade_off(shown, theme))
 
 
 TRADE = (

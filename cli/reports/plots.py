@@ -35,13 +35,6 @@ DARK = Theme(text="#cbd5e1", curve="#fbbf24")
 PAPER = Theme(text="#1f2430", curve="#b4530a", page="#ffffff")
 """For a file that is looked at by itself."""
 
-POSITIONS = tuple((x, sign * y) for y in (3, 12, 22) for x in (6, -6) for sign in (1, -1))
-"""Where a label may be, from its point, in typographic points: the first that is free, or none, as long lines
-cross others; a negative first number puts its end there."""
-
-NEAR = 12
-"""Heights up to this one, in points of print, need no line from the point to its label."""
-
 MARKER_PX = 9.0
 """Half the side of the square around a marker that labels leave free, in pixels."""
 
@@ -122,7 +115,8 @@ def _taken(figure: Any, axis: Any, places: Sequence[tuple[float, float]]) -> lis
 def _place(axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bool, taken: list[Any]) -> None:
     """Write a name beside a point in the first position that is free, if there is one."""
     frame = axis.get_window_extent()
-    for x, y in POSITIONS:
+    # Offsets in points, the best first; a negative x is that of the label's end.
+    for x, y in [(x, sign * y) for y in (3, 12, 22) for x in (6, -6) for sign in (1, -1)]:
         text = axis.annotate(
             name,
             at,
@@ -134,7 +128,7 @@ def _place(axis: Any, name: str, at: tuple[float, float], theme: Theme, bold: bo
             color=theme.text,
             fontweight="bold" if bold else "normal",
             arrowprops={"arrowstyle": "-", "color": theme.text, "linewidth": 0.4, "alpha": 0.6}
-            if abs(y) > NEAR
+            if abs(y) > 12
             else None,
         )
         # The first call puts the text into its place; its own box has no line to the point.
@@ -164,9 +158,6 @@ COLOURS = {
     "peer": ("#7F7F7F", "others"),
 }
 """Colour and name of each kind: those of M. Okabe and K. Ito, "Color Universal Design" (2008), and grey."""
-
-LINEAR_DB = 0.05
-"""Losses below this, in dB, are on a linear scale: they mean little, and may be negative."""
 
 BAND = 1.8
 """Part of the logarithmic range of bounds, over its end, where those are drawn that have none."""
@@ -209,19 +200,19 @@ def trade_off_figure(panels: Sequence[Panel], theme: Theme) -> Any:
         _panel(axis, panel, theme)
     axes[-1].set_xlabel("ms per frame, median; the line spans all rounds")
     _legend(figure, [mark for panel in panels for mark in panel.marks], theme)
+
+    def order(mark: Mark) -> tuple[bool, bool, float]:
+        # The front is named first, then other denoisers, then by time.
+        return (not mark.on_front, mark.executor in MARKERS, mark.ms[0])
+
     # Places of labels need the last size of the axes, which the legend takes room from.
     for axis, panel in zip(axes, panels, strict=True):
         shown = [(mark, (mark.ms[0], _height(panel, mark))) for mark in panel.marks]
         taken = _taken(figure, axis, [at for _, at in shown])
         taken += [text.get_window_extent() for text in axis.texts]
-        for mark, at in sorted(shown, key=lambda pair: _rank(pair[0])):
+        for mark, at in sorted(shown, key=lambda pair: order(pair[0])):
             _place(axis, mark.name, at, theme, mark.on_front, taken)
     return figure
-
-
-def _rank(mark: Mark) -> tuple[bool, bool, float]:
-    """Return the order in which marks are named: the front, other denoisers, then by time."""
-    return (not mark.on_front, mark.executor in MARKERS, mark.ms[0])
 
 
 def _top(panel: Panel) -> tuple[float, float]:
@@ -248,7 +239,8 @@ def _panel(axis: Any, panel: Panel, theme: Theme) -> None:
         size = 11 if marker == OTHER_MARKER[0] else 6.5
         axis.plot([mark.ms[0]], [height], marker, color=colour, markeredgecolor=edge, markersize=size)
     if panel.is_loss:
-        axis.set_yscale("symlog", linthresh=LINEAR_DB)
+        # Smaller losses, in dB, mean little and may be negative.
+        axis.set_yscale("symlog", linthresh=0.05)
         axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axis.axhline(0.0, color=theme.text, linewidth=0.8, alpha=0.5)
     else:

@@ -119,11 +119,17 @@ def write(
 
 def facts(plan: Plan, results: Results, command: str) -> dict[str, Any]:
     """Return everything that a demonstration has found, as JSON's types."""
+    model = results.model
     return {
         "schema": SCHEMA,
         "command": command,
         "plan": asdict(plan),
-        "model": _model_facts(results.model),
+        "model": {
+            "features": model.features,
+            "window": asdict(model.window),
+            "widths": model.siren.widths,
+            "parameters": sum(layer.size for layer in (*model.siren.weights, *model.siren.biases)),
+        },
         "unseen": [
             {
                 "time_s": frame.time_s,
@@ -147,17 +153,6 @@ def facts(plan: Plan, results: Results, command: str) -> dict[str, Any]:
     }
 
 
-def _model_facts(model: Model) -> dict[str, Any]:
-    """Return what a reader wants to know of a model."""
-    layers = (*model.siren.weights, *model.siren.biases)
-    return {
-        "features": model.features,
-        "window": asdict(model.window),
-        "widths": model.siren.widths,
-        "parameters": sum(layer.size for layer in layers),
-    }
-
-
 def draw(results: Results) -> dict[str, Any]:
     """Return each plot as an embedded picture for a light and for a dark page.
 
@@ -166,7 +161,9 @@ def draw(results: Results) -> dict[str, Any]:
     drawn: dict[str, Any] = {"errors": [], "training": {}}
     themes = (("light", plots.LIGHT), ("dark", plots.DARK))
     for frame in results.unseen:
-        maps = _error_maps(frame, results.model.normalization.exposure_stops)
+        stops = results.model.normalization.exposure_stops
+        noisy, target = (to_display(shown["color"], stops) for shown in (frame.noisy, frame.reference))
+        maps = {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
         by_theme = {name: plots.error_maps(list(maps.items()), theme) for name, theme in themes}
         drawn["errors"].append(
             {title: {name: _embedded(by_theme[name][k]) for name in by_theme} for k, title in enumerate(maps)}
@@ -175,12 +172,6 @@ def draw(results: Results) -> dict[str, Any]:
         curve = plots.training_curve(results.state.history, results.seconds_per_step, theme)
         drawn["training"][name] = _embedded(curve)
     return drawn
-
-
-def _error_maps(frame: Unseen, stops: float) -> dict[str, Any]:
-    """Return the absolute error (H, W) of the noisy and the denoised picture."""
-    noisy, target = (to_display(layers["color"], stops) for layers in (frame.noisy, frame.reference))
-    return {"input": error_map(noisy, target), "denoised": error_map(frame.denoised, target)}
 
 
 def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:

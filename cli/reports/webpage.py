@@ -25,9 +25,6 @@ from ..common import options
 from ..common.inputs import learned_scene, load_model, load_scene
 from ..common.packages import need
 
-FOLDER = "templates"
-"""Folder of the template and its parts, beside this module."""
-
 SCRIPTS = (
     "page.scene.js",
     "page.device.js",
@@ -44,12 +41,6 @@ FRAMES = 240
 FPS = 30.0
 """Moments a second. They are half a step beside integers, since some scenes are laid out otherwise at time 0,
 where their boxes are parallel to the axes."""
-
-LEAD = (
-    "One random path per pixel gives the noisy image; a small neural network, compiled to a fragment shader "
-    "with a proven bound on its error, removes the noise. All runs on your device: nothing is loaded or sent."
-)
-"""The sentence below the title."""
 
 
 def build_page(animation: Animation, model: Model, fast: Model | None = None) -> str:
@@ -85,7 +76,7 @@ def render_page(data: dict[str, Any]) -> str:
     """Return the page that shows such data."""
 
     def part(name: str) -> str:
-        return (resources.files(__package__) / FOLDER / name).read_text(encoding="utf-8")
+        return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
     # In a script element nothing but its end tag and <!-- mean anything: JSON can do without the sign.
     # The indentation of sources would be a twelfth of a page.
@@ -93,7 +84,6 @@ def render_page(data: dict[str, Any]) -> str:
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     return environment.from_string(part("page.html.jinja")).render(
         title=f"{data['scene'].replace('_', ' ').capitalize()}, path-traced and denoised live",
-        lead=LEAD,
         style=part("page.css"),
         script="\n".join(part(name) for name in SCRIPTS),
         data=text,

@@ -81,10 +81,10 @@ def test_wrong_options_are_one_line(refused, arguments, message) -> None:
 
 def test_what_is_wrong_of_an_export_is_the_status(wamnet, monkeypatch) -> None:
     verdicts = {"c": Verdict("c", "", 0, "cc", "here"), "wgsl": Verdict("wgsl", "", 0, "x", "-", wrong="off")}
-    monkeypatch.setattr(measure.exports, "judged", lambda model, target, place, scene: verdicts[target])
+    monkeypatch.setattr(measure, "judged", lambda model, target, place, scene: verdicts[target])
     assert wamnet("bench", "exports", "--targets", "c").status == 0
     outcome = wamnet("bench", "exports", "--targets", "wgsl,c")
-    assert outcome.status == measure.exports.STATUS_WRONG
+    assert outcome.status == measure.STATUS_WRONG
     assert outcome.out.splitlines()[2].endswith(" | off")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands import choose
-from wamnet.cli.commands.choose import Request, check_request
+from wamnet.cli.commands.choose import Request
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
@@ -146,6 +146,6 @@ def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) 
 
 def test_sizes_that_are_the_ends_of_the_range_are_allowed() -> None:
     for size in (choose.SMALLEST_PX, choose.LARGEST_PX):
-        check_request(Request(max_ms=1.0, size=size), None)
+        Request(max_ms=1.0, size=size).check(None)
     with pytest.raises(InputError, match="--size 4097"):
-        check_request(Request(max_ms=1.0, size=choose.LARGEST_PX + 1), None)
+        Request(max_ms=1.0, size=choose.LARGEST_PX + 1).check(None)

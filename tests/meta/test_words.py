@@ -121,8 +121,11 @@ PROGRAMS = ("cli/", "compiler/", "kernels/", "refimpl/", "wamnet/")
 LATER = ("cli/course/", "cli/commands/course/", "cli/commands/verify/", "kernels/verify/")
 """Folders that move elsewhere with the next change: their messages are swept there."""
 
-ERRORS = ("InputError", "CompileError", "TrainingError", "ExecutorUnavailable", "WamnetError")
-"""Calls whose texts are messages [`messages`]."""
+ERRORS = (
+    *("InputError", "CompileError", "TrainingError", "ExecutorUnavailable", "WamnetError"),
+    *("option", "argument", "usage"),
+)
+"""Calls whose texts are messages, or lines of help [`messages`]."""
 
 RULES = ("rule", "way_out", "fix")
 """Names of the parts of messages [`messages`]."""
@@ -219,7 +222,7 @@ def commands_of(source: str) -> Mapping[str, list[str]]:
     found: dict[str, list[str]] = {}
     for node in ast.parse(source).body:
         if isinstance(node, ast.AnnAssign) and getattr(node.target, "id", "") == "COMMANDS" and node.value:
-            for module, function, _ in ast.literal_eval(node.value).values():
+            for module, function in ast.literal_eval(node.value).values():
                 found.setdefault(f"cli/commands/{module.replace('.', '/')}.py", []).append(function)
     return found
 

@@ -92,7 +92,7 @@ def verify_renderer(
     words: Words = None,
     profile: Profiles = None,
     pictures: Pictures = 8,
-    seed: options.Seed = 0,
+    seed: int = options.option("seed", 0),
     executor: Annotated[
         options.ExecutorName, typer.Option("--executor", help="What traces the paths of --renderer wamnet.")
     ] = options.ExecutorName.numpy,

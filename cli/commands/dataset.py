@@ -144,8 +144,8 @@ def dataset(
     wamnet dataset minicubes -o cubes
     wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor opencl -o cubes
     wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
-    wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lamps
-    wamnet dataset minicubes --frames 64 --before 8 -o film
+    wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lights
+    wamnet dataset minicubes --frames 64 --before 8 -o sequence
     wamnet dataset mine.json --frames 60 --yaw -24:24 --pitch -5:10 --distance 0.9:1.15 -o mine
     wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
     wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large

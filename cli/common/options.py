@@ -166,7 +166,7 @@ HOW: Mapping[str, Mapping[str, Any]] = {
     "time": {"callback": _finite},
     "exposure": {"callback": _stops},
 }
-"""What else typer is told of them."""
+"""What else typer knows of them."""
 
 
 def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:

@@ -57,6 +57,7 @@ LAUNCHED = f"Each launch is an entry point whose name ends with its number.\n{BA
 """The same where they are functions."""
 
 NOTHING: Mapping[str, str] = {}
+"""No text for any name."""
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""

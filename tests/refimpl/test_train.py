@@ -151,6 +151,8 @@ def test_resume_refuses_another_recipe_other_frames_and_fewer_steps() -> None:
     changed = replace(recipe, batch=64, learning_rate=0.5)
     with pytest.raises(InputError, match="changed parts of the recipe 'batch, learning_rate': a resumed run"):
         train.train(changed, PAIRS, state=state)
+    with pytest.raises(InputError, match="changed parts of the recipe 'seed': a resumed run"):
+        train.train(replace(recipe, seed=recipe.seed + 1), PAIRS, state=state)
     with pytest.raises(
         InputError, match=r"digest of the training frames '.*': the run was started on frames"
     ):

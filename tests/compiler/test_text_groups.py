@@ -44,6 +44,14 @@ def test_a_manifest_whose_schedule_has_other_pixels_is_refused(four, name):
         run_text(source, held, other, weights)
 
 
+@pytest.mark.parametrize("bytes_more", [-4, 4])
+def test_a_manifest_states_the_memory_that_groups_share(four, bytes_more):
+    source, held, manifest, weights = four
+    schedule = {**manifest["schedule"], "shared_bytes": manifest["schedule"]["shared_bytes"] + bytes_more}
+    with pytest.raises(Refused, match=r"its groups share \d+ bytes, not what its manifest says"):
+        run_text(source, held, {**manifest, "schedule": schedule}, weights)
+
+
 def lost(source, n):
     """Return a text without its barrier n."""
     wait = next(w for w in ("workgroupBarrier();", "barrier(CLK_LOCAL_MEM_FENCE);") if w in source)

@@ -117,6 +117,15 @@ def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
     assert not np.array_equal(picture, denoise_on(device, model, frame, images=wanted).image)
 
 
+def test_images_made_in_blocks_of_rows_have_no_seams(kit, monkeypatch):
+    """A pixel that is smoothed reads others; one that is encoded by itself may be in any block."""
+    frame, model = whole_frame(rough_layers(9, 20)), model_of(kit, ("normal", "color", "smoothed"))
+    wanted = images_of(model, frame)
+    monkeypatch.setattr("wamnet.kernels.run.denoise_on.BLOCK_PIXELS", 2 * frame.width)
+    for name, image in images_of(model, frame).items():
+        assert np.array_equal(image, wanted[name]), name
+
+
 def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch):
     """SMO-7: other executors, integers, layers of float64, and models without such features."""
     device, frame = executor_named("opencl"), whole_frame(rough_layers(4, 5))

@@ -11,7 +11,10 @@ from wamnet.compiler.core.ops import ELEMENTWISE, OPS
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.dialect import Dialect
 from wamnet.compiler.languages.glsl import GLSL
+from wamnet.compiler.languages.glsl_buffers import Vulkan
+from wamnet.compiler.languages.glsl_es import GLSLES
 from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.languages.wgsl import WGSL
 
 
 @pytest.mark.parametrize("dialect", [OpenCL, GLSL, C])
@@ -28,6 +31,12 @@ def test_constant_reads_back_as_the_same_float32(value):
     assert "." in text or "e" in text
     assert np.float32(text[:-1]).tobytes() == np.float32(value).tobytes()
     assert np.float32(float(text[:-1])).tobytes() == np.float32(value).tobytes()
+
+
+def test_limits_are_those_that_every_device_has():
+    """WebGPU's maxComputeWorkgroupStorageSize, Vulkan's maxComputeSharedMemorySize; MAX_DRAW_BUFFERS."""
+    assert Vulkan.largest_shared == WGSL.largest_shared == 16_384
+    assert GLSLES.max_output_channels == GLSLES.max_planes == 4 * 4
 
 
 def test_negative_constants_stand_in_brackets():

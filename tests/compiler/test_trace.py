@@ -109,6 +109,11 @@ def test_integers_decisions_and_tables():
     assert "T0: int32[4]" in text(program)
 
 
+def test_a_number_beside_an_integer_is_one():
+    program = traced(lambda x: np.where(x > 0.0, x.astype(np.int32), 2).astype(np.float32))
+    assert interpret(program, {"x": np.array([3.5, -1.0], np.float32)})["color"].tolist() == [3.0, 2.0]
+
+
 def test_float64_means_floats_alone():
     program = traced(lambda x: np.where(x > 0.0, (x * 3.0).astype(np.int32).astype(np.float32), x / 3.0))
     found = interpret(program, {"x": np.array([1.0, -1.0, 0.5])}, np.float64)["color"]

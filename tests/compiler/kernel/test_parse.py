@@ -159,6 +159,8 @@ STATEMENTS = small(
     Array("f", FLOAT, value=const(-0.25), kept=True),
     Array("k", INT),
     Store("k", (), const(3)),
+    Store("f", (), apply("negative", F)),
+    Store("f", (), apply("negative", apply("negative", F))),
     If(apply("not_equal", N, 1), (Store("f", (), const(1.0), add=True),), (Block((Let("m", name("k")),)),)),
     For("i", X, (Store("v", (const(1), name("i")), F),), start=N, step=const(2), until=name("i") < Y),
     For("j", const(2), (Let("g", load("v", name("j"), 0), kept=True),), "unroll"),
@@ -194,7 +196,9 @@ def floats(inner):
     )
     return st.one_of(
         st.builds(lambda op, ab: Expr(op, ab, FLOAT), operator, both),
-        st.builds(lambda op, a: Expr(op, (a,), FLOAT), st.sampled_from(["absolute", "floor", "sqrt"]), inner),
+        st.builds(
+            lambda op, a: Expr(op, (a,), FLOAT), st.sampled_from(["absolute", "floor", "negative"]), inner
+        ),
         st.builds(lambda c, ab: Expr("select", (c, *ab), FLOAT), st.one_of(condition, joined), both),
     )
 
@@ -391,3 +395,9 @@ def test_sums_are_declared_precise(tiny):
     assert parse(loose, "opengl", channels)
     with pytest.raises(Unread, match="part1 is not declared PRECISE"):
         parse(loose, "opengl", channels, bounded=True)
+    total = small(
+        Array("t", FLOAT, value=const(0.0)), Store("t", (), load("image_b", Y, X, 0), add=True), WRITE
+    )
+    loose = rendered(total, "opengl", np.zeros(4, np.float32)).replace("PRECISE float t", "float t", 1)
+    with pytest.raises(Unread, match="t is not declared PRECISE"):
+        parse(loose, "opengl", {"image_a": 3, "image_b": 1}, bounded=True)

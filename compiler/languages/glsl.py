@@ -216,7 +216,7 @@ class GLSL(Dialect):
 
     def textures(self, array: Given) -> list[str]:
         """Return the names of an array's textures: planes are four to each."""
-        if array.name == RESULT:
+        if array.name == RESULT and not array.planes:
             return self.results(int(array.shape[-1]))
         count = -(-array.planes // self.planes_per_buffer)
         return [f"{array.name}_{number}" for number in range(count)] or [array.name]

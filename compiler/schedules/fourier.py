@@ -5,14 +5,14 @@ power of two, it is a product of spectra; of what comes back, the N - K + 1 rows
 K x K pixels lie in the tile are right (overlap-save: A. Oppenheim and R. Schafer, Discrete-Time Signal
 Processing, 3rd edition, 2010, section 8.7.3).
 
-1. Two channels are one complex image p + i q: transform it, rows, then columns [`both_ways`].
+1. Two channels are one complex image p + i q: transform it, rows, then columns.
 2. The channels' spectra are P = (Z(f) + conj Z(-f)) / 2 and Q = (Z(f) - conj Z(-f)) / 2i: the halves go into
-   the weights [`unpack`].
+   the weights.
 3. Each neuron's spectrum is the sum over channels of theirs times the weights', conjugate and divided by N^2
    [`spectrum`].
-4. Two neurons are one complex image a + i b: transform it back [`sums`].
+4. Two neurons are one complex image a + i b: transform it back.
 
-`transform` is written once, for numbers, arrays, and the names of a kernel's variables [emit_fourier.py]:
+`transform` is written once, for numbers, arrays, and the names of a kernel's variables [fft.py]:
 the split-radix algorithm with conjugate pairs of twiddle factors (I. Kamar and Y. Elcherif, Conjugate pair
 fast Fourier transform, Electronics Letters 25(5), 1989).
 
@@ -87,61 +87,11 @@ def _turned(z: Complex, k: int, n: int) -> Complex:
     return (a * c - b * s, a * s + b * c)
 
 
-def both_ways(image: Complex, sign: int) -> Complex:
-    """Return the transform (N, N) of an image (N, N) along rows, then along columns."""
-    real, imaginary = image
-    for _ in range(2):  # along the second axis, which then becomes the first
-        columns = transform(list(zip(real.T, imaginary.T, strict=True)), sign)
-        real, imaginary = (np.stack([number[part] for number in columns]) for part in (0, 1))
-    return real, imaginary
-
-
-def unpack(z: Complex) -> tuple[Complex, Complex]:
-    """Return twice the spectra (N, N) of p and of q from that of p + i q."""
-    (a, b), (c, d) = z, (_mirrored(part) for part in z)
-    return (a + c, b - d), (b + d, c - a)
-
-
-def _mirrored(spectrum: NDArray[Any]) -> NDArray[Any]:
-    """Return spectrum(-f)."""
-    found: NDArray[Any] = np.roll(spectrum[::-1, ::-1], 1, axis=(0, 1))
-    return found
-
-
 def spectrum(matrix: Array, size: int, points: int) -> NDArray[np.complex128]:
     """Return conj(DFT(w)) / 2 N^2 (D_out, N, N, C) of a matrix (D_out, size * size * C)."""
     taps = matrix.reshape(len(matrix), size, size, -1)
     found: NDArray[np.complex128] = np.conj(np.fft.fft2(taps, (points, points), axes=(1, 2)))
     return found / (2 * points**2)
-
-
-def sums(tile: NDArray[Any], matrix: Array, size: int) -> NDArray[Any]:
-    """Return W x (out, out, D_out) for the windows of a tile (N, N, C), in the tile's arithmetic."""
-    points, dtype = len(tile), tile.dtype
-    weights = spectrum(matrix, size, points)
-    tile = np.concatenate([tile, np.zeros((points, points, tile.shape[2] % 2), dtype)], axis=2)
-    half = tile.shape[2] // 2
-    pairs = [unpack(both_ways((tile[..., j], tile[..., j + half]), -1)) for j in range(half)]
-    channels = [first for first, _ in pairs] + [second for _, second in pairs]
-    neurons = []
-    nothing = np.zeros((points, points), dtype)
-    for n in range(len(matrix)):
-        whole = nothing, nothing
-        for block in spectra.blocks_of(weights.shape[3], block_of(half)):
-            real = imaginary = nothing
-            for channel in block:
-                (a, b), w = channels[channel], weights[n, :, :, channel]
-                g, h = w.real.astype(dtype), w.imag.astype(dtype)
-                real, imaginary = real + a * g - b * h, imaginary + a * h + b * g
-            whole = whole[0] + real, whole[1] + imaginary
-        neurons.append(whole)
-    out, found = points - size + 1, np.zeros((points, points, 2 * len(matrix)), dtype)
-    gap = -(-len(matrix) // 2)
-    neurons += [(np.zeros_like(neurons[0][0]),) * 2] * gap
-    for n in range(gap):
-        (a, b), (c, d) = neurons[n], neurons[n + gap]
-        found[..., n], found[..., n + gap] = both_ways((a - d, b + c), 1)
-    return found[:out, :out, : len(matrix)]
 
 
 # ---- what a kernel holds ---------------------------------------------------------------------------------

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
-from ..core.ir import Node
+from ..core.ir import Image, Node
 from ..core.sums import is_split
 from ..kernel import kernel as tree
 from ..kernel.kernel import const, load, name
 from .common import Nest, X, Y, loop, output, weight
+
+J = name("j")
 
 
 class Plainly(Nest):
@@ -28,7 +31,7 @@ class Plainly(Nest):
         body += self.outputs()
         return self.kernel(body, constants, weights=self.weights)
 
-    weights = tree.Type()
+    weights, zero = tree.Type(), const(0.0)
 
     def outputs(self) -> tree.Body:
         """Return the statements that write the output."""
@@ -90,50 +93,68 @@ class Plainly(Nest):
 
     def materialised(self, index: int) -> list[tree.Statement]:
         """Return the copy of the window into an array."""
-        copy = self.over_window(lambda tap: [tree.Store(f"v{index}", (tap,), name("value", tree.Type()))])
+
+        def copied(tap: tree.Expr) -> tree.Statement:
+            """Return the copy of a value."""
+            return tree.Store(f"v{index}", (tap,), name("value", tree.Type()))
+
+        copy = self.over_window(partial(self.each_channel, copied))
         return [tree.Comment(f"%{index}: the window"), self.array(index), *copy]
+
+    # ---- affine maps -------------------------------------------------------------------------------------
 
     def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x + b, x being the images around the pixel or an array."""
-        n_out, j, v = node.type.shape[0], name("j"), f"v{index}"
-        first, bias, source = self.offset(node["weight"]), node.get("bias"), self.program.nodes[node.args[0]]
-        start = weight(self.offset(bias) + j) if bias else const(0.0)
-        starts = loop("j", n_out, tree.Store(v, (j,), start))
-        sums = replace(self.array(index), kept=source.op == "input")
-        found: list[tree.Statement] = [self.mapped(index, node), sums, starts]
-
-        def accumulated(sums: str, row: tree.Expr) -> tree.Statement:
-            """Return the loop that adds `value` times one row of weights to all neurons' sums."""
-            product = weight(first + row * n_out + j) * name("value", tree.Type())
-            return loop("j", n_out, tree.Store(sums, (j,), product, add=True))
-
-        if source.op != "input":
-            i = name("i")
-            value = tree.Let("value", self.read(node.args[0], i))
-            return [*found, loop("i", source.type.shape[0], value, accumulated(v, i))]
+        v, part, source, bias = f"v{index}", f"part{index}", node.args[0], node.get("bias")
+        windowed = self.program.nodes[source].op == "input"
+        start = weight(self.offset(bias) // self.lanes + J, self.weights) if bias else self.zero
+        sums = replace(self.array(index), kept=windowed)
+        found = [self.mapped(index, node), sums, self.each(index, tree.Store(v, (J,), start))]
+        first = self.offset(node["weight"]) // self.lanes
+        if not windowed:
+            return [*found, *self.of_layer(index, first, source)]
         if not is_split(self.gather):
-            return [*found, *self.over_window(lambda tap: [accumulated(v, tap)])]
-        part = f"part{index}"
-        zero = loop("j", n_out, tree.Store(part, (j,), const(0.0)))
-        add = loop("j", n_out, tree.Store(v, (j,), load(part, j), add=True))
-        found.append(tree.Array(part, tree.Type(), (n_out,), kept=True))
-        return [*found, *self.over_window(lambda tap: [accumulated(part, tap)], (zero,), (add,))]
+            return [*found, *self.over_window(partial(self.channels, index, first, v))]
+        zero = self.each(index, tree.Store(part, (J,), self.zero))
+        add = self.each(index, tree.Store(v, (J,), load(part, J, kind=self.weights), add=True))
+        found.append(tree.Array(part, self.weights, (self.count(index),), kept=True))
+        return [*found, *self.over_window(partial(self.channels, index, first, part), zero, add)]
+
+    def each(self, index: int, *body: tree.Statement) -> tree.Statement:
+        """Return the loop over the elements of a value's array."""
+        return loop("j", self.count(index), *body)
+
+    def accumulated(self, index: int, first: int, sums: str, row: tree.Expr) -> tree.Statement:
+        """Return the loop that adds `value` times one row of weights to all neurons' sums."""
+        product = weight(first + row * self.count(index) + J) * name("value", tree.Type())
+        return self.each(index, tree.Store(sums, (J,), product, add=True))
+
+    def of_layer(self, index: int, first: int, source: int) -> list[tree.Statement]:
+        """Return the products of a layer's values."""
+        i = name("i")
+        added = self.accumulated(index, first, f"v{index}", i)
+        return [loop("i", self.count(source), tree.Let("value", self.read(source, i)), added)]
+
+    def channels(self, index: int, first: int, sums: str, image: Image, at: int) -> list[tree.Statement]:
+        """Return the products of a tap's channels of an image."""
+        return self.each_channel(partial(self.accumulated, index, first, sums), image, at)
+
+    def each_channel(
+        self, body: Callable[[tree.Expr], tree.Statement], image: Image, at: int
+    ) -> list[tree.Statement]:
+        """Return the loop over the channels of a tap; `body` takes the index into the window."""
+        c = name("c")
+        inner = body(name("tap") + at + c)
+        return [loop("c", image.channels, tree.Let("value", self.pixel(image, c)), inner)]
 
     def over_window(
-        self, body: Callable[[tree.Expr], list[tree.Statement]], before: tree.Body = (), after: tree.Body = ()
+        self, channels: Callable[[Image, int], list[tree.Statement]], *around: tree.Statement
     ) -> list[tree.Statement]:
-        """Return the loops over images, rows of taps, taps and channels that set `value`.
-
-        `body` takes the index into the window; `before` and `after` surround an image's row of taps.
-        """
+        """Return the loops over images, rows of taps and taps; `around` is before and after a row of taps."""
         found: list[tree.Statement] = []
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
-            channels = []
-            for image, first in group:
-                c = name("c")
-                inner = body(name("tap") + first + c)
-                channels.append(loop("c", image.channels, tree.Let("value", self.pixel(image, c)), *inner))
-            row = loop("dx", self.columns, *self.tap_column(), tree.Let("tap", tap), *channels)
-            found.append(loop("dy", self.rows, self.tap_row(), *before, row, *after))
+            inner = [line for image, at in group for line in channels(image, at)]
+            row = loop("dx", self.columns, *self.tap_column(), tree.Let("tap", tap), *inner)
+            found.append(loop("dy", self.rows, self.tap_row(), *around[:1], row, *around[1:]))
         return found

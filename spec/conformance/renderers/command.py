@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from wamnet.cli.common import options
+from wamnet.cli.common.options import ExecutorName, option
 from wamnet.cli.common.terminal import progress, say, table
 from wamnet.cli.files.outputs import check_new_folder, check_output, making_folder, write_text
 from wamnet.refimpl.errors import InputError
@@ -25,82 +26,38 @@ COMMANDS = {"verify-renderer": "verify_renderer"}
 STATUS_DEVIATES = 1
 """Exit status when a rule is broken."""
 
-Name = Annotated[
-    str | None,
-    typer.Option(
-        "--renderer",
-        metavar="NAME",
-        help="A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, cycles-gltf, "
-        "luxcore or povray.",
-    ),
-]
-Command = Annotated[
-    str | None,
-    typer.Option(
-        "--command",
-        metavar="CMD",
-        help="In its place any program: a command with {scene}, {output} or {outputs}; no shell reads it. "
-        "Further {seed}, {width}, {height}, {samples}, {depth}.",
-    ),
-]
-Form = Annotated[
-    str | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Form of the scene files: wamnet, mitsuba, blender, povray, luxcore, gltf or three.",
-    ),
-]
-Words = Annotated[
-    list[str] | None,
-    typer.Option(
-        "-k",
-        metavar="WORD",
-        help="Only cases whose name holds this word, or whose rule it is; repeat for more.",
-        show_default="all",
-    ),
-]
-Profiles = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--profile",
-        metavar="NAME",
-        help="A deviation by intent, such as clamps or no-caustics; repeat for more.",
-        show_default="none",
-    ),
-]
-Pictures = Annotated[
-    int, typer.Option("--pictures", metavar="N", help="Pictures of each case, by other seeds.")
-]
-Timeout = Annotated[float, typer.Option("--timeout", help="Longest time for a command, in seconds.")]
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write a report as JSON.")]
-Markdown = Annotated[
-    Path | None, typer.Option("--markdown", metavar="FILE", help="Write a report as Markdown.")
-]
-Write = Annotated[
-    Path | None,
-    typer.Option(
-        "--write", metavar="FOLDER", help="Write the scene files of a format with their answers, and end."
-    ),
-]
+
+@dataclass(frozen=True)
+class Request:
+    """Who is asked, what, and where the answer goes."""
+
+    renderer: str | None = option(
+        "NAME  A renderer that wamnet knows: wamnet, mitsuba, cycles, cycles-as-it-comes, cycles-gltf, "
+        "luxcore or povray."
+    )
+    command: str | None = option(
+        "CMD  In its place any program: a command with {scene}, {output} or {outputs}; no shell reads it. "
+        "Further {seed}, {width}, {height}, {samples}, {depth}."
+    )
+    form: str | None = option(
+        "--format NAME  Form of the scene files: wamnet, mitsuba, blender, povray, luxcore, gltf or three."
+    )
+    words: list[str] | None = option(
+        "-k WORD  Only cases whose name holds this word, or whose rule it is; repeat for more. [default: all]"
+    )
+    profile: list[str] | None = option(
+        "NAME  A deviation by intent, such as clamps or no-caustics; repeat for more. [default: none]"
+    )
+    pictures: int = option("N  Pictures of each case, by other seeds.", 8)
+    seed: int = option("seed", 0)
+    executor: ExecutorName = option("What traces the paths of --renderer wamnet.", ExecutorName.numpy)
+    timeout: float = option("Longest time for a command, in seconds.", 300.0)
+    as_json: Path | None = option("--json FILE  Write a report as JSON.")
+    markdown: Path | None = option("FILE  Write a report as Markdown.")
+    write: Path | None = option("FOLDER  Write the scene files of a format with their answers, and end.")
 
 
-def verify_renderer(
-    renderer: Name = None,
-    command: Command = None,
-    form: Form = None,
-    words: Words = None,
-    profile: Profiles = None,
-    pictures: Pictures = 8,
-    seed: int = options.option("seed", 0),
-    executor: Annotated[
-        options.ExecutorName, typer.Option("--executor", help="What traces the paths of --renderer wamnet.")
-    ] = options.ExecutorName.numpy,
-    timeout: Timeout = 300.0,
-    as_json: Json = None,
-    markdown: Markdown = None,
-    write: Write = None,
-) -> None:
+def verify_renderer(*, request: Request) -> None:
     """Ask any renderer to render scenes whose answers are known, and say which rule it breaks.
 
     Each case is rendered several times with other seeds; a t-test with Holm's correction for the number of
@@ -116,32 +73,28 @@ def verify_renderer(
     from . import report, run
     from .cases import PROFILES, chosen
 
-    questions = chosen(words or ())
-    if write is not None:
-        if renderer is not None or command is not None:
+    questions, profiles = chosen(request.words or ()), request.profile or []
+    if request.write is not None:
+        if request.renderer is not None or request.command is not None:
             rule = "it writes scenes and asks nobody"
-            raise InputError("--write", str(write), rule, "leave --renderer and --command out")
-        _write_scenes(write, _known_form(form), questions)
+            raise InputError("--write", str(request.write), rule, "leave --renderer and --command out")
+        _write_scenes(request.write, _known_form(request.form), questions)
         return
-    profiles = list(profile or ())
     for name in profiles:
         if name not in PROFILES:
             raise InputError("--profile", name, "it is unknown", f"known are {', '.join(PROFILES)}")
-    _check_numbers(pictures, seed, timeout)
-    for path in (as_json, markdown):
+    _check_numbers(request)
+    for path in (request.as_json, request.markdown):
         if path is not None:
             check_output(path)
-    asked = _renderer(renderer, command, form, executor.value, timeout)
-    shots = run.shots_of(questions)
-    with progress(f"asking {asked.name}", len(shots)) as advance:
-        verdicts = run.verify(
-            asked, questions, pictures=pictures, seed=seed, profiles=profiles, advance=advance
-        )
-    about = {"pictures": pictures, "seed": seed, "profiles": [*profiles, *asked.intents]}
-    if as_json is not None:
-        write_text(as_json, report.to_json(asked.name, verdicts, about))
-    if markdown is not None:
-        write_text(markdown, report.to_markdown(asked.name, verdicts))
+    asked, numbers = _renderer(request), {"pictures": request.pictures, "seed": request.seed}
+    with progress(f"asking {asked.name}", len(run.shots_of(questions))) as advance:
+        verdicts = run.verify(asked, questions, profiles=profiles, advance=advance, **numbers)
+    if request.as_json is not None:
+        about = {**numbers, "profiles": [*profiles, *asked.intents]}
+        write_text(request.as_json, report.to_json(asked.name, verdicts, about))
+    if request.markdown is not None:
+        write_text(request.markdown, report.to_markdown(asked.name, verdicts))
     _print(asked.name, verdicts)
     if any(verdict.deviates for verdict in verdicts):
         raise typer.Exit(STATUS_DEVIATES)
@@ -157,36 +110,35 @@ def _known_form(form: str | None) -> str:
     return form
 
 
-def _check_numbers(pictures: int, seed: int, timeout: float) -> None:
+def _check_numbers(request: Request) -> None:
     """Refuse numbers that cannot be used."""
     from .run import LARGEST_SEED, LEAST_PICTURES
 
-    if not LEAST_PICTURES <= pictures <= 1000:
+    if not LEAST_PICTURES <= request.pictures <= 1000:
         rule = f"their spread is the error of their mean: {LEAST_PICTURES} at least, and at most 1000"
-        raise InputError("--pictures", pictures, rule, "8 are usual")
-    if not 0 <= seed <= LARGEST_SEED:
-        raise InputError("--seed", seed, f"it must lie in [0, {LARGEST_SEED}]", "use a smaller one")
-    if not 0.0 < timeout < math.inf:
-        raise InputError("--timeout", timeout, "it must be a positive number of seconds", "300 is usual")
+        raise InputError("--pictures", request.pictures, rule, "8 are usual")
+    if not 0 <= request.seed <= LARGEST_SEED:
+        raise InputError("--seed", request.seed, f"it must lie in [0, {LARGEST_SEED}]", "use a smaller one")
+    if not 0.0 < request.timeout < math.inf:
+        rule = "it must be a positive number of seconds"
+        raise InputError("--timeout", request.timeout, rule, "300 is usual")
 
 
-def _renderer(
-    name: str | None, command: str | None, form: str | None, executor: str, timeout: float
-) -> Renderer:
+def _renderer(request: Request) -> Renderer:
     """Return who is asked, or refuse what does not say it."""
     from .renderers import ByCommand, command_words, known
 
-    if (name is None) == (command is None):
-        value = "neither given" if name is None else "both given"
-        raise InputError(
-            "--renderer, --command", value, "exactly one says who is asked", "for example --renderer wamnet"
-        )
-    if name is not None:
+    name, command, form, limit_s = request.renderer, request.command, request.form, request.timeout
+    if name is not None and command is None:
         if form is not None:
             raise InputError("--format", form, "a known renderer has its own", "leave it out")
-        return known(name, executor, read_layers, timeout)
-    assert command is not None
-    return ByCommand(command, _known_form(form), command_words(command), read_layers, limit_s=timeout)
+        return known(name, request.executor.value, read_layers, limit_s)
+    if name is None and command is not None:
+        return ByCommand(command, _known_form(form), command_words(command), read_layers, limit_s=limit_s)
+    value = "neither given" if name is None else "both given"
+    raise InputError(
+        "--renderer, --command", value, "exactly one says who is asked", "for example --renderer wamnet"
+    )
 
 
 def read_layers(path: Path) -> Mapping[str, Any]:

@@ -138,7 +138,11 @@ def validate(frame: Frame, finite: bool = True) -> None:
         raise InputError("frame", NO_VALUE, "has no layers", _known())
     for name, values in frame.layers.items():
         _check_form(name, values)
-    _check_sizes(frame.layers)
+    sizes = {name: values.shape[:2] for name, values in frame.layers.items()}
+    if len(set(sizes.values())) > 1:
+        text = ", ".join(f"{name} {width}x{height}" for name, (height, width) in sizes.items())
+        rule = "all layers must have the same size"
+        raise InputError("sizes of the layers", text, rule, "render them in one run")
     for name, values in frame.layers.items() if finite else ():
         check_finite(f"layer {name!r}", values)
 
@@ -174,16 +178,6 @@ def _check_form(name: str, values: Floats) -> None:
     if values.ndim != 3 or values.shape[-1] != channels or values.size == 0:
         rule = f"must be (height, width, {channels}) with at least one pixel"
         raise InputError(f"shape of layer {name!r}", values.shape, rule, "reshape or render it again")
-
-
-def _check_sizes(layers: Mapping[str, Floats]) -> None:
-    """Refuse layers of different height or width."""
-    sizes = {name: values.shape[:2] for name, values in layers.items()}
-    if len(set(sizes.values())) > 1:
-        text = ", ".join(f"{name} {width}x{height}" for name, (height, width) in sizes.items())
-        raise InputError(
-            "sizes of the layers", text, "all layers must have the same size", "render them in one run"
-        )
 
 
 def _known() -> str:

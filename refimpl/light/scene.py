@@ -128,15 +128,13 @@ def _plain(value: Any) -> Any:
     """Turn dataclasses and tuples into dictionaries and lists, and every number into a float."""
     if is_dataclass(value):
         kind = {"kind": value.kind} if isinstance(value, Material) else {}
-        return {**kind, **{f.name: _plain(getattr(value, f.name)) for f in fields(value) if _told(f, value)}}
+        parts = ((f, getattr(value, f.name)) for f in fields(value))
+        # [`OMITTED`] fields are in the text only where they differ from their default.
+        named = {f.name: _plain(each) for f, each in parts if not (f.metadata and each == f.default)}
+        return {**kind, **named}
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     return float(value) if isinstance(value, int) else value
-
-
-def _told(f: Any, value: Any) -> bool:
-    """Tell whether the text mentions a field: [`OMITTED`] ones only where they differ from their default."""
-    return not (f.metadata and getattr(value, f.name) == f.default)
 
 
 # -----------------------------------------------------------------------------------------------------------

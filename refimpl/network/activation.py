@@ -50,26 +50,6 @@ class Activation:
     omegas: tuple[float, float] | None = None
 
 
-def _sine_weight_bound(layer: int, n_in: int, omega_0: float) -> float:
-    """Return 1 / D_in in layer 0, else sqrt(6 / D_in) / omega_0: the ranges of the source."""
-    return 1.0 / n_in if layer == 0 else math.sqrt(6.0 / n_in) / omega_0
-
-
-def _he_weight_bound(layer: int, n_in: int, omega_0: float) -> float:
-    """Return sqrt(6 / D_in) / omega_0: uniform numbers with the source's variance 2 / D_in."""
-    return math.sqrt(6.0 / n_in) / omega_0
-
-
-def _rectified(a: Any) -> Any:
-    """Return a where it is positive, else 0."""
-    return np.maximum(a, 0.0)
-
-
-def _step(a: Array) -> Array:
-    """Return 1 where a is positive, else 0: at 0, where there is no derivative, 0."""
-    return (a > 0.0).astype(a.dtype)
-
-
 ACTIVATIONS: Mapping[str, Activation] = {
     row.name: row
     for row in (
@@ -79,16 +59,21 @@ ACTIVATIONS: Mapping[str, Activation] = {
             derivative=np.cos,
             values=(-1.0, 1.0),
             slope=1.0,
-            weight_bound=_sine_weight_bound,
+            # The ranges of the source.
+            weight_bound=lambda layer, n_in, omega: (
+                1.0 / n_in if layer == 0 else math.sqrt(6.0 / n_in) / omega
+            ),
             biases=lambda u, n_in: u / math.sqrt(n_in),
         ),
         Activation(
             RELU,
-            forward=_rectified,
-            derivative=_step,
+            forward=lambda a: np.maximum(a, 0.0),
+            # At 0, where there is no derivative, 0.
+            derivative=lambda a: (a > 0.0).astype(a.dtype),
             values=(0.0, math.inf),
             slope=1.0,
-            weight_bound=_he_weight_bound,
+            # Uniform numbers with the source's variance 2 / D_in.
+            weight_bound=lambda layer, n_in, omega: math.sqrt(6.0 / n_in) / omega,
             biases=lambda u, n_in: np.zeros_like(u),
             omegas=(1.0, 1.0),
         ),

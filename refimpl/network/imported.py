@@ -59,26 +59,6 @@ class Step:
     numbers: tuple[float, ...]
 
 
-def _sine(x: Any, scale: float) -> Any:
-    """Return sin(scale x) (...)."""
-    return np.sin(x if scale == 1.0 else scale * x)
-
-
-def _relu(x: Any, floor: float) -> Any:
-    """Return the larger of x (...) and the floor."""
-    return np.maximum(x, floor)
-
-
-def _leaky(x: Any, slope: float) -> Any:
-    """Return x (...) where it is positive, else slope x."""
-    return np.maximum(x, slope * x)
-
-
-def _clip(x: Any, low: float, high: float) -> Any:
-    """Return x (...) between both ends."""
-    return np.minimum(np.maximum(x, low), high)
-
-
 @dataclass(frozen=True)
 class StepKind:
     """A row: the function of sums (...) and of `names`; `holds` says which numbers it takes, as `rule`."""
@@ -90,10 +70,25 @@ class StepKind:
 
 
 STEPS: Mapping[str, StepKind] = {
-    "sine": StepKind(("scale",), _sine, "a scale other than 0", lambda scale: scale != 0.0),
-    "relu": StepKind(("floor",), _relu, "a floor"),
-    "leaky": StepKind(("slope",), _leaky, "a slope in [0, 1]", lambda slope: 0.0 <= slope <= 1.0),
-    "clip": StepKind(("low", "high"), _clip, "low at most high", lambda low, high: low <= high),
+    "sine": StepKind(
+        ("scale",),
+        lambda x, scale: np.sin(x if scale == 1.0 else scale * x),
+        "a scale other than 0",
+        lambda scale: scale != 0.0,
+    ),
+    "relu": StepKind(("floor",), np.maximum, "a floor"),
+    "leaky": StepKind(
+        ("slope",),
+        lambda x, slope: np.maximum(x, slope * x),
+        "a slope in [0, 1]",
+        lambda slope: 0.0 <= slope <= 1.0,
+    ),
+    "clip": StepKind(
+        ("low", "high"),
+        lambda x, low, high: np.minimum(np.maximum(x, low), high),
+        "low at most high",
+        lambda low, high: low <= high,
+    ),
 }
 """All steps, by name; each function may be traced."""
 

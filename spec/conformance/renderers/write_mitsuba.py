@@ -12,6 +12,8 @@ Source: Mitsuba 3's documentation of plugins, https://mitsuba.readthedocs.io.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from wamnet.refimpl.light.scene import Camera
@@ -100,7 +102,9 @@ def _matrix(columns: Array) -> str:
 
 def _look(look: Look, closed: bool) -> list[str]:
     """Return material and emitter of a shape."""
-    bsdf = _BSDFS[look.kind](look)
+    kind, lines, tinted = _BSDFS[look.kind]
+    numbers = (line.format(repr(look.number)) for line in lines)
+    bsdf = [f'<bsdf type="{kind}">', *numbers, *(_rgb(name, look.reflectance) for name in tinted), "</bsdf>"]
     if not closed and not look.emits:
         bsdf = ['<bsdf type="twosided">', *bsdf, "</bsdf>"]
     if look.emits:
@@ -108,39 +112,24 @@ def _look(look: Look, closed: bool) -> list[str]:
     return bsdf
 
 
-def _matte(look: Look) -> list[str]:
-    return ['<bsdf type="diffuse">', _rgb("reflectance", look.reflectance), "</bsdf>"]
-
-
-def _mirror(look: Look) -> list[str]:
-    return ['<bsdf type="conductor">', _NO_METAL, _rgb("specular_reflectance", look.reflectance), "</bsdf>"]
-
-
-def _metal(look: Look) -> list[str]:
-    return [
-        '<bsdf type="roughconductor">',
-        _NO_METAL,
-        '<string name="distribution" value="ggx"/>',
-        f'<float name="alpha" value="{look.number!r}"/>',
-        _rgb("specular_reflectance", look.reflectance),
-        "</bsdf>",
-    ]
-
-
-def _glass(look: Look) -> list[str]:
-    tints = [_rgb(f"specular_{way}", look.reflectance) for way in ("reflectance", "transmittance")]
-    indices = [
-        f'<float name="int_ior" value="{look.number!r}"/>',
-        '<float name="ext_ior" value="1.0"/>',
-    ]
-    return ['<bsdf type="dielectric">', *indices, *tints, "</bsdf>"]
-
-
 _NO_METAL = '<string name="material" value="none"/>'
 """A conductor that reflects everything."""
 
-_BSDFS = {MATTE: _matte, MIRROR: _mirror, METAL: _metal, GLASS: _glass}
-"""How each kind of surface is said."""
+_BSDFS: Mapping[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    MATTE: ("diffuse", (), ("reflectance",)),
+    MIRROR: ("conductor", (_NO_METAL,), ("specular_reflectance",)),
+    METAL: (
+        "roughconductor",
+        (_NO_METAL, '<string name="distribution" value="ggx"/>', '<float name="alpha" value="{}"/>'),
+        ("specular_reflectance",),
+    ),
+    GLASS: (
+        "dielectric",
+        ('<float name="int_ior" value="{}"/>', '<float name="ext_ior" value="1.0"/>'),
+        ("specular_reflectance", "specular_transmittance"),
+    ),
+}
+"""How each kind of surface is said: its name, lines with the material's number, and what has its colour."""
 
 
 def _rgb(name: str, color: tuple[float, ...]) -> str:

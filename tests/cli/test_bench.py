@@ -1,4 +1,4 @@
-"""Tests of `wamnet bench`: its files, its refusals, an interrupt, and the report's section."""
+"""Tests of `wamnet bench`: its files, its refusals, an interrupt, its table and its plots."""
 
 import json
 import re

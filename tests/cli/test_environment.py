@@ -1,4 +1,4 @@
-"""The command on machines that take things away: a home, a name, writable folders, programs in folders."""
+"""The command on machines that take things away: a home, a name, writable folders."""
 
 import os
 import shutil

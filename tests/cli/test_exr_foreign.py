@@ -1,4 +1,4 @@
-"""Tests of OpenEXR files as other programs write them: parts, views, attributes, text, damage."""
+"""Tests of OpenEXR files as other programs write them: parts, views, attributes, text."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Transforms, sums from spectra, and their bound: against numpy.fft, direct sums, and planted faults."""
+"""Transforms, sums from spectra, and their bound: against numpy.fft and direct sums."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The second implementation, examples/c99/wamnet.c: it needs nothing, passes all, and survives nonsense.
+"""The second implementation, examples/c99/wamnet.c: it needs nothing, and passes all.
 
 Of its mutants (examples/c99/mutants.txt) every third is asked here; `python examples/c99/mutants.py` asks
 all of them.

@@ -1,4 +1,4 @@
-"""How the site looks and works: live page, captions, no cut text, access in two themes, print."""
+"""How the site looks and works: live page, no cut text, access in two themes."""
 
 import figures
 import pytest

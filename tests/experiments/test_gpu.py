@@ -1,4 +1,4 @@
-"""Denoising kernels on a GPU: the rehearsal on PoCL, wrong and missing kernels, and a time limit."""
+"""Denoising kernels on a GPU: the rehearsal on PoCL, missing kernels, and a time limit."""
 
 from __future__ import annotations
 

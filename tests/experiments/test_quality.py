@@ -1,4 +1,4 @@
-"""The comparison of quality: what its rows are given, the whole way at toy size, and the models it makes."""
+"""The comparison of quality: all of it at toy size, and the models it makes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table 1 and the claims, tiny: every row runs, nothing is done twice, and what is missing is said."""
+"""Table 1 and the claims, tiny: every row runs, and nothing is done twice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""First layers in two passes, on every executor that has them: borders, sizes, ranks, schedules, faults."""
+"""First layers in two passes, on every executor that has them: borders, sizes, ranks, schedules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every schedule against the float64 reference: shapes, sizes, borders, work groups, and planted faults."""
+"""Every schedule against the float64 reference: shapes, sizes, borders, work groups."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Products of bytes on graphics processors (WHO-12): stand-ins for what compilers lack, and faults."""
+"""Products of bytes on graphics processors (WHO-12): stand-ins for what compilers lack."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""GLSL ES 3.00 (EXP-1, EXP-2): what the language asks for, results against reference, bound and paths."""
+"""GLSL ES 3.00 (EXP-1, EXP-2): what the language asks for, and the bound of its schedules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes as triangles, for formats that have nothing else: every part of every shot, and planted faults."""
+"""Scenes as triangles, for formats that have nothing else: every part of every shot."""
 
 from __future__ import annotations
 

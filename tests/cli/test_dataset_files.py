@@ -1,6 +1,7 @@
 """Tests of a data set's folder: every place where a run can end, damage, other requests, other folders."""
 
 import contextlib
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -152,6 +153,16 @@ def test_damage_is_found_and_mended(tmp_path, whole) -> None:
     (band,) = (tmp_path / files.UNFINISHED).glob("*.exr")
     band.write_bytes(b"damaged")
     assert make(tmp_path) == (9, [])
+    assert content(tmp_path) == whole
+
+
+def test_other_bytes_are_told(tmp_path, whole) -> None:
+    """What another machine had made is made again here, and named."""
+    make(tmp_path)
+    manifest = json.loads((tmp_path / files.MANIFEST).read_text())
+    manifest["frames"][0]["noisy"]["sha256"] = "0" * 64
+    (tmp_path / files.MANIFEST).write_text(json.dumps(manifest))
+    assert make(tmp_path) == (3, ["train/00000-noisy.exr"])
     assert content(tmp_path) == whole
 
 

@@ -132,6 +132,11 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
     assert "steps 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
 
 
+def test_no_features_are_refused(refused, pair) -> None:
+    """An empty list is not the preset's."""
+    assert "at least one, each once" in refused("train", *pair[:4], "--features", "")
+
+
 def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:
     """With the checkpoint's name, if there is one."""
 

@@ -71,6 +71,7 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
         ("[(y * width + x) * 3 + i] =", "[(y * width + x) * 3 + i * 2 % 3] =", "not the program's"),
         ("i < 3; ++i) {\n        result", "i < 2; ++i) {\n        result", "without a result"),
         ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
+        ("* 3 + c]", "* 2 + c]", "two numbers of channels"),
     ],
 )
 def test_faults_are_named(plain, old, new, why):

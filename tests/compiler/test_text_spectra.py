@@ -145,6 +145,11 @@ def test_the_loops_of_a_host_are_read(c):
             run_text(*changed(c, old, new))
 
 
+def test_work_items_are_those_of_the_manifest(opencl):
+    with pytest.raises(Refused, match="its work items are of"):
+        run_text(*changed(opencl, "(int)get_global_id(1) * OUT", "(int)get_global_id(1) * POINTS"))
+
+
 def test_products_in_another_order_are_refused(opencl):
     """The bound is one of partial sums in this order."""
     source, *others = opencl

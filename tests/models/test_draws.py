@@ -51,6 +51,17 @@ def test_times_are_even_and_go_on() -> None:
     assert draws.times(0, 2.0, 8.0, 60, 4) == draws.times(0, 2.0, 8.0, 0, 64)[60:]
 
 
+def test_dimensions_are_independent() -> None:
+    """Spearman's rank correlation of any two of the eight numbers over 512 frames; 28 pairs, level 1 %.
+
+    Sidak: each pair is tested at 1 - 0.99^(1/28).
+    """
+    table = np.array([numbers(d) for d in draws.drawn(11, RANGES, CUBES.lights, 0, 512)]).T
+    level = 1.0 - 0.99 ** (1 / 28)
+    for one, other in itertools.combinations(table, 2):
+        assert stats.spearmanr(one, other).pvalue >= level
+
+
 def test_numbers_fill_their_ranges() -> None:
     """Kolmogorov's test of yaw, pitch, distance and saturation against uniform; 4 tests, level 1 %."""
     found = draws.drawn(5, RANGES, CUBES.lights, 0, 512)

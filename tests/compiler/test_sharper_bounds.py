@@ -96,6 +96,16 @@ def test_many_terms_count_as_large_as_their_sum():
     assert (large <= sums.gamma(66) * (np.abs(x) @ np.abs(weight).T)).all()
 
 
+def test_a_bias_and_two_partial_sums_are_two_additions():
+    """1 + u + u, a little less each: both additions round down to 1."""
+    almost = np.float32(0.999 * U)
+    x, count = np.full((1, 2), almost, np.float64), sums.MOST_SORTED
+    off = 2 * float(almost) - float(np.float32(1) + almost + almost - np.float32(1))
+    bound = sums.rounding(np.ones((count, 2)), np.ones(count), x, x, [np.array([0]), np.array([1])])
+    assert 1.9 * U < off
+    assert (bound >= off).all()
+
+
 def network(seed, widths, omega_0, scale, activation="sine"):
     found = siren.init(widths, omega_0, omega_0, seed, activation=activation)
     weights = tuple((w * np.float32(scale)).astype(np.float32) for w in found.weights)

@@ -24,6 +24,7 @@ WEIGHTS_A_TEXEL = "weights_a_texel"
 """Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""
 
 COUNTER = name("i")
+"""The loop variable of copies."""
 
 
 def packed_weights(program: Program) -> Mapping[str, NDArray[np.float32]]:

@@ -17,6 +17,7 @@ from ..kernel.kernel import const, load, name
 from .common import Nest, X, Y, loop, output, weight
 
 J = name("j")
+"""The loop variable of outputs."""
 
 
 class Plainly(Nest):
@@ -109,7 +110,8 @@ class Plainly(Nest):
         windowed = self.program.nodes[source].op == "input"
         start = weight(self.offset(bias) // self.lanes + J, self.weights) if bias else self.zero
         sums = replace(self.array(index), kept=windowed)
-        found = [self.mapped(index, node), sums, self.each(index, tree.Store(v, (J,), start))]
+        filled = self.each(index, tree.Store(v, (J,), start))
+        found: list[tree.Statement] = [self.mapped(index, node), sums, filled]
         first = self.offset(node["weight"]) // self.lanes
         if not windowed:
             return [*found, *self.of_layer(index, first, source)]

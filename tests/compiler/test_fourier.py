@@ -137,6 +137,7 @@ def drawn(points, size, channels, neurons, seed):
     seed=st.integers(0, 2**32 - 1),
 )
 def test_sums_from_spectra_are_the_direct_ones(points, size, channels, neurons, seed) -> None:
+    """FOU-2, FOU-4: channels and neurons go by pairs, also where their number is odd."""
     tile, matrix = drawn(points, size, channels, neurons, seed)
     wanted = direct(tile, matrix, size)
     # In float64: some hundreds of u of the norms.

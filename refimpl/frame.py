@@ -95,6 +95,9 @@ SUN = "sun"
 DIRECT = "direct"
 """The layer of the lamps' light with shadows (light/transport.py: direct), which a frame has on request."""
 
+REMEDIES = {DIRECT: "render it: --shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it"}
+"""What helps where a frame lacks a layer, if it is not as usual."""
+
 USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN, DIRECT))
 """The layers that any rendered frame has."""
 
@@ -109,9 +112,8 @@ class Frame:
     def __getitem__(self, name: str) -> Floats:
         """Return the layer `name` (H, W, C), or say which layers there are."""
         if name not in self.layers:
-            raise InputError(
-                "layers of the frame", ", ".join(self.layers), f"layer {name!r} is missing", "render it"
-            )
+            rule, remedy = f"layer {name!r} is missing", REMEDIES.get(name, "render it")
+            raise InputError("layers of the frame", ", ".join(self.layers), rule, remedy)
         return self.layers[name]
 
     def __contains__(self, name: object) -> bool:

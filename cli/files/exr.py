@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import Floats, Frame, validate
+from ...refimpl.frame import REMEDIES, Floats, Frame, validate
 from ...refimpl.network.dataset import FARTHEST_DEPTH, FEATURES
 from ...refimpl.reading import check_room, refusing
 from ..common.packages import need
@@ -207,7 +207,8 @@ def need_layers(
                 file = read_headers(path)
                 left = unused(file.parts, select(path, file.parts, view_layer))
                 rule += f" (channels that are not used: {', '.join(left)})" if left else ""
-            raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, way_out)
+            remedy = REMEDIES.get(layer, way_out)
+            raise InputError(f"{path}: list of layers", ", ".join(frame.layers), rule, remedy)
 
 
 def _missing(path: Path, file: File, selection: Selection, rule: str, way_out: str) -> InputError:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
-from ..frame import DIRECT, FIRST_HIT, LAYERS, SUN, Frame, check_finite
+from ..frame import DIRECT, FIRST_HIT, LAYERS, REMEDIES, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -391,7 +391,8 @@ def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Ar
     for layer in feature.layers:
         if layer not in frame.layers:
             what, rule = f"feature {feature.name!r}: layers of the frame", f"layer {layer!r} must be present"
-            raise InputError(what, ", ".join(frame.layers), rule, "render it, or choose other features")
+            remedy = REMEDIES.get(layer, "render it, or choose other features")
+            raise InputError(what, ", ".join(frame.layers), rule, remedy)
     values, *others = (known(frame[layer].astype(np.float64)) for layer in feature.layers)
     if feature.guides:
         guides = dict(zip(feature.guides, others, strict=True))

@@ -207,6 +207,9 @@ def test_missing_layer_is_named() -> None:
     message = "feature 'normal': layers of the frame 'color': layer 'normal' must be present (render it"
     with pytest.raises(InputError, match=re.escape(message)):
         dataset.feature_image(frame, ("color", "normal"), Normalization())
+    message = "layer 'direct' must be present (render it: --shadow-rays 1, or shadow_rays=1; bundled models"
+    with pytest.raises(InputError, match=re.escape(message)):
+        dataset.feature_image(frame, ("color", "direct"), Normalization())
 
 
 def test_feature_names_are_checked() -> None:

@@ -39,6 +39,8 @@ def test_a_missing_layer_is_named() -> None:
     frame = Frame({"color": np.zeros((1, 1, 3))})
     with pytest.raises(InputError, match="layers of the frame 'color': layer 'albedo' is missing"):
         frame["albedo"]
+    with pytest.raises(InputError, match=r"layer 'direct' is missing \(render it: --shadow-rays 1, or"):
+        frame["direct"]
 
 
 def test_an_empty_frame_is_refused() -> None:

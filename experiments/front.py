@@ -3,29 +3,30 @@
     python experiments/front.py -o docs/images/front.webp
 
 1. Frames of the scene minicubes: its time runs once around, and the camera swings inside the range that the
-   bundled model was trained on [`scenes`]. The model was not trained on these frames.
-2. Each is rendered with one path and 16 feature rays per pixel, denoised by the model and by Open Image
-   Denoise (high, with the same features declared clean), and rendered with many paths [`panels`].
+   bundled model was trained on [`shots`]. The model was not trained on these frames.
+2. Each is rendered with one path, and 16 camera rays with a shadow ray each for the features, and denoised by
+   the model and by Open Image Denoise (high). That has the same features, declared clean, and in place of
+   shadow rays the direct light of 16 paths in its colour; and is rendered with many paths [`panels`].
 3. All are shown at the same exposure; the order of the panels is that of the caption.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from lab.command import described
+from lab.frames import Shot, frames, noisy, one_scattering, reference, relit
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 import wamnet
-from wamnet.cli.common.inputs import load_scene
-from wamnet.cli.common.options import View
 from wamnet.cli.files.outputs import replacing
 from wamnet.refimpl.encoding import to_8bit, to_display
-from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.light.variation import Variation
 from wamnet_peers.peer_oidn import Kept
 
 FRAMES, FRAME_MS, YAW_DEG = 24, 150, 12.0
@@ -34,6 +35,10 @@ FRAMES, FRAME_MS, YAW_DEG = 24, 150, 12.0
 SIZE, REFERENCE_SPP, LABEL_PX = 320, 512, 26
 """Pixels of a panel's edge, paths per pixel of the reference, and the height of a label."""
 
+RAYS = 16
+"""Camera rays per pixel of the features, which send a shadow ray each; paths of Open Image Denoise's direct
+light."""
+
 QUALITY = 62
 """Quality of the WebP file, which decides its size."""
 
@@ -41,21 +46,20 @@ LABELS = ("1 path per pixel", "wamnet", "Open Image Denoise", f"reference, {REFE
 """What is above each panel."""
 
 
-def scenes(period: float) -> Iterator[Scene]:
-    """Yield the scene at the times and cameras of the loop."""
+def shots(period: float) -> Iterator[Shot]:
+    """Yield the noisy frames of the loop: each its own time and camera."""
     for step in range(FRAMES):
         phase = step / FRAMES
-        yaw = YAW_DEG * math.sin(2 * math.pi * phase)
-        yield load_scene("minicubes", period * phase, [], View(yaw))
+        look = Variation(yaw_deg=YAW_DEG * math.sin(2 * math.pi * phase))
+        yield noisy(Shot("minicubes", period * phase, SIZE, 1, step, RAYS, look, shadow_rays=1))
 
 
-def panels(scene: Scene, model: wamnet.Model, other: Kept, seed: int) -> list[NDArray[np.uint8]]:
+def panels(rendered: Sequence[Frame], model: wamnet.Model, other: Kept) -> list[NDArray[np.uint8]]:
     """Return the four images of a frame, 8 bits per channel."""
-    size = {"width": SIZE, "height": SIZE, "executor": "opencl"}
-    noisy = wamnet.render(scene, feature_spp=16, seed=seed, **size)
-    clean = wamnet.render(scene, spp=REFERENCE_SPP, seed=10_000 + seed, **size)
-    ours = wamnet.denoise(model, noisy, executor="opencl", encoded=True)
-    linear = (noisy["color"], other(noisy).copy(), clean["color"])
+    given, own, lit, clean = rendered
+    ours = wamnet.denoise(model, given, executor="opencl", encoded=True)
+    theirs = other(relit(given, own["color"], lit["color"])).copy()
+    linear = (given["color"], theirs, clean["color"])
     first, theirs, last = (to_display(color, model.normalization.exposure_stops) for color in linear)
     return [to_8bit(image) for image in (first, ours, theirs, last)]
 
@@ -76,10 +80,15 @@ def main() -> None:
     """Render and write the loop."""
     parser = described(__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/front.webp"))
+    parser.add_argument("--cache", type=Path, default=Path("out/lab/frames"), help="folder of the frames")
     parser.add_argument("--period", type=float, default=8.0, help="the scene's time at the loop's end")
     options = parser.parse_args()
     model, other = wamnet.load("minicubes"), Kept((SIZE, SIZE), clean=True)
-    pages = [sheet(panels(scene, model, other, seed)) for seed, scene in enumerate(scenes(options.period))]
+    loop = list(shots(options.period))
+    kinds = (loop, *zip(*(one_scattering(shot, RAYS) for shot in loop), strict=True))
+    kinds = (*kinds, [reference(shot, REFERENCE_SPP) for shot in loop])
+    rendered = [frames(options.cache, kind) for kind in kinds]
+    pages = [sheet(panels(each, model, other)) for each in zip(*rendered, strict=True)]
     with replacing(options.output) as path:
         pages[0].save(
             path,

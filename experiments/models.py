@@ -36,7 +36,7 @@ SUMS = "SHA256SUMS"
 """File with the digest of each model, in the form of `sha256sum`."""
 
 MADE_OF = {
-    "minicubes": (SHIPPED_SET, "shipped"),
+    "minicubes": (SHIPPED_SET, "shipped-shadows"),
     "cornell": ("cornell", "best-16"),
     "glossy": ("glossy", "best-16"),
     "minicubes-basic": ("minicubes", "basic-16"),
@@ -65,7 +65,7 @@ def scored(bench: Bench, ours: str) -> dict[str, dict[str, float]]:
     """Return PSNR, SSIM and FLIP on the test frames, means, of each way in the table above."""
     found = {}
     for text, (name, rays) in SCORED.items():
-        pairs = bench.tests(0, rays)
+        pairs = bench.tests(0, rays, shadow_rays=ROWS[ours].shadow_rays)
         row = ROWS[name or ours]
         row = row if row.recipe else replace(row, rays=rays)
         pictures, _ = denoised(bench, row, [frame for frame, _ in pairs], 0)

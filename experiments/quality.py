@@ -6,7 +6,8 @@
 1. A set says what varies: time, camera, lamps [`lab/sets.py`]. Its test frames inside of the ranges and
    outside are compared with those of training before anything is rendered; none shows what another one shows.
 2. Each row denoises the test frames of each seed, which is that of the noise and of the training [`judged`].
-   Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers.
+   Features are those of the colour's one camera ray, or means over 16 rays: then for both denoisers. These
+   may send a shadow ray each: then 16 rays are spread evenly, for both denoisers.
 3. Each score comes with the number of samples per pixel whose render has the same error [`climbed`].
 4. Networks are certified: how far a kernel may be off, over all pictures [`certified`]. Times of a frame
    are interleaved, and go from frame to picture in display encoding [`timed`].
@@ -52,7 +53,7 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
 from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
-from wamnet.refimpl.network.train import BEST, MIRRORS, SHORT, SKY, Recipe
+from wamnet.refimpl.network.train import BEST, MIRRORS, SHADOWS, SHORT, SKY, Recipe
 from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SHIPPED_SET = "minicubes-page"
@@ -108,6 +109,8 @@ RECIPES: Mapping[str, Recipe] = {
     "short": SHORT,
     "best": BEST,
     "page": replace(BEST, features=LAMPS, steps=60_000),
+    "shadows": SHADOWS,
+    "page-shadows": replace(SHADOWS, steps=60_000),
     "basic": replace(BEST, features=BASIC, steps=60_000),
     "past": replace(BEST, features=PAST),
     "bright": replace(BEST, features=BRIGHT),
@@ -136,6 +139,7 @@ class Row:
     frames a network has learned from, if not that of the test. `past`: features are also of what is seen past
     mirrors and glass, which frames of some sets have; Open Image Denoise gets these in place of the others.
     `apart`: what is seen emits is taken off the colour before, and added without its noise after.
+    `shadow_rays`: how many each of the features' rays sends; the rays are spread evenly then.
     """
 
     text: str
@@ -146,6 +150,7 @@ class Row:
     of: str = ""
     past: bool = False
     apart: bool = False
+    shadow_rays: int = 0
 
 
 ROWS: Mapping[str, Row] = {
@@ -187,7 +192,13 @@ ROWS: Mapping[str, Row] = {
     "lit7-16": Row("preset `mirrors` with a 7x7 window", RAYS, "lit7", past=True),
     "sun-16": Row("7x7 window, plus sun direction (preset `sky`)", RAYS, "sun", past=True),
     "sun48-16": Row("the same, 48 neurons per layer", RAYS, "sun48", past=True),
-    "shipped": Row(f"wamnet, the bundled network, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
+    "shipped": Row(f"wamnet, the same inputs without shadow rays, {RAYS} rays", RAYS, "page", of=SHIPPED_SET),
+    "oidn-shadows16": Row(f"Open Image Denoise, high, features of {RAYS} rays spread evenly",
+        RAYS, quality="high", aux="clean", shadow_rays=1),
+    "shipped-shadows": Row(f"wamnet, the bundled network, {RAYS} rays and shadow rays",
+        RAYS, "page-shadows", of=SHIPPED_SET, shadow_rays=1),
+    "shadows-16": Row(f"wamnet, preset `shadows`, {RAYS} rays and shadow rays",
+        RAYS, "shadows", shadow_rays=1),
 }  # fmt: skip
 """The rows by name."""
 
@@ -215,6 +226,7 @@ COLUMNS = (
     tables.Column("ssim", "SSIM", 3, interval=True),
     tables.Column("flip", "FLIP", 3, interval=True),
     tables.Column("relmse", "relMSE", 4, interval=True),
+    tables.Column("penumbra", "RMSE in the penumbra, 1/255", 2, interval=True),
     tables.Column("spp", "equivalent spp", 0),
     tables.Column("seconds", "training, s", 0),
 )
@@ -223,7 +235,7 @@ COLUMNS = (
 SPECTRA = "fft:16"
 """The fastest schedule, whose bound is larger."""
 
-KEPT = ("psnr", "ssim", "flip", "relmse")
+KEPT = ("psnr", "ssim", "flip", "relmse", "penumbra")
 """Scores that are kept of every frame."""
 
 
@@ -246,19 +258,23 @@ class Bench:
         """Return the numbers of frames."""
         return SETS[self.name].counts(self.plan.train, self.plan.test, self.plan.outside)
 
-    def _shots(self, split: str, rays: int, noise: int = 0) -> list[Shot]:
+    def _shots(self, split: str, rays: int, noise: int = 0, shadow_rays: int = 0) -> list[Shot]:
         """Return the shots of a split with the noise of a seed."""
-        return SETS[self.name].shots(split, self.counts, self.plan.size, rays if rays > 1 else 0, noise)
+        own = rays if rays > 1 else 0
+        return SETS[self.name].shots(split, self.counts, self.plan.size, own, noise, shadow_rays)
 
-    def training(self, rays: int) -> list[Pair]:
+    def training(self, rays: int, shadow_rays: int = 0) -> list[Pair]:
         """Return the training frames, with features of so many camera rays, and their targets' colours."""
-        return training_pairs(self, rays)
+        return training_pairs(self, rays, shadow_rays)
 
-    def tests(self, seed: int, rays: int, split: str = TEST) -> list[Pair]:
-        """Return the test frames with the noise of a seed; their references are the same for all."""
-        found = self._frames(list(map(noisy, self._shots(split, rays, seed + 1))))
+    def tests(self, seed: int, rays: int, split: str = TEST, shadow_rays: int = 0) -> list[Pair]:
+        """Return the test frames with the noise of a seed; their references are the same for all.
+
+        References have the layer `direct`, by which a penumbra is known.
+        """
+        found = self._frames(list(map(noisy, self._shots(split, rays, seed + 1, shadow_rays))))
         spp = self.plan.test_spp * SETS[self.name].cleaner
-        clean = self._frames([reference(s, spp) for s in self._shots(split, 1)])
+        clean = self._frames([replace(reference(s, spp), shadow_rays=1) for s in self._shots(split, 1)])
         return list(zip(found, clean, strict=True))
 
     def renders(self, spp: int) -> list[Frame]:
@@ -275,17 +291,19 @@ class Bench:
         if self.plan.steps is not None:
             recipe = replace(recipe, steps=self.plan.steps)
         of = replace(self, name=row.of or self.name)
-        return training.trained(recipe, of.training(row.rays), self.cache / "models", self.executor)
+        pairs = of.training(row.rays, row.shadow_rays)
+        return training.trained(recipe, pairs, self.cache / "models", self.executor)
 
 
 @lru_cache(maxsize=1)
-def training_pairs(bench: Bench, rays: int) -> list[Pair]:
+def training_pairs(bench: Bench, rays: int, shadow_rays: int = 0) -> list[Pair]:
     """Return a set's training frames, with features of so many camera rays, and their targets' colours.
 
     Rows, seeds and splits of one set share them: reading hundreds of frames takes longer than judging some.
     """
     plan, counts = bench.plan, bench.counts
-    shots = SETS[bench.name].shots(TRAIN, counts, plan.size, rays if rays > 1 else 0)
+    own = rays if rays > 1 else 0
+    shots = SETS[bench.name].shots(TRAIN, counts, plan.size, own, shadow_rays=shadow_rays)
     wanted = [s for shot in shots for s in (noisy(shot), reference(shot, plan.train_spp))]
     found = frames(bench.cache / "frames", wanted, bench.executor)
     targets = [Frame({"color": clean["color"]}, clean.info) for clean in found[1::2]]
@@ -294,17 +312,17 @@ def training_pairs(bench: Bench, rays: int) -> list[Pair]:
 
 def judged(bench: Bench, row: Row, split: str, ladder: scores.Ladder | None, seed: int) -> Values:
     """Return the scores of a row over the test frames of a seed, of each frame and their means, and more."""
-    pairs = bench.tests(seed, row.rays, split)
+    pairs = bench.tests(seed, row.rays, split, row.shadow_rays)
     given = [frame for frame, _ in pairs]
     if row.apart:
         given = [reflected(f, own) for f, (own, _) in zip(given, bench.tests(seed, 1, split), strict=True)]
     pictures, facts = denoised(bench, row, given, seed)
     found = [
-        scores.score(picture, clean["color"], linear)
+        scores.score_lit(picture, clean, linear)
         for (picture, linear), (_, clean) in zip(pictures, pairs, strict=True)
     ]
     mean = scores.mean_scores(found)
-    each = {name: [round(scores[name], 5) for scores in found] for name in KEPT}
+    each = {name: [round(scores[name], 5) for scores in found] for name in KEPT if name in mean}
     worth = {} if ladder is None else {"spp": ladder.spp_of(mean["mse"])}
     return {**mean, **worth, **facts, PER_FRAME: each}
 
@@ -432,7 +450,7 @@ def drawn(bench: Bench, path: Path, rows: Sequence[str]) -> None:
     """Write the first test frame as each row has it, and the reference."""
     pictures = []
     for name in [row for row in SHOWN if row in rows and (SETS[bench.name].seen or not ROWS[row].past)]:
-        frame, clean = bench.tests(0, ROWS[name].rays)[0]
+        frame, clean = bench.tests(0, ROWS[name].rays, TEST, ROWS[name].shadow_rays)[0]
         picture = denoised(bench, ROWS[name], [frame], 0)[0][0][0]
         pictures.append((SHOWN[name], picture))
         target = to_display(clean["color"])

@@ -2,8 +2,8 @@
 
     python experiments/publish.py --run shadows python experiments/shadows.py
 
-1. Frames of the mini cubes are drawn from the ranges of the set `minicubes`, at every time and from moving
-   cameras, with the features of each row [`ROWS`]: camera rays, shadow rays of each, paths per pixel.
+1. Frames are drawn from the ranges of a set (`--set`), at every time and from moving cameras, with the
+   features of each row [`ROWS`]: camera rays, shadow rays of each, paths per pixel.
 2. A network is trained for each row and seed by the preset `best`, whose input is the layer `unshadowed`
    where there are no shadow rays, and `direct` in its place where there are [`Bench.images`]. `direct` has
    visible lights too: a row without shadow rays, with `seen_emission`, has the gain of these alone.
@@ -11,8 +11,10 @@
    what the path itself has found of that: of the path that ends after one scattering [`Bench.relit`]. Since
    `direct` approximates lights by disks, which a network learns and it cannot, another row has no such bias.
 4. Scores are means over seeds and test frames that nothing was chosen on, in the penumbra and after a blur
-   too [`scored`]. Milliseconds are those of a pipeline's frame, paths, features and network, 512 x 512
+   too [`lab/scores.py`]. Milliseconds are those of a pipeline's frame, paths, features and network, 512 x 512
    pixels, rows in turn [`milliseconds`]. A picture shows a test frame by the rows in `SHOWN`.
+5. With `--models` nothing is trained: their rows have the rays that they were trained on, and fewer of them
+   [`rows_of_models`]. `--frames` is then the number of frames of their training.
 
 Prints a Markdown table.
 """
@@ -29,14 +31,16 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 from lab.command import begin
-from lab.scores import mean_scores, score
+from lab.frames import one_scattering, relit
+from lab.scores import mean_scores, score_lit
 from lab.sets import SETS, Counts
 from lab.tables import markdown
 from lab.training import denoised, trained
 
+import wamnet
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import write_panels
 from wamnet.kernels import open_executor
@@ -45,20 +49,16 @@ from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
 from wamnet.models.data.frame_plan import TEST, TRAIN
-from wamnet.refimpl import metrics
-from wamnet.refimpl.encoding import LEVELS, to_display
+from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.render import FEATURE_SAMPLER, Job, spread_rays
 from wamnet.refimpl.light.scene import Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import varied
-from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
 from wamnet.refimpl.network.train import BEST
 from wamnet_peers.peer_oidn import filtered, prefiltered
-
-SET = SETS["minicubes"]
-"""Where the frames are drawn from."""
 
 TIMED_PX = 512
 """Side of the timed image."""
@@ -75,7 +75,7 @@ class Row:
     """Camera rays of the features, shadow rays of each, and paths, per pixel.
 
     `emission`: the network sees visible lights without shadow rays. `oidn`: Open Image Denoise; `usual`: its
-    direct light is that of as many paths of one scattering, which have no bias.
+    direct light is that of as many paths of one scattering, which have no bias. `file`: the network is there.
     """
 
     rays: int
@@ -84,6 +84,13 @@ class Row:
     emission: bool = False
     oidn: bool = False
     usual: bool = False
+    file: str = ""
+    sampler: str = ""
+
+    @property
+    def of_pipeline(self) -> dict[str, Any]:
+        """Return the options of a pipeline with these camera rays."""
+        return {"feature_spp": self.rays, "feature_sampler": self.sampler}
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -105,10 +112,17 @@ ROWS = {
 }
 """The rows by name; shadow rays are those of all camera rays together."""
 
+THEIRS = {name: row for name, row in ROWS.items() if row.oidn}
+"""The rows of Open Image Denoise."""
+
+FEWER = (1, 2, 4)
+"""What the camera rays of a model's training are divided by."""
+
 SHOWN = {
     "4 camera rays, no shadow ray": "no shadow ray",
     "8 camera rays, 8 shadow rays": "8 shadow rays",
     "16 camera rays, 16 shadow rays": "16 shadow rays",
+    "Open Image Denoise, 16 camera rays, no shadow ray": "OIDN",
     "Open Image Denoise, 16 camera rays, 16 paths of one scattering": "OIDN, 16",
 }
 """Rows of the picture, and their labels."""
@@ -134,10 +148,16 @@ class Bench:
         """The kernels that all frames share: compiling one for each frame takes longer than rendering it."""
         return Frames([scene for split in (TRAIN, TEST) for scene in self.scenes(split)])
 
+    @cached_property
+    def rows(self) -> Mapping[str, Row]:
+        """The rows by name."""
+        return {**rows_of_models(self.options.models), **THEIRS} if self.options.models else ROWS
+
     def scenes(self, split: str) -> list[Scene]:
         """Return the scenes of a split."""
-        draws = SET.draws(split, Counts(self.options.frames, self.options.tests, 0))
-        return [varied(canonical(SET.scene, time=draw.time_s), draw.variation) for draw in draws]
+        chosen = SETS[self.options.set]
+        draws = chosen.draws(split, Counts(self.options.frames, self.options.tests, 0))
+        return [varied(canonical(chosen.scene, time=draw.time_s), draw.variation) for draw in draws]
 
     def frame(self, scene: Scene, job: Job) -> Frame:
         """Return a frame, rendered if it is not there."""
@@ -156,7 +176,7 @@ class Bench:
             noisy = self.noisy(split, row, seed, index)
             clean = Job(size, size, self.options.spp, 2 * index + 1)
             if split == TEST:
-                clean = replace(clean, spp=4 * clean.spp, seed=2 * index + 1 + SEED_STEP, shadow_rays=4)
+                clean = replace(clean, spp=4 * clean.spp, seed=2 * index + 1 + SEED_STEP, shadow_rays=1)
             found.append((self.frame(scene, noisy), self.frame(scene, clean)))
         return found
 
@@ -164,17 +184,20 @@ class Bench:
         """Return the job of a noisy frame."""
         number = 2 * (SEED_STEP * seed + index) + (SEED_STEP if split == TEST else 0)
         more = {"feature_spp": row.rays, "shadow_rays": row.shadow_rays, "seen": row.emission}
+        more |= {"feature_sampler": row.sampler}
         return Job(self.options.size, self.options.size, row.spp, number, **more)  # type: ignore[arg-type]
 
     def model(self, row: Row, seed: int) -> Model:
         """Return the network of a row."""
+        if row.file:
+            return wamnet.load(row.file)
         recipe = replace(BEST, features=row.layers, steps=self.options.steps, seed=seed)
         pairs = self.pairs(TRAIN, row, seed)
         return trained(recipe, pairs, self.options.cache / "models", self.options.executor)[0]
 
     def images(self, name: str, seed: int) -> list[Floats]:
         """Return the denoised test frames of a row."""
-        row = ROWS[name]
+        row = self.rows[name]
         noisy = [frame for frame, _ in self.pairs(TEST, row, seed)]
         if not row.oidn:
             return denoised(self.model(row, seed), noisy, self.options.executor)
@@ -186,42 +209,44 @@ class Bench:
         """Return test frames whose colour has the layer `direct` for what its path has found of that."""
         found = []
         for index, (scene, frame) in enumerate(zip(self.scenes(TEST), frames, strict=True)):
-            job = replace(self.noisy(TEST, row, seed, index), feature_spp=0, shadow_rays=0)
-            own = self.frame(scene, replace(job, settings=Settings(max_depth=1)))["color"]
-            lit = frame["direct"]
-            if row.usual:
-                paths = replace(job, spp=row.rays, settings=Settings(max_depth=1, sampler="sobol"))
-                lit = self.frame(scene, paths)["color"]
-            color = np.maximum(frame["color"] - own, 0.0) + lit
-            found.append(Frame({**frame.layers, "color": color}, frame.info))
+            own, paths = one_scattering(self.noisy(TEST, row, seed, index), row.rays)
+            lit = self.frame(scene, paths)["color"] if row.usual else frame["direct"]
+            found.append(relit(frame, self.frame(scene, own)["color"], lit))
         return found
 
 
-def scored(image: Floats, reference: Frame) -> dict[str, float]:
-    """Return the scores of a denoised frame, in the penumbra and after a blur too."""
-    target, mask = (
-        to_display(reference["color"]),
-        metrics.penumbra(reference["direct"], reference["unshadowed"]),
-    )
-    return {
-        **score(image, reference["color"]),
-        "penumbra": LEVELS * metrics.inside(mask, image, target),
-    }
+def rows_of_models(files: Sequence[str]) -> dict[str, Row]:
+    """Return the rows of models: with the rays of their training; and fewer, which are spread evenly."""
+    rows = {}
+    for file in files:
+        model = wamnet.load(file)
+        rays, shadow_rays, name = learned_feature_spp(model), learned_shadow_rays(model), Path(file).stem
+        if f"trained_on_{FEATURE_SAMPLER}" in model.info:
+            chosen = [(rays // part, "") for part in FEWER]
+        else:
+            chosen = [(rays, Settings().sampler), (spread_rays(rays), "")]
+        for count, sampler in chosen:
+            text = f"{count} shadow rays" if shadow_rays else "no shadow ray"
+            at = " at random" if sampler else ""
+            row = Row(count, shadow_rays, file=file, sampler=sampler)
+            rows[f"{name}, {count} camera rays{at}, {text}"] = row
+    return rows
 
 
-def milliseconds(executor: Executor, models: Mapping[str, Model]) -> dict[str, float]:
+def milliseconds(
+    executor: Executor, scene: Scene, rows: Mapping[str, Row], models: Mapping[str, Model]
+) -> dict[str, float]:
     """Return the median milliseconds of a frame by each row's pipeline."""
-    scene, size = canonical(SET.scene), (TIMED_PX, TIMED_PX)
-    found: dict[str, list[float]] = {name: [] for name in models}
+    size, found = (TIMED_PX, TIMED_PX), {name: list[float]() for name in models}
     with ExitStack() as stack:
         opened = {
-            name: stack.enter_context(Pipeline(executor, scene, model, size, feature_spp=ROWS[name].rays))
+            name: stack.enter_context(Pipeline(executor, scene, model, size, **rows[name].of_pipeline))
             for name, model in models.items()
         }
         for number in range(ROUNDS + 1):
             for name, pipeline in opened.items():
                 started = time.perf_counter()
-                pipeline.run(number, ROWS[name].spp)
+                pipeline.run(number, rows[name].spp)
                 if number:
                     found[name].append(1000.0 * (time.perf_counter() - started))
     return {name: statistics.median(times) for name, times in found.items()}
@@ -232,6 +257,8 @@ def options_of(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--set", default="minicubes", metavar="SET", help=", ".join(SETS))
+    parser.add_argument("--models", nargs="+", default=[], help="bundled models, or files, in place of rows")
     parser.add_argument("--frames", type=int, default=24, help="frames to train on")
     parser.add_argument("--tests", type=int, default=4)
     parser.add_argument("--size", type=int, default=128)
@@ -249,20 +276,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Train, measure, draw and print."""
     bench = Bench(options_of(arguments))
     seeds = range(bench.options.seeds)
-    references = [clean for _, clean in bench.pairs(TEST, ROWS[next(iter(SHOWN))], 0)]
-    panels = [("one path", to_display(bench.pairs(TEST, ROWS[next(iter(SHOWN))], 0)[0][0]["color"]))]
+    pairs = bench.pairs(TEST, next(iter(bench.rows.values())), 0)
+    references, labels = [clean for _, clean in pairs], SHOWN
+    if bench.options.models:
+        labels = {n: n for n, row in bench.rows.items() if row.file} | SHOWN
+    panels = [("one path", to_display(pairs[0][0]["color"]))]
     scores: dict[str, list[dict[str, float]]] = {}
-    for name in ROWS:
+    for name in bench.rows:
         images = [bench.images(name, seed) for seed in seeds]
-        each = [[scored(*pair) for pair in zip(found, references, strict=True)] for found in images]
+        each = [[score_lit(*pair) for pair in zip(found, references, strict=True)] for found in images]
         scores[name] = list(map(mean_scores, each))
-        panels += [(SHOWN[name], images[0][0])] if name in SHOWN else []
+        panels += [(labels[name], images[0][0])] if name in labels else []
     panels.append(("reference", to_display(references[0]["color"])))
     write_panels(bench.options.cache / "shadows.png", panels, "experiments/shadows.py")
     # What is seen past mirrors and glass has no further camera rays in a pipeline: no time of that row.
-    timed = {name: bench.model(row, 0) for name, row in ROWS.items() if not (row.oidn or row.emission)}
+    timed = {n: bench.model(row, 0) for n, row in bench.rows.items() if not (row.oidn or row.emission)}
     with open_executor(bench.options.executor) as executor:
-        times = milliseconds(executor, timed)
+        times = milliseconds(executor, canonical(SETS[bench.options.set].scene), bench.rows, timed)
     heads = ["features", *(head for head, _ in COLUMNS.values()), "PSNR, range of seeds", "ms"]
     print(markdown(heads, [shown(name, found, times) for name, found in scores.items()]))
 

@@ -15,9 +15,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from wamnet.cli.common.terminal import hint_on_interrupt, progress
 from wamnet.cli.files import exr
@@ -25,7 +27,7 @@ from wamnet.cli.files.dataset_files import sum_of
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.kernels.run.render_on import Frames
 from wamnet.models.data.frame_plan import version
-from wamnet.refimpl.frame import FIRST_HIT, SUN, Frame
+from wamnet.refimpl.frame import FIRST_HIT, SUN, Floats, Frame
 from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, feature_job, render_info
 from wamnet.refimpl.light.scene import Scene, scene_digest
@@ -48,7 +50,8 @@ class Shot:
     """A picture to be rendered.
 
     Its features are means over `feature_spp` camera rays at random; 0: over the colour's. `seen`: features
-    are also of what is seen past mirrors and glass.
+    are also of what is seen past mirrors and glass. With `shadow_rays` of each camera ray the frame has the
+    layer `direct` too, and these camera rays are spread evenly.
     """
 
     scene: str = "minicubes"
@@ -59,12 +62,16 @@ class Shot:
     feature_spp: int = 0
     variation: Variation = AT_REST
     seen: bool = False
+    shadow_rays: int = 0
+    settings: Settings = field(default_factory=Settings)
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        rays = {"feature_spp": self.feature_spp, "feature_sampler": Settings().sampler}
-        return Job(self.size, self.size, self.spp, self.seed, seen=self.seen, **rays)  # type: ignore[arg-type]
+        sampler = "" if self.shadow_rays else Settings().sampler
+        rays = {"feature_spp": self.feature_spp, "feature_sampler": sampler, "shadow_rays": self.shadow_rays}
+        how = self.size, self.size, self.spp, self.seed, self.settings
+        return Job(*how, seen=self.seen, **rays)  # type: ignore[arg-type]
 
     def build(self) -> Scene:
         """Return the scene at its time, from its side and under its lamps."""
@@ -77,7 +84,7 @@ def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     job = shot.job.facts()
     if not shot.feature_spp:
         del job["feature_spp"]  # these files are older than it is
-    del job["feature_sampler"]  # the same for all
+    del job["feature_sampler"]  # the same for all that have no shadow rays, which are in the name
     scene = shot.build()
     layers = sorted([*shot.job.layers, *([SUN] if sun_of(scene) is not None else [])])
     made_from = [scene_digest(scene), job, executor, layers, version()]
@@ -119,7 +126,10 @@ def _render(folder: Path, shot: Shot, executor: str, kernels: Frames, advance: A
 
     Where the same colour is there with features of its own rays, only the others' first hits are traced.
     """
-    scene, plain = shot.build(), find(folder, replace(shot, feature_spp=0, seen=False), executor)
+    scene, plain = (
+        shot.build(),
+        find(folder, replace(shot, feature_spp=0, seen=False, shadow_rays=0), executor),
+    )
     if (of_features := feature_job(shot.job)) is not None and plain is not None:
         hits = _rendered(executor, scene, of_features, kernels, advance)
         layers = {**hits.layers, "color": exr.read_frame(plain)["color"]}
@@ -137,6 +147,22 @@ def _rendered(executor: str, scene: Scene, job: Job, kernels: Frames, advance: A
     return render_frame(executor, scene, job, workers=None, on_progress=advance, frames=kernels).frame
 
 
+Made = TypeVar("Made", Job, Shot)
+"""What says how a picture is rendered."""
+
+
+def one_scattering(job: Made, spp: int) -> tuple[Made, Made]:
+    """Return how to render the direct light that a job's own paths have found, and that of so many paths."""
+    own = replace(job, feature_spp=0, shadow_rays=0, settings=Settings(max_depth=1))
+    return own, replace(own, spp=spp, settings=Settings(max_depth=1, sampler="sobol"))
+
+
+def relit(frame: Frame, own: Floats, lit: Floats) -> Frame:
+    """Return a frame whose colour has other direct light than what its own paths have found."""
+    color = np.maximum(frame["color"] - own, 0.0) + lit
+    return Frame({**frame.layers, "color": color}, frame.info)
+
+
 def frames(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> list[Frame]:
     """Return the frames of all shots, rendered where they are not there."""
     return [exr.read_frame(path) for path in render_all(folder, shots, executor)]
@@ -152,7 +178,7 @@ def reference(shot: Shot, spp: int) -> Shot:
 
     Seeds of references are odd and those of noisy shots even, so that none share their random numbers.
     """
-    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0, seen=False)
+    return replace(shot, spp=spp, seed=2 * shot.seed + 1, feature_spp=0, seen=False, shadow_rays=0)
 
 
 def noisy(shot: Shot) -> Shot:

@@ -32,7 +32,7 @@ from wamnet.cli.common.packages import need
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import LEVELS, from_display, to_8bit, to_display
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.frame import Floats
+from wamnet.refimpl.frame import Floats, Frame
 
 
 def score(picture: Floats, reference: Floats, linear: Floats | None = None) -> dict[str, float]:
@@ -57,9 +57,22 @@ def score(picture: Floats, reference: Floats, linear: Floats | None = None) -> d
     }
 
 
+def score_lit(picture: Floats, reference: Frame, linear: Floats | None = None) -> dict[str, float]:
+    """Return every score, and the error in the penumbra, if there is one, on 0 .. 255.
+
+    The reference has the layer `direct`.
+    """
+    found = score(picture, reference["color"], linear)
+    mask = metrics.penumbra(reference["direct"], reference["unshadowed"])
+    if mask.any():
+        found["penumbra"] = LEVELS * metrics.inside(mask, picture, to_display(reference["color"]))
+    return found
+
+
 def mean_scores(found: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the means of scores over pictures."""
-    return {name: float(np.mean([scores[name] for scores in found])) for name in found[0]}
+    """Return the means of the scores that all pictures have."""
+    names = [name for name in found[0] if all(name in scores for scores in found)]
+    return {name: float(np.mean([scores[name] for scores in found])) for name in names}
 
 
 def paper_figure(mse255: float) -> float:

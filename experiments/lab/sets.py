@@ -80,10 +80,12 @@ class FrameSet:
         )
         return [draw for kind, draw in frame_draws(request) if kind == split]
 
-    def shots(self, split: str, counts: Counts, size: int, rays: int = 0, noise: int = 0) -> list[Shot]:
+    def shots(
+        self, split: str, counts: Counts, size: int, rays: int = 0, noise: int = 0, shadow_rays: int = 0
+    ) -> list[Shot]:
         """Return the shots of a split with the noise of a seed; features of `rays` rays, 0: the colour's."""
         first = {TRAIN: 0, TEST: counts.train, OUTSIDE: counts.train + counts.test}[split]
-        shot = Shot(self.scene, size=size, feature_spp=rays, seen=self.seen)
+        shot = Shot(self.scene, size=size, feature_spp=rays, seen=self.seen, shadow_rays=shadow_rays)
         return [
             replace(
                 shot,

@@ -22,7 +22,7 @@ def test_scores_are_of_the_penumbra_too():
     half = np.where(np.arange(32) < 16, 0.5, 1.0)[None, :, None] * np.ones_like(grey)
     reference = Frame({"color": grey, "unshadowed": np.ones_like(grey), "direct": half})
     target = shadows.to_display(grey)
-    found = shadows.scored(target + 0.1 * (half < 1.0), reference)
+    found = shadows.score_lit(target + 0.1 * (half < 1.0), reference)
     assert abs(found["penumbra"] - 25.5) <= 255.0 * 2.0**-20  # float32 in, a tenth of 255
     assert 0.0 < found["blurred"] < found["penumbra"]
 

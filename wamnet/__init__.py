@@ -3,7 +3,7 @@
     import wamnet
 
     model = wamnet.load("minicubes")
-    frame = wamnet.render("minicubes", time=2.5)
+    frame = wamnet.render("minicubes", time=2.5, feature_spp=16, shadow_rays=1)
     image = wamnet.denoise(model, frame)
 
 This module is the public interface: its names change only with a line in the changelog. All other modules

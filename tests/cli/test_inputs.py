@@ -71,6 +71,9 @@ def test_a_missing_layer_names_the_file(refused, here) -> None:
         "flat.exr: list of layers 'color': normal must be among them, because the model was trained" in line
     )
     assert "features" not in line
+    line = refused("denoise", "minicubes", "noisy.exr")
+    assert "direct must be among them" in line
+    assert "--shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it" in line
     line = refused("train", "-i", "flat.exr", "-t", "reference.exr", "--features", "color,normal")
     assert "flat.exr: list of layers 'color': normal must be among them" in line
     assert "--features" in line

@@ -15,7 +15,7 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import ranges_from_json
-from wamnet.refimpl.network.denoise import denoise
+from wamnet.refimpl.network.denoise import denoise, learned_shadow_rays
 from wamnet.refimpl.network.train import recipe_from_json
 
 NAMES = options.MODELS.split(", ")
@@ -85,13 +85,15 @@ def test_a_model_says_its_ranges(name):
 def test_a_model_denoises_an_unseen_frame(name):
     """A band of rows, at a time and with noise that training had none of."""
     scene = canonical(name.removesuffix(BASIC), time=UNSEEN_S)
-    noisy = render(scene, Job(256, 256, seed=990, feature_spp=16), rows=ROWS).frame
-    target = to_display(render(scene, Job(256, 256, 64, seed=991), rows=ROWS).frame["color"])
     model = load_model(models.path(name))
+    job = Job(256, 256, seed=990, feature_spp=16, shadow_rays=learned_shadow_rays(model))
+    noisy = render(scene, job, rows=ROWS).frame
+    target = to_display(render(scene, Job(256, 256, 64, seed=991), rows=ROWS).frame["color"])
     found = metrics.psnr(denoise(model, noisy), target)
     assert found >= LEAST_DB[name.removesuffix(BASIC)]
     # The features matter: without normals, and the light that follows from them, the network is far off;
     # less so where the first hit's normals say little, as in mirrors.
-    blind = {**noisy.layers, **{name: np.zeros_like(noisy[name]) for name in ("normal", "unshadowed")}}
+    unseen = ("normal", *(("direct",) if "direct" in model.features else ()))
+    blind = {**noisy.layers, **{name: np.zeros_like(noisy[name]) for name in unseen}}
     least = 1.0 if name == "glossy-basic" else 2.0
     assert metrics.psnr(denoise(model, Frame(blind)), target) <= found - least

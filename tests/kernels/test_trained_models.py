@@ -32,7 +32,7 @@ from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import RANGES, ranges_from_json, varied
-from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.denoise import Model, denoise, learned_shadow_rays
 
 MODELS = [name for name in models.names() if not name.endswith("-basic") or name == "glossy-basic"]
 """All bundled models, but those of the form of another one, with other weights."""
@@ -86,7 +86,7 @@ def shown(model: Model) -> Frame:
     """Return a noisy frame of the scene that a model is for, rendered as those that it has learned from."""
     settings = Settings(max_depth=int(first_of(model, "max_depth", str(Settings().max_depth))))
     spp, rays = (int(first_of(model, name, "1")) for name in ("spp", "feature_spp"))
-    job = Job(WIDTH, HEIGHT, spp, SEED, settings, feature_spp=rays)
+    job = Job(WIDTH, HEIGHT, spp, SEED, settings, feature_spp=rays, shadow_rays=learned_shadow_rays(model))
     return render_frame("numpy", unseen(model), job).frame
 
 

@@ -22,8 +22,6 @@ Prints a Markdown table.
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
 import statistics
 import time
 from collections.abc import Mapping, Sequence
@@ -34,28 +32,24 @@ from pathlib import Path
 from typing import Any
 
 from lab.command import begin
-from lab.frames import one_scattering, relit
+from lab.frames import Shot, frames, noisy, one_scattering, reference, relit
 from lab.scores import mean_scores, score_lit
 from lab.sets import SETS, Counts
 from lab.tables import markdown
 from lab.training import denoised, trained
 
 import wamnet
-from wamnet.cli.files import exr
 from wamnet.cli.files.images import write_panels
 from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.run.pipeline import Pipeline
-from wamnet.kernels.run.render_frame import render_frame
-from wamnet.kernels.run.render_on import Frames
 from wamnet.models.data.frame_plan import TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Floats, Frame
-from wamnet.refimpl.light.render import FEATURE_SAMPLER, Job, spread_rays
-from wamnet.refimpl.light.scene import Scene, scene_digest
+from wamnet.refimpl.light.render import FEATURE_SAMPLER, spread_rays
+from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.light.variation import varied
 from wamnet.refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
 from wamnet.refimpl.network.train import BEST
 from wamnet_peers.peer_oidn import filtered, prefiltered
@@ -66,16 +60,14 @@ TIMED_PX = 512
 ROUNDS = 7
 """Times of each row, of which the median is shown."""
 
-SEED_STEP = 1000
-"""Noise of frames has the seed of the network times this, and more."""
-
 
 @dataclass(frozen=True)
 class Row:
     """Camera rays of the features, shadow rays of each, and paths, per pixel.
 
     `emission`: the network sees visible lights without shadow rays. `oidn`: Open Image Denoise; `usual`: its
-    direct light is that of as many paths of one scattering, which have no bias. `file`: the network is there.
+    direct light is that of as many paths of one scattering, which have no bias. `file`: the network is there;
+    `at_random`: it was trained on camera rays that are not spread evenly.
     """
 
     rays: int
@@ -85,12 +77,13 @@ class Row:
     oidn: bool = False
     usual: bool = False
     file: str = ""
-    sampler: str = ""
+    at_random: bool = False
 
     @property
     def of_pipeline(self) -> dict[str, Any]:
         """Return the options of a pipeline with these camera rays."""
-        return {"feature_spp": self.rays, "feature_sampler": self.sampler}
+        sampler = Settings().sampler if self.at_random else ""
+        return {"feature_spp": self.rays, "feature_sampler": sampler}
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -144,48 +137,28 @@ class Bench:
     options: argparse.Namespace
 
     @cached_property
-    def kernels(self) -> Frames:
-        """The kernels that all frames share: compiling one for each frame takes longer than rendering it."""
-        return Frames([scene for split in (TRAIN, TEST) for scene in self.scenes(split)])
-
-    @cached_property
     def rows(self) -> Mapping[str, Row]:
         """The rows by name."""
         return {**rows_of_models(self.options.models), **THEIRS} if self.options.models else ROWS
 
-    def scenes(self, split: str) -> list[Scene]:
-        """Return the scenes of a split."""
-        chosen = SETS[self.options.set]
-        draws = chosen.draws(split, Counts(self.options.frames, self.options.tests, 0))
-        return [varied(canonical(chosen.scene, time=draw.time_s), draw.variation) for draw in draws]
+    def frames(self, shots: Sequence[Shot]) -> list[Frame]:
+        """Return frames, rendered where they are not there."""
+        return frames(self.options.cache / "frames", shots, self.options.executor)
 
-    def frame(self, scene: Scene, job: Job) -> Frame:
-        """Return a frame, rendered if it is not there."""
-        folder, executor = self.options.cache / "frames", self.options.executor
-        text = json.dumps([scene_digest(scene), job.facts(), executor], sort_keys=True)
-        path = folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.exr"
-        if not path.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            exr.write_frame(path, render_frame(executor, scene, job, frames=self.kernels).frame)
-        return exr.read_frame(path)
+    def shots(self, split: str, row: Row, seed: int) -> list[Shot]:
+        """Return the noisy shots of a row."""
+        of, noise = SETS[self.options.set], 2 * seed + (split == TEST)
+        counts = Counts(self.options.frames, self.options.tests, 0)
+        found = of.shots(split, counts, self.options.size, row.rays, noise, row.shadow_rays)
+        return [replace(noisy(s), seen=s.seen or row.emission, spread=not row.at_random) for s in found]
 
     def pairs(self, split: str, row: Row, seed: int) -> list[tuple[Frame, Frame]]:
         """Return noisy frames and references; those of tests have the layer `direct`."""
-        size, found = self.options.size, []
-        for index, scene in enumerate(self.scenes(split)):
-            noisy = self.noisy(split, row, seed, index)
-            clean = Job(size, size, self.options.spp, 2 * index + 1)
-            if split == TEST:
-                clean = replace(clean, spp=4 * clean.spp, seed=2 * index + 1 + SEED_STEP, shadow_rays=1)
-            found.append((self.frame(scene, noisy), self.frame(scene, clean)))
-        return found
-
-    def noisy(self, split: str, row: Row, seed: int, index: int) -> Job:
-        """Return the job of a noisy frame."""
-        number = 2 * (SEED_STEP * seed + index) + (SEED_STEP if split == TEST else 0)
-        more = {"feature_spp": row.rays, "shadow_rays": row.shadow_rays, "seen": row.emission}
-        more |= {"feature_sampler": row.sampler}
-        return Job(self.options.size, self.options.size, row.spp, number, **more)  # type: ignore[arg-type]
+        spp, shadow_rays = (4 * self.options.spp, 1) if split == TEST else (self.options.spp, 0)
+        of, counts = SETS[self.options.set], Counts(self.options.frames, self.options.tests, 0)
+        clean = [reference(shot, spp) for shot in of.shots(split, counts, self.options.size)]
+        targets = self.frames([replace(shot, shadow_rays=shadow_rays) for shot in clean])
+        return list(zip(self.frames(self.shots(split, row, seed)), targets, strict=True))
 
     def model(self, row: Row, seed: int) -> Model:
         """Return the network of a row."""
@@ -205,14 +178,14 @@ class Bench:
         found = [filtered(frame, prefiltered(frame), clean=True) for frame in relit]
         return [to_display(image) for image in found]
 
-    def relit(self, frames: Sequence[Frame], row: Row, seed: int) -> list[Frame]:
+    def relit(self, found: Sequence[Frame], row: Row, seed: int) -> list[Frame]:
         """Return test frames whose colour has the layer `direct` for what its path has found of that."""
-        found = []
-        for index, (scene, frame) in enumerate(zip(self.scenes(TEST), frames, strict=True)):
-            own, paths = one_scattering(self.noisy(TEST, row, seed, index), row.rays)
-            lit = self.frame(scene, paths)["color"] if row.usual else frame["direct"]
-            found.append(relit(frame, self.frame(scene, own)["color"], lit))
-        return found
+        jobs = [one_scattering(shot, row.rays) for shot in self.shots(TEST, row, seed)]
+        own = self.frames([job for job, _ in jobs])
+        lit = [f["direct"] for f in found]
+        if row.usual:
+            lit = [frame["color"] for frame in self.frames([paths for _, paths in jobs])]
+        return [relit(f, o["color"], light) for f, o, light in zip(found, own, lit, strict=True)]
 
 
 def rows_of_models(files: Sequence[str]) -> dict[str, Row]:
@@ -222,13 +195,13 @@ def rows_of_models(files: Sequence[str]) -> dict[str, Row]:
         model = wamnet.load(file)
         rays, shadow_rays, name = learned_feature_spp(model), learned_shadow_rays(model), Path(file).stem
         if f"trained_on_{FEATURE_SAMPLER}" in model.info:
-            chosen = [(rays // part, "") for part in FEWER]
+            chosen = [(rays // part, False) for part in FEWER]
         else:
-            chosen = [(rays, Settings().sampler), (spread_rays(rays), "")]
-        for count, sampler in chosen:
+            chosen = [(rays, True), (spread_rays(rays), False)]
+        for count, at_random in chosen:
             text = f"{count} shadow rays" if shadow_rays else "no shadow ray"
-            at = " at random" if sampler else ""
-            row = Row(count, shadow_rays, file=file, sampler=sampler)
+            at = " at random" if at_random else ""
+            row = Row(count, shadow_rays, file=file, at_random=at_random)
             rows[f"{name}, {count} camera rays{at}, {text}"] = row
     return rows
 
@@ -268,7 +241,7 @@ def options_of(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=12_000)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--executor", default="opencl")
-    parser.add_argument("--cache", type=Path, default=Path("out/shadows"))
+    parser.add_argument("--cache", type=Path, default=Path("out/lab"))
     return parser.parse_args(arguments)
 
 

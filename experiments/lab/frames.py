@@ -51,7 +51,7 @@ class Shot:
 
     Its features are means over `feature_spp` camera rays at random; 0: over the colour's. `seen`: features
     are also of what is seen past mirrors and glass. With `shadow_rays` of each camera ray the frame has the
-    layer `direct` too, and these camera rays are spread evenly.
+    layer `direct` too, and these camera rays are spread evenly, as with `spread`.
     """
 
     scene: str = "minicubes"
@@ -64,11 +64,12 @@ class Shot:
     seen: bool = False
     shadow_rays: int = 0
     settings: Settings = field(default_factory=Settings)
+    spread: bool = False
 
     @property
     def job(self) -> Job:
         """Return size, samples and seed as the renderer wants them."""
-        sampler = "" if self.shadow_rays else Settings().sampler
+        sampler = "" if self.shadow_rays or self.spread else Settings().sampler
         rays = {"feature_spp": self.feature_spp, "feature_sampler": sampler, "shadow_rays": self.shadow_rays}
         how = self.size, self.size, self.spp, self.seed, self.settings
         return Job(*how, seen=self.seen, **rays)  # type: ignore[arg-type]
@@ -84,7 +85,8 @@ def path_of(folder: Path, shot: Shot, executor: str) -> Path:
     job = shot.job.facts()
     if not shot.feature_spp:
         del job["feature_spp"]  # these files are older than it is
-    del job["feature_sampler"]  # the same for all that have no shadow rays, which are in the name
+    if shot.shadow_rays or not shot.spread:
+        del job["feature_sampler"]  # the same for all with shadow rays, and for all without
     scene = shot.build()
     layers = sorted([*shot.job.layers, *([SUN] if sun_of(scene) is not None else [])])
     made_from = [scene_digest(scene), job, executor, layers, version()]

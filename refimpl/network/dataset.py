@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
-from ..frame import DIRECT, FIRST_HIT, LAYERS, REMEDIES, SUN, Frame, check_finite
+from ..frame import DIRECT, FIRST_HIT, LAYERS, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -387,12 +387,7 @@ def encode_sums(
 
 
 def _encoded(frame: Frame, feature: Feature, normalization: Normalization) -> Array:
-    """Return one encoded feature (H, W, channels) in float64, or say which layer is missing."""
-    for layer in feature.layers:
-        if layer not in frame.layers:
-            what, rule = f"feature {feature.name!r}: layers of the frame", f"layer {layer!r} must be present"
-            remedy = REMEDIES.get(layer, "render it, or choose other features")
-            raise InputError(what, ", ".join(frame.layers), rule, remedy)
+    """Return one encoded feature (H, W, channels) in float64."""
     values, *others = (known(frame[layer].astype(np.float64)) for layer in feature.layers)
     if feature.guides:
         guides = dict(zip(feature.guides, others, strict=True))

@@ -204,10 +204,10 @@ def test_features_do_not_depend_on_the_frames_float_type() -> None:
 
 def test_missing_layer_is_named() -> None:
     frame = Frame({"color": np.zeros((2, 2, 3))})
-    message = "feature 'normal': layers of the frame 'color': layer 'normal' must be present (render it"
+    message = "layers of the frame 'color': layer 'normal' is missing (render it"
     with pytest.raises(InputError, match=re.escape(message)):
         dataset.feature_image(frame, ("color", "normal"), Normalization())
-    message = "layer 'direct' must be present (render it: --shadow-rays 1, or shadow_rays=1; bundled models"
+    message = "layer 'direct' is missing (render it: --shadow-rays 1, or shadow_rays=1; bundled models"
     with pytest.raises(InputError, match=re.escape(message)):
         dataset.feature_image(frame, ("color", "direct"), Normalization())
 

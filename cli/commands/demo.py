@@ -35,7 +35,7 @@ from ...models.data.scene_source import scene_source
 from ...models.model_file import load_checkpoint
 from ...refimpl.encoding import from_display, normal_to_display, to_display
 from ...refimpl.errors import InputError
-from ...refimpl.frame import Frame
+from ...refimpl.frame import DIRECT, Frame
 from ...refimpl.light.render import Job
 from ...refimpl.light.shading import build, ever_follows
 from ...refimpl.network.denoise import Model
@@ -131,11 +131,11 @@ def demo(
 
 
 def of_scene(plan: Plan, name: str) -> Plan:
-    """Return the plan for a scene: the preset that suits its materials, and views if it is static."""
+    """Return the plan for a scene: the preset for its materials and lights, and views if it is static."""
     source = scene_source(name)
     shown = source.at()
-    specular = ever_follows(build(shown, float))
-    preset = "sky" if shown.environment else "mirrors" if specular else plan.preset
+    matte = plan.preset if shown.lights else "best"
+    preset = "sky" if shown.environment else "mirrors" if ever_follows(build(shown, float)) else matte
     views = VIEWS if source.still is not None else {}
     return replace(plan, scene=name, scene_sha256=source.sha256, preset=preset, **views)
 
@@ -227,14 +227,15 @@ def _timed(seconds: dict[str, float], name: str, step: Callable[[], _Result]) ->
 
 def render_frames(plan: Plan, output: Path) -> None:
     """Render what an earlier run has not: the data set of the plan."""
-    source = scene_source(plan.scene)
+    source, features = scene_source(plan.scene), PRESETS[plan.preset].features
     request = frame_plan.Request(
         source.name,
         still=source.still,
         yaw_deg=plan.yaw_deg,
         pitch_deg=plan.pitch_deg,
         distance=plan.distance,
-        seen=sees(PRESETS[plan.preset].features),
+        seen=sees(features),
+        shadow_rays=int(DIRECT in features),
         frames=plan.train_frames,
         test_frames=plan.test_frames,
         size_px=plan.size_px,

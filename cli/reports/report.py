@@ -55,8 +55,8 @@ class Plan:
     test_frames: int = 2
     train_spp: int = 64
     reference_spp: int = 1024
-    feature_spp: int = 4
-    preset: str = "best"
+    feature_spp: int = 8
+    preset: str = "shadows"
     steps: int | None = None
     seed: int = 1
     renderer: str = "opencl"

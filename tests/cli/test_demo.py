@@ -77,7 +77,7 @@ def test_the_full_plan_is_what_is_promised() -> None:
     assert plan.train_frames >= 4
     assert plan.test_frames >= 2
     assert plan.feature_spp > 1
-    assert plan.preset == "best"
+    assert plan.preset == "shadows"
 
 
 def test_the_numbers_are_those_of_the_files(finished, report) -> None:
@@ -219,7 +219,7 @@ def test_the_report_tells_whose_picture_it_is(finished, report) -> None:
     ran = {run["executor"] for run in report["runs"] if not run["missing"]}
     assert report["denoised_by"] == next(name for name in ("opencl", "opengl", "numpy") if name in ran)
     html = (finished / "report.html").read_text()
-    assert "it sees color, normal, albedo, position of its" in html
+    assert "it sees color, normal, albedo, position, direct of its" in html
     assert "its own noise counts as error" in html
 
 

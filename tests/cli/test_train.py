@@ -134,7 +134,7 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
 
 def test_no_features_are_refused(refused, pair) -> None:
     """An empty list is not the preset's."""
-    assert "at least one, each once" in refused("train", *pair[:4], "--features", "")
+    assert "at least one, each once" in refused("train", *pair[:4], "--steps", "2", "--features", "")
 
 
 def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:

@@ -73,7 +73,7 @@ class Request:
 
     def choose(self, model: Model, network: KernelRequest, executor: str) -> KernelRequest:
         """Return a request with the variant and the schedule that the limits ask for; say which, and why."""
-        found = self._curve(model, network.profile, executor)
+        found = self._curve(model, network, executor)
         points = [
             each
             for each in found.points
@@ -86,12 +86,12 @@ class Request:
             say(f"not {point.variant}, schedule {point.schedule}: {rules}")
         return replace(network, variant=choice.point.variant, schedule=choice.point.schedule)
 
-    def _curve(self, model: Model, profile: str, executor: str) -> Curve:
+    def _curve(self, model: Model, network: KernelRequest, executor: str) -> Curve:
         """Return the curve to choose from: a file's, the cache folder's, or one that is measured and kept."""
         digest = variants.digest_of(model)
         if self.curve is not None:
             found = curve.read(self.curve)
-            wanted = Curve(digest, found.device, found.size, profile, ())
+            wanted = Curve(digest, found.device, found.size, network.profile, ())
             curve.check_fits(found, wanted, str(self.curve))
             return found
         if self.frames is None:
@@ -104,13 +104,14 @@ class Request:
         of_frames = hashlib.sha256((self.frames / dataset_files.MANIFEST).read_bytes()).hexdigest()
         names, size = measure_curve.names_for(model), (self.size or 1024, self.size or 1024)
         with open_executor(executor) as runner:
-            wanted = Curve(digest, runner.device, size, profile, ())
+            wanted = Curve(digest, runner.device, size, network.profile, ())
             key = curve.key_of(wanted, runner.name, of_frames, names)
             if (kept := curve.cached(key, wanted)) is not None:
                 say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
                 return kept
             with progress(f"measuring {len(names)} variants", 1.0) as advance:
-                found = measure_curve.measure(runner, model, size, profile, pairs, names, on_done=advance)
+                how = (size, network.profile, pairs, names)
+                found = measure_curve.measure(runner, model, *how, on_done=advance)
         path = cache.write_json(key, found.as_data())
         where = f"cached in {path}" if path else "not cached: no cache folder is writable"
         say(f"curve: {len(found.points)} points, measured now, {where}")

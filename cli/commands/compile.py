@@ -44,7 +44,7 @@ class OfScene:
     sampler: Sampler | None = option("Sampler (scenes only). [default: pcg4d]")
     lanes: int | None = option("Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs. [default: 1]")
 
-    def compiled(self, name: str, language: Language, profile: str) -> Artifact:
+    def compiled(self, name: str, language: Language, network: KernelRequest) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
         scene = load_scene(name, self.time, self.parameters or [])
         said_of_compiling(scene)
@@ -52,7 +52,7 @@ class OfScene:
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)
         programs = lower_scene.lower_scene(scene, settings, language.forms)
-        return compile_path(programs, language, profile, 1 if self.lanes is None else self.lanes)
+        return compile_path(programs, language, network.profile, 1 if self.lanes is None else self.lanes)
 
 
 def compile_model(
@@ -92,7 +92,7 @@ def compile_model(
         rule = f"{model} is a scene, whose kernels have one schedule, no variants"
         refuse(of_models, rule, "leave it out, or name a model")
         check_folder(folder, language.name, of_scene=True)
-        kernel = of_scene.compiled(model, language, network.profile)
+        kernel = of_scene.compiled(model, language, network)
     else:
         _check_name(model, given(of_scene))
         check_folder(folder, language.name)

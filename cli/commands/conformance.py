@@ -100,7 +100,7 @@ def conformance(
         write_text(as_json, report.to_json(name, profile, verdicts, tested.again))
     if junit is not None:
         write_text(junit, report.to_junit(name, verdicts, tested.again))
-    _print_counts(name, profile, verdicts)
+    _print_counts(f"Conformance of {name}, profile {profile}", verdicts)
     failed = [verdict for verdict in verdicts if verdict.failed]
     if track is not None and before is not None:
         changed = report.changes(before, verdicts)
@@ -136,7 +136,7 @@ def _command(program: str | None, executor: str | None) -> list[str]:
     return [sys.executable, "-m", "wamnet.spec.conformance.program", "--executor", str(executor)]
 
 
-def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
+def _print_counts(title: str, verdicts: Sequence[Verdict]) -> None:
     """Print a table with a line a kind."""
     rows = []
     for known in counts(verdicts):
@@ -146,7 +146,7 @@ def _print_counts(name: str, profile: str, verdicts: Sequence[Verdict]) -> None:
         ratio = f"{known.ratio:.2f}" if passed else "-"
         rows.append((known.kind, str(known.cases), str(passed), text, str(unsupported), ratio))
     header = ("kind", "cases", "pass", "failed", "unsupported", "error / bound")
-    table(f"Conformance of {name}, profile {profile}", header, rows)
+    table(title, header, rows)
     failed = sum(verdict.failed for verdict in verdicts)
     passed = sum(verdict.verdict == PASS for verdict in verdicts)
     rest = len(verdicts) - passed - failed

@@ -1,7 +1,7 @@
 """`wamnet train`: from pairs of a noisy frame and its reference to a model."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from ...kernels.run.trainer import model_of_run
 from ...models import model_file
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Frame
+from ...refimpl.network import train as reference
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.domain import LEAST_FRAMES, Domain, of_model
 from ...refimpl.network.siren import Siren
@@ -295,7 +296,10 @@ def fit(
                 model_file.save_checkpoint(saved, now)
                 kept = monotonic()
 
-        with _trainer(executor) as train:
+        with ExitStack() as opened:
+            train: Callable[..., TrainState] = reference.train
+            if executor != "numpy":
+                train = partial(kernels.train_on, opened.enter_context(kernels.open_executor(executor)))
             state = train(
                 recipe,
                 pairs,
@@ -307,18 +311,6 @@ def fit(
     seconds = monotonic() - started
     model_file.save_model(output, model_of_run(state, pairs))
     return state, seconds
-
-
-@contextmanager
-def _trainer(executor: str) -> Iterator[Callable[..., TrainState]]:
-    """Give the reference's trainer, or that of a device, which is closed afterwards."""
-    if executor == "numpy":
-        from ...refimpl.network.train import train
-
-        yield train
-        return
-    with kernels.open_executor(executor) as device:
-        yield partial(kernels.train_on, device)
 
 
 def _said_of_domain(domain: Domain | None) -> str:

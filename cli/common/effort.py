@@ -1,8 +1,8 @@
 """What large work will take, said before it starts: nothing is forbidden, but nobody should have to guess.
 
 1. Every path meets every primitive at each bounce, so rendering takes a time in proportion to samples times
-   primitives; the reference also starts some operations for each primitive and tile [`seconds_of`].
-2. Memory goes into the primitives' tables and the layers of the picture [`said_of_rendering`].
+   primitives; the reference also starts some operations for each primitive and tile.
+2. Memory goes into the primitives' tables and the layers of the picture.
 3. From a stated size on a sentence says both [`said_of_rendering`], [`said_of_compiling`],
    [`said_of_measuring`], [`said_of_learning`].
 
@@ -45,18 +45,14 @@ _PRIMITIVE_BYTES, _PIXEL_BYTES = 2_000, 500
 their means, and the frame."""
 
 
-def seconds_of(count: int, samples: int, pixels: int, executor: str, workers: int) -> float:
-    """Return how long rendering may take, of pictures of so many pixels each."""
-    if executor != "numpy":
-        return count * samples * _KERNEL_SAMPLE_S
-    tiles = samples / pixels * math.ceil(pixels / TILE_PIXELS)
-    return count * (samples * _NUMPY_SAMPLE_S + tiles * _NUMPY_START_S) / max(workers, 1)
-
-
 def said_of_rendering(scene: Scene, samples: int, pixels: int, executor: str, workers: int | None) -> None:
     """Say what large work takes; `pixels` are those of one picture."""
     count = primitives(scene) + (scene.room is not None)
-    seconds = seconds_of(count, samples, pixels, executor, workers or len(os.sched_getaffinity(0)))
+    if executor != "numpy":
+        seconds = count * samples * _KERNEL_SAMPLE_S
+    else:
+        work = samples * _NUMPY_SAMPLE_S + samples / pixels * math.ceil(pixels / TILE_PIXELS) * _NUMPY_START_S
+        seconds = count * work / (workers or len(os.sched_getaffinity(0)))
     if count >= MANY_PRIMITIVES or samples >= 10**9:
         size = count * _PRIMITIVE_BYTES + pixels * _PIXEL_BYTES
         _say(f"{count:,} primitives and {samples:,} samples", seconds, size)

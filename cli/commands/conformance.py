@@ -11,7 +11,7 @@ import typer
 
 from ...compiler.core.profiles import profile_named
 from ...kernels.devices.registry import EXECUTORS
-from ...kernels.export.runners import RUNNERS
+from ...kernels.export.targets import RUNNERS
 from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...spec.conformance import report, run
 from ...spec.conformance import vectors as all_vectors

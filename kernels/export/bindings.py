@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...compiler.artifact import Artifact, files_of
+from ...compiler.artifact import Artifact
 from ...compiler.core.ir import OUTPUT_ENCODING
 from ...compiler.core.lower import lower
 from ...compiler.kernel.interface import (
@@ -51,9 +51,32 @@ def encoding(model: Model) -> str:
 
 
 def kernels(row: Row, made: Mapping[str, Artifact], passes: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return what a manifest says about each kernel, by its name, in the order in which they run."""
-    of_host = [_pass(row, name, text) for name, text in passes.items()]
-    return [*of_host, *(_kernel(row, name, kernel) for name, kernel in made.items())]
+    """Return what a manifest says about each kernel, by its name, in the order in which they run.
+
+    Passes of a host that write a feature come first.
+    """
+    written = {"name": "colour", "access": WRITE, "type": "float32", "shape": ["height", "width", 4]}
+    found: list[dict[str, Any]] = [
+        {
+            "role": f"feature {name}",
+            "files": [f"features/{file}" for file in row.files(f"feature.{name}", text)],
+            "entry_point": row.entry or "fragment",
+            "bindings": [{**written, "slot": f"the texture of image_{name}"}],
+            "arguments": "none: the host's own; every frame has random numbers of its own",
+        }
+        for name, text in passes.items()
+    ]
+    for role, kernel in made.items():
+        facts = {
+            "role": role,
+            "files": [f"{role}/{name}" for name in sorted(row.files(kernel.role, kernel.source))],
+            "entry_point": row.entry or kernel.entry_point,
+            "bindings": SLOTS[row.slots](kernel.interface),
+            "arguments": kernel.manifest["arguments"],
+        }
+        own = {"schedule": kernel.manifest["schedule"]} if kernel.role == DENOISE else {}
+        found.append(facts | own)
+    return found
 
 
 def _bound(interface: Interface) -> list[Binding]:
@@ -68,31 +91,6 @@ def _bound(interface: Interface) -> list[Binding]:
         }
         for array in arrays
     ]
-
-
-def _kernel(row: Row, role: str, kernel: Artifact) -> dict[str, Any]:
-    """Return what a manifest says about one kernel."""
-    files = sorted(row.files(kernel.role, kernel.source))
-    return {
-        "role": role,
-        "files": [f"{role}/{name}" for name in files],
-        "entry_point": row.entry or kernel.entry_point,
-        "bindings": SLOTS[row.slots](kernel.interface),
-        "arguments": kernel.manifest["arguments"],
-        **({"schedule": kernel.manifest["schedule"]} if kernel.role == DENOISE else {}),
-    }
-
-
-def _pass(row: Row, name: str, text: str) -> dict[str, Any]:
-    """Return what a manifest says about a pass that writes a feature."""
-    written = {"name": "colour", "access": WRITE, "type": "float32", "shape": ["height", "width", 4]}
-    return {
-        "role": f"feature {name}",
-        "files": [f"features/{file}" for file in row.files(f"feature.{name}", text)],
-        "entry_point": row.entry or "fragment",
-        "bindings": [{**written, "slot": f"the texture of image_{name}"}],
-        "arguments": "none: the host's own; every frame has random numbers of its own",
-    }
 
 
 def _integer(name: str) -> Binding:
@@ -208,14 +206,6 @@ def inputs_of(model: Model, language: Language) -> list[Input]:
     if before:
         found.append(Input(compile_history(language), "follow", "A history with one picture more.", before))
     return found
-
-
-def inputs_written(inputs: Sequence[Input]) -> dict[str, bytes]:
-    """Return the files of these kernels by path."""
-    files: dict[str, bytes] = {}
-    for each in inputs:
-        files |= {f"{FOLDER}/{each.name}/{name}": data for name, data in files_of(each.kernel).items()}
-    return files
 
 
 def input_facts(inputs: Sequence[Input]) -> list[dict[str, Any]]:

@@ -25,8 +25,7 @@ from ..devices.kernel import Part
 from . import onnx_export
 from .check_pair import SEED
 from .package import Export
-from .runners import opened
-from .targets import ONNX, TARGETS, Row
+from .targets import ONNX, TARGETS, Row, opened
 
 OPERATIONS = 10_000
 """Operations of a path of six surfaces, rounded up: sums may be off by so many roundings of values near 1."""
@@ -104,7 +103,9 @@ def check(export: Export) -> Verdict:
         return Verdict(*known, compiled, "refused", wrong=str(error))
     pair = export.pair
     off = np.abs(found.astype(np.float64) - pair.output)
-    share = float(np.max(_shares(off, pair.bound)))
+    with np.errstate(divide="ignore"):
+        # No error is a share of 0 even of a bound 0; any other is infinite then.
+        share = float(np.max(np.divide(off, pair.bound, out=np.zeros_like(off), where=off != 0)))
     times = f"{share:.3g} times the bound" if pair.bound.any() else "where each bit is promised"
     wrong = "" if share <= 1 else f"off by {off.max():.3g}, {times}"
     if paths is not None and not paths >= PATHS_ALIKE:
@@ -116,12 +117,6 @@ def check(export: Export) -> Verdict:
 def digest_of(picture: NDArray[np.float32]) -> str:
     """Return the SHA-256 of a picture as raw little-endian float32, as `check/output.f32` holds one."""
     return sha256(np.ascontiguousarray(picture, "<f4").tobytes())
-
-
-def _shares(off: NDArray[np.float64], bound: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return errors as shares of their bounds; no error is 0 even of a bound 0, any other then infinite."""
-    with np.errstate(divide="ignore"):
-        return np.divide(off, bound, out=np.zeros_like(off), where=off != 0)
 
 
 UNTOLD: Mapping[str, str] = {"metal": "none of Apple's here", "onnx": "onnx.checker"}
@@ -138,19 +133,14 @@ def _compiled(export: Export) -> tuple[str, str]:
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
         try:
-            for path in _sources(export, tool.suffix):
-                tool.take(folder, path, *tool.options)
+            for path in (name for kernel in export.manifest["kernels"] for name in kernel["files"]):
+                if path.endswith(tool.suffix):
+                    tool.take(folder, path, *tool.options)
         except ExecutorUnavailable as error:
             return f"missing: {error}", ""
         except CompileError as error:
             return "", str(error)
     return tool.title, ""
-
-
-def _sources(export: Export, suffix: str) -> list[str]:
-    """Return the kernels' files of a suffix."""
-    named = [name for kernel in export.manifest["kernels"] for name in kernel["files"]]
-    return [name for name in named if name.endswith(suffix)]
 
 
 def runner(row: Row, kernel: str) -> Executor:

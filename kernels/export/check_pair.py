@@ -136,10 +136,10 @@ def pair(
     if programs is None:
         images = _livelier(plan.analysed, size)
     else:
-        planes, sums = _sums(programs, model.features, plan.profile.name, size)
+        summed = partial(_sums, programs, model.features, plan.profile.name, size)
+        planes, sums = summed()
         rays = programs.rays.count if programs.rays else 0
         images = _encoded(model, dict(zip(planes, sums, strict=True)), rays)
-        summed = partial(_sums, programs, model.features, plan.profile.name, size)
         moments = tuple(Moment(row, summed(row)[1]) for row in rows)
     held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
     output = held.value.astype(np.float32)

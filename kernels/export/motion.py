@@ -22,7 +22,7 @@ from ...compiler.scenes.path_kernel import numbers_of
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...refimpl import rng
 from ...refimpl.errors import InputError, choice
-from ...refimpl.light.scene import Light, Scene
+from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 
 TIME, CAMERA, LIGHTS, POSITIONS = "time", "camera", "lights", "positions"
@@ -116,14 +116,20 @@ class Motion:
 
 def drawn(scene: Scene, kinds: Collection[str], number: int) -> Scene:
     """Return the scene with drawn values of what moves, apart from time; another number draws others."""
-    draw = _draws(number)
+    words = rng.counter(np.arange(MOST_DRAWS))
+    shares, *_ = rng.uniforms(rng.counter(number), words, rng.counter(0), rng.counter(0), np.float64)
+    draw = iter(shares.tolist())
     if CAMERA in kinds:
         camera = scene.camera
         view = camera.vertical_fov_deg * (0.8 + 0.4 * next(draw))
         places = {"position": _moved(camera.position, draw), "look_at": _moved(camera.look_at, draw)}
         scene = replace(scene, camera=replace(camera, **places, vertical_fov_deg=view))
     if LIGHTS in kinds:
-        scene = replace(scene, lights=tuple(_relit(light, draw) for light in scene.lights))
+        lights = []
+        for light in scene.lights:
+            color = (0.1 + next(draw), 0.1 + next(draw), 0.1 + next(draw))
+            lights.append(replace(light, color=color, power=light.power * (0.5 + next(draw))))
+        scene = replace(scene, lights=tuple(lights))
     if POSITIONS in kinds:
         shapes: dict[str, Any] = {
             kind: tuple(replace(one, **{at: _moved(getattr(one, at), draw)}) for one in getattr(scene, kind))
@@ -131,12 +137,6 @@ def drawn(scene: Scene, kinds: Collection[str], number: int) -> Scene:
         }
         scene = replace(scene, **shapes)
     return scene
-
-
-def _relit(light: Light, draw: Iterator[float]) -> Light:
-    """Return a lamp with a drawn colour and power."""
-    color = (0.1 + next(draw), 0.1 + next(draw), 0.1 + next(draw))
-    return replace(light, color=color, power=light.power * (0.5 + next(draw)))
 
 
 PLACES: Mapping[str, str] = {"boxes": "center", "spheres": "center", "quads": "corner", "lights": "corner"}
@@ -153,10 +153,3 @@ def _moved(place: tuple[float, float, float], draw: Iterator[float]) -> tuple[fl
     """Return a place near another."""
     x, y, z = (value + FARTHEST * (2 * next(draw) - 1) for value in place)
     return x, y, z
-
-
-def _draws(number: int) -> Iterator[float]:
-    """Return random numbers in [0, 1), a list of its own for each number."""
-    words = rng.counter(np.arange(MOST_DRAWS))
-    found, *_ = rng.uniforms(rng.counter(number), words, rng.counter(0), rng.counter(0), np.float64)
-    return iter(found.tolist())

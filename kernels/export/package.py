@@ -13,12 +13,15 @@ Everything is a function of model, scene and request, and of the translators' ve
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiler import artifact as artifacts
 from ...compiler.artifact import Artifact
@@ -33,8 +36,8 @@ from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path, feature_pass
 from ...compiler.schedules.names import remedy
 from ...compiler.targets import Language, language_named
-from ...compiler.variants import FULL, parse, plan_model, vary
-from ...refimpl.errors import InputError, choice
+from ...compiler.variants import FULL, Varied, parse, plan_model, vary
+from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
@@ -43,7 +46,6 @@ from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
 from .hosts import scratch
-from .hosts.picture import beside
 from .hosts.table import HOSTS, host_named
 from .motion import ROWS_NAME, Motion
 from .targets import NAMES, ONNX, PASSES, TARGETS, Limit, Place, Row
@@ -69,6 +71,9 @@ HALVES_NAME = "weights16.bin"
 EXPECTED_NAME = "expected.png"
 """What a host shows of the check pair, as the reference draws it."""
 
+ENLARGED = 12
+"""How many times as large each pixel is: the pair has few."""
+
 
 @dataclass(frozen=True)
 class Request:
@@ -87,6 +92,11 @@ class Request:
     schedule: str = ""
     motion: Motion | None = None
     host: str = ""
+
+    @cached_property
+    def varied(self) -> Varied:
+        """Return the variant of the model."""
+        return vary(parse(self.variant), self.model)
 
 
 @dataclass(frozen=True)
@@ -125,8 +135,17 @@ def export(request: Request) -> Export:
     if request.target == ONNX:
         return _graph(request)
     row = TARGETS[request.target]
-    how, place = _place(row, request.weights)
-    schedule = _schedule(row, how, place, request.schedule)
+    how = request.weights or next(iter(row.places))
+    if how not in row.places:
+        rule = f"is not available for target {row.name}"
+        raise InputError("--weights", how, rule, f"{choice(how, row.places)}, or leave it out")
+    place = row.places[how]
+    schedule = request.schedule or place.schedules[0]
+    if schedule not in place.schedules:
+        rule = f"is not available for target {row.name} with --weights {how}"
+        raise InputError(
+            "--schedule", schedule, rule, f"{remedy(schedule, place.schedules)}, or leave it out"
+        )
     plan = plan_model(request.model, place.kernel, request.profile, schedule, request.variant)
     denoiser = compile_plan(plan)
     limits = _limits(request, row, place, denoiser)
@@ -146,7 +165,7 @@ def export(request: Request) -> Export:
         found = row.files(f"feature.{name}", text)
         files |= {f"features/{n}": data for n, data in found.items()}
         _check(row.source, max(map(len, found.values())), row.name)
-    model, promised = vary(parse(request.variant), request.model).model, plan.bound.output is not None
+    model, promised = plan.model, plan.bound.output is not None
     others = []
     if request.motion:
         files[f"path/{ROWS_NAME}"] = request.motion.rows(request.settings).astype("<f4").tobytes()
@@ -154,7 +173,9 @@ def export(request: Request) -> Export:
     pair = check_pair.pair(plan, model, promised, programs, others)
     files |= {f"check/{name}": data for name, data in pair.files().items()}
     made_by = [] if request.model.is_imported else bindings.inputs_of(model, _usual(row))
-    files |= bindings.inputs_written(made_by)
+    for each in made_by:
+        folder = f"{bindings.FOLDER}/{each.name}"
+        files |= {f"{folder}/{name}": data for name, data in artifacts.files_of(each.kernel).items()}
     facts = _facts(request, row, how, denoiser, limits, bool(halves)) | {"schedules": list(place.schedules)}
     facts["scene"] = _scene(request, programs)
     facts["kernels"] = bindings.kernels(row, kernels, passes)
@@ -182,7 +203,7 @@ def _hosted(request: Request) -> Request:
         rule = f"host {host.name} runs kernels of target {host.target}"
         raise InputError("--target", request.target, rule, "leave it out, or leave --host out")
     scene = None if request.scene is None else request.scene.name
-    two = vary(parse(request.variant), request.model).rank > 0
+    two = request.varied.rank > 0
     host.check(scene, request.motion is not None, two, request.variant, request.model.features)
     weights, schedule = request.weights or host.weights, request.schedule or host.schedule
     if schedule == PASSES:
@@ -200,10 +221,11 @@ def _graph(request: Request) -> Export:
         raise InputError("--weights", request.weights, "the graph contains them", "leave it out")
     if request.schedule:
         raise InputError("--schedule", request.schedule, "the runtime schedules it", "leave it out")
-    varied = vary(parse(request.variant), request.model)
-    data = onnx_export.graph(varied.model)
-    plan, model = plan_program(lower(varied.model), "numpy"), varied.model
-    pair = check_pair.pair(plan, model, promised=model.is_whole)
+    model = request.varied.model
+    data, plan = onnx_export.graph(model), plan_program(lower(model), "numpy")
+    pair, network = check_pair.pair(plan, model, promised=model.is_whole), model.siren
+    factors = network.factors if isinstance(network, Whole) else ()
+    count = sum(array.size for array in (*network.weights, *network.biases, *factors))
     files = {"denoise/denoise.onnx": data}
     files |= {f"check/{name}": content for name, content in pair.files().items()}
     facts = {
@@ -214,7 +236,7 @@ def _graph(request: Request) -> Export:
         "output": {"name": "result", "channels": 3, "encoding": bindings.encoding(model)},
         **onnx_export.promise(model),
         "certificate": None,
-        "weights": {"where": "inline", "count": _count(model), "file": None, "order": "initialisers"},
+        "weights": {"where": "inline", "count": count, "file": None, "order": "initialisers"},
         "limits": [],
         "schedules": [],
         "kernels": [onnx_export.kernel(model)],
@@ -234,6 +256,22 @@ def _finished(export: Export) -> Export:
         seen = first if first.shape[2] == 3 else pair.output
         files = {**files, **host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
     return _closed(replace(export, files=files, manifest=facts))
+
+
+def beside(noisy: NDArray[np.float32], output: NDArray[np.float32]) -> bytes:
+    """Return the pair's colour (H, W, 3) and the reference's output beside it, enlarged, as a file.
+
+    Raises `ExecutorUnavailable` where Pillow is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError:
+        raise ExecutorUnavailable("Pillow is not installed: pip install 'wamnet[full]'") from None
+    both = np.concatenate([noisy, output], axis=1).clip(0, 1)
+    large = both.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
+    file = io.BytesIO()
+    Image.fromarray((255 * large + 0.5).astype(np.uint8)).save(file, format="PNG", optimize=True)
+    return file.getvalue()
 
 
 def _closed(export: Export) -> Export:
@@ -266,13 +304,12 @@ def _facts(
     """Return the entries of a manifest other than kernels and files."""
     held = denoiser.manifest
     first = denoiser.kernels[0].manifest
-    size = vary(parse(request.variant), request.model).model.window.size
     return {
         "language": row.text,
         "profile": held["profile"],
         "model": _model(request),
         "images": first["images"],
-        "window": {"size": size, "border": first["window"]["border"]},
+        "window": {"size": denoiser.plan.model.window.size, "border": first["window"]["border"]},
         "output": held["output"],
         "bound": held["bound"],
         "assumes": denoiser.plan.assumes,
@@ -311,8 +348,7 @@ def _scene(request: Request, programs: PathPrograms | None) -> dict[str, Any] | 
 
 def _model(request: Request) -> dict[str, Any]:
     """Return what a manifest says about the model."""
-    varied = vary(parse(request.variant), request.model).model
-    domain = of_model(request.model)
+    varied, domain = request.varied.model, of_model(request.model)
     return {
         **({"domain": asdict(domain)} if domain else {}),
         "features": list(varied.features),
@@ -320,30 +356,6 @@ def _model(request: Request) -> dict[str, Any]:
         "variant": request.variant,
         "feature_spp": learned_feature_spp(request.model) or 1,
     }
-
-
-def _count(model: Model) -> int:
-    """Return the number of a model's weights and biases, and of the factors of one of integers."""
-    network = model.siren
-    factors = network.factors if isinstance(network, Whole) else ()
-    return sum(array.size for array in (*network.weights, *network.biases, *factors))
-
-
-def _place(row: Row, wanted: str) -> tuple[str, Place]:
-    """Return the place of the weights and its name."""
-    how = wanted or next(iter(row.places))
-    if how not in row.places:
-        rule = f"is not available for target {row.name}"
-        raise InputError("--weights", how, rule, f"{choice(how, row.places)}, or leave it out")
-    return how, row.places[how]
-
-
-def _schedule(row: Row, how: str, place: Place, wanted: str) -> str:
-    """Return the schedule that is wanted, or the usual one."""
-    if wanted and wanted not in place.schedules:
-        rule = f"is not available for target {row.name} with --weights {how}"
-        raise InputError("--schedule", wanted, rule, f"{remedy(wanted, place.schedules)}, or leave it out")
-    return wanted or place.schedules[0]
 
 
 def _check(limit: Limit | None, needs: float, name: str) -> list[dict[str, Any]]:
@@ -406,26 +418,17 @@ def _of_scene(
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}
-    model, language = vary(parse(request.variant), request.model).model, _usual(row)
-    if row.single:
-        header = [f"wamnet: a noisy feature of scene {_plain(request.scene.name)}, one sample a pixel."]
-        return (
-            None,
-            None,
-            {
-                name: feature_pass(programs, name, model.normalization, row.name, header, model.is_whole)
-                for name in model.features
-            },
-        )
-    path = compile_path(
-        programs, language, request.profile, groups=tuple(dict.fromkeys(layers_of(model.features)))
-    )
-    rays = programs.rays.count if programs.rays else 0
+    model, language = request.varied.model, _usual(row)
     scales, whole = model.normalization, model.is_whole
+    if row.single:
+        name = "".join(letter if letter.isalnum() else "_" for letter in request.scene.name[:60])
+        header = [f"wamnet: a noisy feature of scene {name}, one sample a pixel."]
+        passes = {
+            each: feature_pass(programs, each, scales, row.name, header, whole) for each in model.features
+        }
+        return None, None, passes
+    groups = tuple(dict.fromkeys(layers_of(model.features)))
+    path = compile_path(programs, language, request.profile, groups=groups)
+    rays = programs.rays.count if programs.rays else 0
     encoder = compile_encode(model.features, scales, language, request.profile, path.planes, whole, rays)
     return path, encoder, {}
-
-
-def _plain(name: str) -> str:
-    """Return a scene's name for a comment."""
-    return "".join(letter if letter.isalnum() else "_" for letter in name[:60])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ...compiler.artifact import Artifact, schedule_text
@@ -83,14 +83,16 @@ def readme(
     `denoiser`: the kernel, None where it is a graph; `host`: the program around it, if there is one; `sizes`:
     the bytes of files by path.
     """
+    # An imported network has numbers of its own.
+    own = facts["output"]["encoding"] == OWN_NUMBERS
+    encoded = "" if own else " Colour is encoded for the display already."
     lines = [
         f"# Denoiser for {facts['target']}",
         "",
         f"{facts['language']}. Written by `wamnet export`; `manifest.json` says the same for programs.",
         "",
         *_hosted(host),
-        *_facts(facts),
-        *_stack(facts, denoiser),
+        *_facts(facts, denoiser),
         *(PRECISIONS if facts["target"] == ONNX else ()),
         "",
         "## Kernels, in the order in which they run",
@@ -102,7 +104,7 @@ def readme(
         _code(facts),
         "```",
         "",
-        f"Rows: row 0 of every image is the picture's TOP row.{_encoded(facts)}",
+        f"Rows: row 0 of every image is the picture's TOP row.{encoded}",
         "",
         *input_section(facts),
         *_moving(facts),
@@ -120,12 +122,6 @@ def readme(
         "",
     ]
     return "\n".join(lines)
-
-
-def _encoded(facts: Mapping[str, Any]) -> str:
-    """Return the sentence about the output's colour; an imported network has numbers of its own."""
-    own = facts["output"]["encoding"] == OWN_NUMBERS
-    return "" if own else " Colour is encoded for the display already."
 
 
 def _hosted(host: Host | None) -> list[str]:
@@ -153,88 +149,49 @@ def _hosted(host: Host | None) -> list[str]:
     ]
 
 
-def _facts(facts: Mapping[str, Any]) -> list[str]:
-    """Return the lines about the whole."""
-    bound, window, weights = facts["bound"]["output"], facts["window"], facts["weights"]
-    promise = f"no promise ({facts['bound']['against']})"
-    if bound:
-        size = f"at most {max(bound):g} from the float64 reference"
-        promise = f"{size if any(bound) else 'none, the same bits'}, for every picture in the stated ranges"
-    images = [
-        f"* Image `{i['name']}`: {i['channels']} channels in [{i['low']:g}, {i['high']:g}]; {i['encoding']}."
-        for i in facts["images"]
-    ]
-    return [
-        f"* Error: {promise}.",
-        *([f"* This assumes: {facts['assumes']}."] if facts["assumes"] else []),
-        f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`.",
-        f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}.",
-        *_halves(facts),
-        *_schedule(facts),
-        *_speed(facts),
-        f"* Output: {facts['output']['encoding'] or 'linear'}.",
-        *images,
-        *_rays(facts),
-        *_domain(facts["model"]),
-        "* Size: no image, and no buffer of sums, may hold 2^31 numbers or more.",
-        *(f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"]),
-    ]
-
-
-def _stack(facts: Mapping[str, Any], denoiser: Artifact | None) -> list[str]:
-    """Return the lines about the stack of functions in C."""
-    if denoiser is None or TARGETS[facts["target"]].slots != "header":
-        return []
-    most = max(map(scratch.stack_of, denoiser.kernels))
-    return [
-        f"* Stack: a call of the denoiser takes up to {most:,} bytes of its thread's stack. For threads with",
-        f"  less (musl: 131,072), `wamnet_image_with` of `{scratch.NAME}` runs it on memory that you pass.",
-    ]
-
-
-def _domain(model: Mapping[str, Any]) -> list[str]:
-    """Return the line about the frames that the model has learned."""
-    if "domain" not in model:
-        return []
-    frames, threshold = model["domain"]["frames"], model["domain"]["threshold"]
-    return [
-        f"* Domain: `model.domain` in the manifest describes the features of {frames} frames that it has "
-        f"learned (DOM-1); a frame farther than {threshold:.3g} from them may be denoised poorly (DOM-2)."
-    ]
-
-
-def _schedule(facts: Mapping[str, Any]) -> list[str]:
-    """Return the line about the denoiser's schedule, with the names of the other schedules."""
-    picked = facts["kernels"][-1].get("schedule")
-    if picked is None:
-        return []
-    others = [name for name in facts["schedules"] if name != picked["name"]]
-    besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
-    return [f"* Schedule: {schedule_text(picked)}.{besides}"]
-
-
-def _halves(facts: Mapping[str, Any]) -> list[str]:
-    """Return the line about weights in half precision."""
-    name = facts["weights"].get("half")
-    if name is None:
-        return []
-    return [
-        f"* `{name}` has the same weights as 16-bit floats: widen them when you load, and nothing changes."
-    ]
-
-
-def _speed(facts: Mapping[str, Any]) -> list[str]:
-    """Return the line about the time of a picture."""
-    speed = facts.get("speed")
-    if speed is None:
-        return []
-    plain = f"{speed['plain_ms']:.3g} ms with -O2 alone; " if "plain_ms" in speed else ""
-    between = f"{speed['least_ms']:.3g} to {speed['most_ms']:.3g}, {speed['rounds']} runs"
-    return [
-        f"* Speed: {speed['ms']:.3g} ms ({between}) for {speed['size']} x {speed['size']} pixels",
-        f"  on {speed['device']}, with copies of the images there and back;",
-        f"  {plain}{speed['compile_s']:.2g} s to compile. `wamnet export --measure` measures it again.",
-    ]
+def _facts(facts: Mapping[str, Any], denoiser: Artifact | None) -> Iterator[str]:
+    """Yield the lines about the whole."""
+    bound, window, weights, model = (facts[name] for name in ("bound", "window", "weights", "model"))
+    promise = f"no promise ({bound['against']})"
+    if output := bound["output"]:
+        size = f"at most {max(output):g} from the float64 reference"
+        promise = f"{size if any(output) else 'none, the same bits'}, for every picture in the stated ranges"
+    yield f"* Error: {promise}."
+    if facts["assumes"]:
+        yield f"* This assumes: {facts['assumes']}."
+    yield f"* Window: {window['size']} x {window['size']} pixels, border rule `{window['border']}`."
+    yield f"* Weights: {weights['count'] or 'all'} numbers, {weights['where']}."
+    if half := weights.get("half"):
+        widened = "widen them when you load, and nothing changes"
+        yield f"* `{half}` has the same weights as 16-bit floats: {widened}."
+    if picked := facts["kernels"][-1].get("schedule"):
+        others = [name for name in facts["schedules"] if name != picked["name"]]
+        besides = f" Others, by `--schedule`: {', '.join(others)}." if others else ""
+        yield f"* Schedule: {schedule_text(picked)}.{besides}"
+    if speed := facts.get("speed"):
+        plain = f"{speed['plain_ms']:.3g} ms with -O2 alone; " if "plain_ms" in speed else ""
+        between = f"{speed['least_ms']:.3g} to {speed['most_ms']:.3g}, {speed['rounds']} runs"
+        yield f"* Speed: {speed['ms']:.3g} ms ({between}) for {speed['size']} x {speed['size']} pixels"
+        yield f"  on {speed['device']}, with copies of the images there and back;"
+        yield f"  {plain}{speed['compile_s']:.2g} s to compile. `wamnet export --measure` measures it again."
+    yield f"* Output: {facts['output']['encoding'] or 'linear'}."
+    for i in facts["images"]:
+        between = f"[{i['low']:g}, {i['high']:g}]"
+        yield f"* Image `{i['name']}`: {i['channels']} channels in {between}; {i['encoding']}."
+    yield from _rays(facts)
+    if "domain" in model:
+        frames, threshold = model["domain"]["frames"], model["domain"]["threshold"]
+        yield (
+            f"* Domain: `model.domain` in the manifest describes the features of {frames} frames that it has "
+            f"learned (DOM-1); a frame farther than {threshold:.3g} from them may be denoised poorly (DOM-2)."
+        )
+    yield "* Size: no image, and no buffer of sums, may hold 2^31 numbers or more."
+    yield from (f"* Limit: {x['name']}: needs {x['needs']} of {x['most']}." for x in facts["limits"])
+    if denoiser is not None and TARGETS[facts["target"]].slots == "header":
+        most, memory = max(map(scratch.stack_of, denoiser.kernels)), "its thread's stack. For threads with"
+        yield f"* Stack: a call of the denoiser takes up to {most:,} bytes of {memory}"
+        with_memory = f"`wamnet_image_with` of `{scratch.NAME}`"
+        yield f"  less (musl: 131,072), {with_memory} runs it on memory that you pass."
 
 
 WRITTEN = "write_buffer(scene_numbers, rows + {count} * moment); /* {slot} of the path kernel */"
@@ -298,34 +255,27 @@ def _rays(facts: Mapping[str, Any]) -> list[str]:
     return [line]
 
 
-def _proof(facts: Mapping[str, Any], denoiser: Artifact | None) -> list[str]:
-    """Return the lines about the certificate, and about what reads the kernel's text (CER-1, TXT-7)."""
+def _proof(facts: Mapping[str, Any], denoiser: Artifact | None) -> Iterator[str]:
+    """Yield the lines about the certificate, and about what reads the kernel's text (CER-1, TXT-7)."""
     if denoiser is None:
-        return ["There is no certificate: a runtime makes kernels of its own from a graph."]
+        yield "There is no certificate: a runtime makes kernels of its own from a graph."
+        return
     if denoiser.certificate is None:
-        found = [f"There is no certificate: {denoiser.plan.unproven}."]
+        yield f"There is no certificate: {denoiser.plan.unproven}."
     else:
         bound = max(denoiser.certificate["bound"]["output"])
         size = f"a bound of {bound:g} for all images" if bound else "that no operation rounds"
-        found = [
-            f"`{facts['certificate']}` proves {size} in their ranges. This command checks it:",
-            *("", "```text", "wamnet certify denoise", "```", ""),
-            _text(facts, denoiser),
-        ]
+        yield f"`{facts['certificate']}` proves {size} in their ranges. This command checks it:"
+        yield from ("", "```text", "wamnet certify denoise", "```", "")
+        source = denoiser.source_name
+        made = [f"`{name}`" for name in facts["kernels"][-1]["files"] if name != f"denoise/{source}"]
+        besides = f" {', '.join(made)}: translated from it, and not read." if made else ""
+        reads = f"It reads `denoise/{source}` too, and checks that this text computes what is certified."
+        kind = f"schedule {denoiser.manifest['schedule']['name']}, profile {denoiser.profile}"
+        unread = f"It does not read `{source}`, whose kind ({kind}) it does not know."
+        yield reads + besides if is_read(denoiser.manifest) else unread
     if facts["scene"] is not None:
-        found += ["", "What traces paths or encodes features has no certificate."]
-    return found
-
-
-def _text(facts: Mapping[str, Any], denoiser: Artifact) -> str:
-    """Return what the command does with the text of a kernel that has a certificate."""
-    source, schedule = denoiser.source_name, denoiser.manifest["schedule"]["name"]
-    if not is_read(denoiser.manifest):
-        kind = f"schedule {schedule}, profile {denoiser.profile}"
-        return f"It does not read `{source}`, whose kind ({kind}) it does not know."
-    made = [name for name in facts["kernels"][-1]["files"] if name != f"denoise/{source}"]
-    besides = f" {', '.join(f'`{name}`' for name in made)}: translated from it, and not read." if made else ""
-    return f"It reads `denoise/{source}` too, and checks that this text computes what is certified.{besides}"
+        yield from ("", "What traces paths or encodes features has no certificate.")
 
 
 def _check(check: Mapping[str, Any]) -> list[str]:

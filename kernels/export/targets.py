@@ -1,19 +1,24 @@
 """The targets of `wamnet export`: which kernels are written for each, how they are called, what limits hold.
 
 One row a target [`TARGETS`]. A row names a compiler target for each place that weights can have, the first
-one being the usual one, and says how files are named, how kernels are called, and which limits hold.
+one being the usual one, and says how files are named, how kernels are called, and which limits hold. What
+runs kernels here that executors of the registry do not is in [`RUNNERS`].
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from ...compiler.kernel.interface import BLOCK, TABLE, staged
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.inlined import LARGEST_WEIGHTS
 from ...compiler.schedules.schedules import PLAIN
+from ..devices.executor import Executor
+from ..devices.registry import open_executor
 from . import tools
 
 BUFFER, TEXTURE = "buffer", "texture"
@@ -120,7 +125,7 @@ class Row:
     `dispatch`: how kernels on buffers with numbers are started.
 
     `opens`: what runs its kernels here, the target's own compiler and device or the nearest to it
-    [runners.py], to which they are translated by `route`. `stands_in`: it computes the same, but is nothing
+    [`opened`], to which they are translated by `route`. `stands_in`: it computes the same, but is nothing
     that the target's users have. `timed`: where options of a compiler decide, those that are timed: the
     advised ones, and those of a plain build. `tool`: what takes its files, if not what runs them.
     """
@@ -422,7 +427,7 @@ ROWS: tuple[Row, ...] = (
         "4. Set each channel's filter to nearest and its wrap to clamp.",
         entry="mainImage",
         single=True,
-        opens=("host_pass_runner", "ShadertoyRunner"),
+        opens=("gl_runner", "ShadertoyRunner"),
         route="its uniforms declared, ",
         most_images=Limit("buffers of a Shadertoy, A to D", 4, "use fewer features"),
         # The site states none: with more its editor hardly moves.
@@ -446,7 +451,7 @@ ROWS: tuple[Row, ...] = (
         "# Leave HDR 2D off: a viewport with it encodes for the display what it shows, and these colours\n"
         "# are encoded. To read them in 16 bits, draw into a SubViewport with use_hdr_2d that is not shown.",
         single=True,
-        opens=("host_pass_runner", "GodotRunner"),
+        opens=("gl_runner", "GodotRunner"),
         route="its words declared, ",
     ),
 )
@@ -460,3 +465,32 @@ ONNX = "onnx"
 
 NAMES = (*TARGETS, ONNX)
 """All names of targets here; the web page is another command's."""
+
+
+# ---- what runs kernels here --------------------------------------------------------------------------------
+
+
+def opened(module: str, *name: str) -> Executor:
+    """Open an executor of the registry, or a runner of this folder, whose packages are imported only then."""
+    if not name:
+        return open_executor(module)
+    found: Executor = getattr(import_module(f".{module}", __package__), name[0])(*name[1:])
+    return found
+
+
+OWN = ("glsl-es", "glsl-compute", "glsl-vulkan", "wgsl", "metal", "cuda", "godot")
+"""Targets whose kernels run as they are."""
+
+RUNNERS: Mapping[str, Callable[[], Executor]] = {
+    name: partial(opened, *opens)
+    for name, opens in {
+        **{name: TARGETS[name].opens for name in OWN},
+        "c99": TARGETS["c"].opens,
+        "glsl-vulkan/hlsl-fxc": ("wgpu_runner", "hlsl_runner", "fxc"),
+        "glsl-vulkan/hlsl-dxc": ("wgpu_runner", "hlsl_runner", "dxc"),
+        "wgsl/tint": ("tint_runner", "TintRunner"),
+        "wgsl/tint-gles": ("tint_runner", "TintRunner", "opengles"),
+    }.items()
+}
+"""By compiler target, and after a stroke what translates it, or to what; c99 is C, whose name an executor
+has. Conformance runs them by name."""

@@ -29,7 +29,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .buffer_runner import BufferRunner, Launch
-from .wgpu_runner import UNIFORM_BYTES, declared
+from .wgpu_runner import UNIFORM_BYTES, kinds_of
 
 WAY_OUT = "npm install --global webgpu, and a driver of Vulkan or OpenGL ES"
 """How to get a device."""
@@ -100,15 +100,11 @@ class TintRunner(BufferRunner):
         if "device" in told:
             self.device = f"Dawn, {told['device']}, {told['described']}"
             return ""
-        why = " ".join(f"{told.get('missing', told.get('error'))}; {self._warning()}".split())
+        self._said.seek(0)
+        warnings = ["no warning", *(line for line in self._said if line.startswith("Warning: "))]
+        why = " ".join(f"{told.get('missing', told.get('error'))}; {warnings[-1]}".split())
         self.close()
         return why
-
-    def _warning(self) -> str:
-        """Return the last line of what Dawn said that is a warning."""
-        self._said.seek(0)
-        warnings = [line.strip() for line in self._said if line.startswith("Warning: ")]
-        return warnings[-1] if warnings else "no warning"
 
     def _answer(self) -> dict[str, Any]:
         """Return the next line of the process."""
@@ -135,7 +131,7 @@ class TintRunner(BufferRunner):
         built = {
             "source": kernel.source,
             "entry": kernel.entry_point,
-            "kinds": {str(number): kind for number, kind in declared(kernel.source).items()},
+            "kinds": {str(number): kind for number, kind in kinds_of(kernel.interface).items()},
         }
         self._ask(**built)
         return built

@@ -130,25 +130,14 @@ def _instructions(words: Words) -> Iterator[tuple[int, Words]]:
         at += length
 
 
-def _text(words: Words) -> str:
-    """Return the text in operands."""
-    return words.tobytes().partition(b"\0")[0].decode()
-
-
-def _named(number: int, text: str) -> Words:
-    """Return the instruction that gives a number a name."""
-    raw = text.encode() + b"\0" * (4 - len(text) % 4)
-    operands = np.frombuffer(raw, "<u4")
-    return np.array([(len(operands) + 2) << 16 | NAME, number, *operands], np.uint32)
-
-
 def named(binary: bytes) -> bytes:
     """Return a module whose buffers have the names of their first members, its block of integers `sizes`."""
     words: Words = np.frombuffer(binary, "<u4").astype(np.uint32)
     members, structures, names = dict[int, list[str]](), dict[int, int](), dict[int, str]()
     for operation, given in _instructions(words):
         if operation == MEMBER_NAME:
-            members.setdefault(int(given[0]), []).append(_text(given[2:]))
+            text = given[2:].tobytes().partition(b"\0")[0].decode()
+            members.setdefault(int(given[0]), []).append(text)
         elif operation == POINTER and given[1] == UNIFORM:
             structures[int(given[0])] = int(given[2])
         elif operation == VARIABLE and given[2] == UNIFORM:
@@ -160,6 +149,8 @@ def named(binary: bytes) -> bytes:
     written = [words[:HEAD]]
     for operation, given in _instructions(words):
         number = int(given[0]) if operation == NAME else -1
-        head = np.array([(len(given) + 1) << 16 | operation], np.uint32)
-        written += [_named(number, names[number])] if number in names else [head, given]
+        if number in names:
+            raw = names[number].encode()
+            given = np.array([number, *np.frombuffer(raw + b"\0" * (4 - len(raw) % 4), "<u4")], np.uint32)
+        written += [np.array([(len(given) + 1) << 16 | operation], np.uint32), given]
     return np.concatenate(written).astype("<u4").tobytes()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import BLOCK, WEIGHTS
+from ...compiler.kernel.interface import BLOCK, BOTH, READ, WEIGHTS, WRITE, Interface
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.kernel import Memory
 from . import tools
@@ -28,30 +27,18 @@ WAY_OUT = "pip install wgpu, and a Vulkan driver: apt-get install mesa-vulkan-dr
 UNIFORM_BYTES = 16
 """A uniform buffer's size is a multiple of this."""
 
-DECLARED = re.compile(
-    r"@binding\((\d+)\) var<(uniform|storage, read_write|storage, read)>"
-    r"|layout\(std\d+, binding = (\d+)\) (uniform|restrict readonly buffer|restrict buffer)"
-)
-"""A buffer in WGSL, or in GLSL for Vulkan."""
 
-KINDS = {
-    "uniform": "uniform",
-    "storage, read_write": "storage",
-    "restrict buffer": "storage",
-    "storage, read": "read-only-storage",
-    "restrict readonly buffer": "read-only-storage",
-}
-"""What WebGPU calls it."""
-
-
-def declared(source: str) -> dict[int, str]:
-    """Return the kinds of the buffers that a kernel declares, by binding."""
-    return {int(m[1] or m[3]): KINDS[m[2] or m[4]] for m in DECLARED.finditer(source)}
+def kinds_of(interface: Interface) -> dict[int, str]:
+    """Return what WebGPU calls the kinds of a kernel's buffers, by binding."""
+    kinds = {READ: "read-only-storage", WRITE: "storage", BOTH: "storage"}
+    numbers = interface.numbers()
+    found = {numbers[a.name]: "uniform" if a.home == BLOCK else kinds[a.access] for a in interface.arrays}
+    return {0: "uniform", **found}
 
 
 def bound(kernel: Artifact) -> dict[int, str]:
     """Return the kinds of the buffers that are bound: of one of several launches those of its own arrays."""
-    kinds = declared(kernel.source)
+    kinds = kinds_of(kernel.interface)
     arrays = kernel.manifest.get("schedule", {}).get("arrays")
     if arrays is None:
         return kinds

@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         serve(sys.stdin, sys.stdout, "wamnet, reference", list(KINDS), of_reference)
         return
     from ...kernels import open_executor
-    from ...kernels.export.runners import RUNNERS
+    from ...kernels.export.targets import RUNNERS
     from .on_executor import OnExecutor
 
     try:

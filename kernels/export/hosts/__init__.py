@@ -3,7 +3,7 @@
 1. A host is a row [table.py]: the target whose kernels it runs, its files [files/], how it is started, and
    how much its own storage may add to a kernel's error [host.py].
 2. Its files are copied as they are. They read `manifest.json`, or, where a language has no reader of JSON,
-   a header that says the same [calls.py: C and C++, launches.py: OpenCL and Vulkan].
+   a header that says the same [headers.py].
 3. Every host runs all kernels on the check pair, compares, and ends with one line and a status, or with a
    page that shows both.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ....refimpl.errors import InputError, choice
-from . import calls, launches
+from .headers import calling, launching
 from .host import EIGHT_BITS, Host, page
 
 PAGE = ("wamnet.js", "serve.mjs")
@@ -37,7 +37,7 @@ ROWS = (
         "make run",
         "make and a C compiler; for `make wasm` zig and Node",
         "seen.ppm, and with a scene picture.ppm",
-        made={"host.h": calls.header},
+        made={"host.h": calling},
         scenes=True,
     ),
     Host(
@@ -48,7 +48,7 @@ ROWS = (
         "make run",
         "make and a C++ compiler",
         "seen.ppm, and with a scene picture.ppm",
-        made={"host.h": calls.header},
+        made={"host.h": calling},
         scenes=True,
     ),
     Host(
@@ -60,7 +60,7 @@ ROWS = (
         "make, a C compiler, and Blender, or Python with the package bpy",
         "seen.ppm",
         ("wamnet_check.py",),
-        {"host.h": calls.header},
+        {"host.h": calling},
         features=("color", "highlights", "normal", "albedo", "position", "depth"),
     ),
     Host(
@@ -72,7 +72,7 @@ ROWS = (
         "make, a C compiler, and OpenCL's loader with a driver (ocl-icd-libopencl1, pocl-opencl-icd)",
         "seen.ppm",
         ("common.h",),
-        {"host.h": launches.header},
+        {"host.h": launching},
         schedule="tile:8",  # spectra need more of a thread's stack than some drivers give it
     ),
     Host(
@@ -84,7 +84,7 @@ ROWS = (
         "make, a C compiler, and Vulkan's headers, loader and driver (libvulkan-dev, mesa-vulkan-drivers)",
         "seen.ppm",
         ("common.h",),
-        {"host.h": launches.header},
+        {"host.h": launching},
     ),
     Host(
         "webgpu",

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import encoded
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
@@ -20,7 +21,7 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.export import check, runners
+from wamnet.kernels.export import check, targets
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
@@ -35,11 +36,11 @@ FEATURES = ("color", "normal")
 
 
 @pytest.fixture(
-    scope="module", params=[pytest.param(n, marks=pytest.mark.needs("devices")) for n in runners.RUNNERS]
+    scope="module", params=[pytest.param(n, marks=pytest.mark.needs("devices")) for n in targets.RUNNERS]
 )
 def runner(request):
     try:
-        opened = runners.RUNNERS[request.param]()
+        opened = targets.RUNNERS[request.param]()
     except ExecutorUnavailable as error:
         pytest.skip(str(error))
     with opened:
@@ -205,7 +206,7 @@ def test_encoding_keeps_its_bound(runner, traced):
         pytest.skip("its encodings are parts of its paths' passes: test_exports.py runs them")
     kernel, sums = compile_encode(FEATURES, Normalization(), runner.name), traced[2]
     planes = dict(zip(kernel.planes, sums, strict=True))
-    bound, found = error_at(kernel, planes, 1), runner.encode(kernel, sums, 1)
+    bound, found = error_at(kernel, planes, 1), encoded(runner, kernel, sums, 1)
     layers = {
         name: np.moveaxis(sums[3 * i : 3 * i + 3], 0, -1).astype(np.float64)
         for i, name in enumerate(FEATURES)
@@ -225,7 +226,7 @@ def test_pipelines_are_the_composition_of_the_kernels(runner, kit):
 
 def test_every_exported_language_has_a_runner():
     """But Shadertoy, whose tabs have no place for weights but their text: test_exports.py runs them."""
-    held = {name.partition("/")[0] for name in runners.RUNNERS}
+    held = {name.partition("/")[0] for name in targets.RUNNERS}
     assert {name for name, row in LANGUAGES.items() if not row.runs and ":" not in name} - {
         "shadertoy"
     } <= held

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.compile import compile_program
-from wamnet.kernels.export import runners, tint_runner
+from wamnet.kernels.export import targets, tint_runner
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.apart  # drivers of Vulkan stay in memory
 def opened(name):
     """Return a runner by its name, or skip where it is not here."""
     try:
-        return runners.RUNNERS[name]()
+        return targets.RUNNERS[name]()
     except ExecutorUnavailable as error:
         pytest.skip(str(error))
 

@@ -45,8 +45,8 @@ from wamnet.compiler.variants import plan_model
 from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
-from wamnet.kernels.run import tune
-from wamnet.kernels.run.denoise_on import images_of, images_on
+from wamnet.kernels.run.denoise_on import Denoiser, images_of
+from wamnet.kernels.run.tune import Subject, Tuning
 from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
@@ -407,7 +407,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
             model, _ = bench.model(ROWS[row], 0)
             size = (frame.height, frame.width)
             plan = plan_model(model, device.name)
-            plan = plan.scheduled(tune.choose(device, plan, size, rounds)[0])
+            plan = plan.scheduled(Tuning(device, Subject.of(plan), size).picked(rounds)[0])
             kernel = compile_plan(plan)
             device.build(kernel, size)
             ways |= _ways(device, model, kernel, frame, row)
@@ -420,7 +420,7 @@ def _ways(device: Executor, model: Model, kernel: Artifact, frame: Frame, row: s
     """Return the ways of a network: from the frame's layers, and from features that are encoded."""
     images = images_of(model, frame)
     return {
-        row: lambda: device.run(kernel, images_on(device, model, frame)),
+        row: lambda: device.run(kernel, Denoiser(device, model).images(frame)),
         f"{row}, encoded features given": lambda: device.run(kernel, images),
     }
 

@@ -84,20 +84,12 @@ def kept(kind: str, parts: Sequence[object], make: Callable[[], Any]) -> Any:
     """
     name = f"{kind}-{key(*parts, program_version())}"
     if (data := read_json(name)) is None and (data := make()) is not None:
-        write_json(name, data)
-        _trim(kind)
+        written = write_json(name, data)
+        with suppress(OSError):  # others may remove the oldest entries at the same time
+            entries = written.parent.glob(f"{kind}-*.json") if written else ()
+            for old in sorted(entries, key=lambda path: -path.stat().st_mtime)[MOST_KEPT:]:
+                old.unlink(missing_ok=True)
     return data
-
-
-def _trim(kind: str) -> None:
-    """Remove the oldest entries of a kind; others may do so at the same time."""
-    path = folder()
-    if path is None:
-        return
-    with suppress(OSError):
-        entries = sorted(path.glob(f"{kind}-*.json"), key=lambda path: -path.stat().st_mtime)
-        for old in entries[MOST_KEPT:]:
-            old.unlink(missing_ok=True)
 
 
 def read_json(name: str) -> Any:

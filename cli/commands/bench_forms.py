@@ -15,7 +15,7 @@ from pathlib import Path
 from ...compiler import variants
 from ...compiler.variants import digest_of
 from ...kernels.bench.contenders import Variant
-from ...kernels.run.measure_curve import names_for
+from ...kernels.run.curve import names_for
 from ...models.model_file import load_checkpoint
 from ...refimpl.errors import InputError
 from ...refimpl.frame import Frame

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ...compiler import variants
 from ...kernels import cache, open_executor
-from ...kernels.run import curve, measure_curve
+from ...kernels.run import curve
 from ...kernels.run.curve import Curve, Limits
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.network.denoise import Model
@@ -102,16 +102,16 @@ class Request:
             rule = "has no test frames"
             raise InputError("--frames", str(self.frames), rule, "give a data set made with --test 1 or more")
         of_frames = hashlib.sha256((self.frames / dataset_files.MANIFEST).read_bytes()).hexdigest()
-        names, size = measure_curve.names_for(model), (self.size or 1024, self.size or 1024)
+        names, size = curve.names_for(model), (self.size or 1024, self.size or 1024)
         with open_executor(executor) as runner:
             wanted = Curve(digest, runner.device, size, network.profile, ())
-            key = curve.key_of(wanted, runner.name, of_frames, names)
+            key = wanted.key(runner.name, of_frames, names)
             if (kept := curve.cached(key, wanted)) is not None:
                 say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
                 return kept
             with progress(f"measuring {len(names)} variants", 1.0) as advance:
-                how = (size, network.profile, pairs, names)
-                found = measure_curve.measure(runner, model, *how, on_done=advance)
+                measured = curve.Measurement(runner, model, size, network.profile, pairs)
+                found = measured.curve(names, on_done=advance)
         path = cache.write_json(key, found.as_data())
         where = f"cached in {path}" if path else "not cached: no cache folder is writable"
         say(f"curve: {len(found.points)} points, measured now, {where}")

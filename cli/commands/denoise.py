@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import kernels
-from ...kernels.devices.images import Images
+from ...kernels.devices.kernel import Images
 from ...kernels.run.denoise_on import Denoiser
 from ...kernels.run.tune import first_time
 from ...refimpl.encoding import from_display
@@ -166,7 +166,7 @@ def _denoise_one(job: Job, path: Path, output: Path) -> None:
     job.notes.say()
     job.notes.counts.clear()
     result = denoiser.run(noisy, images)
-    first = first_time(denoiser.executor, result.kernel, result.seconds_compile)
+    first = first_time(denoiser.executor.identity, result.kernel, result.seconds_compile)
     job.write(output, path, result.image, "")
     job.notes.say()
     say(f"{output}: {noisy.width}x{noisy.height} pixels on {denoiser.executor.name} ({result.device})")

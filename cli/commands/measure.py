@@ -15,8 +15,8 @@ import typer
 
 from ...kernels import EXECUTORS, open_executor
 from ...kernels.bench import paths, peers, pipelines, training
-from ...kernels.bench.crowd import KINDS, crowd
 from ...kernels.bench.fresh import empty_caches, first_picture
+from ...kernels.bench.paths import KINDS, crowd, form_of_peer, forms
 from ...kernels.bench.pipelines import MOVING
 from ...kernels.bench.workload import check_size, paper_model, random_model
 from ...kernels.devices.kernel import Part
@@ -192,7 +192,10 @@ def primitives(
         for name in given:
             with nullcontext() if name in paths.PEERS else open_executor(name) as executor:
                 for scene in (crowd(kind, count) for kind in scenes for count in numbers):
-                    entries = paths.forms(executor, name, scene, part)
+                    if executor is None:
+                        entries = [form_of_peer(name, scene, part)]
+                    else:
+                        entries = forms(executor, scene, part)
                     take_turns(entries, repeats)
                     for entry in entries:
                         _show(name, scene.name, entry, size * size * spp)
@@ -318,8 +321,9 @@ def _entries(
     with ExitStack() as stack, ExitStack() as pipes:
         found: list[Entry] = []
         opened = [stack.enter_context(open_executor(name)) for name in given]
-        for each in opened:
-            found += pipelines.entries(each.name, pipelines.ways_of(pipes, each, model, scene, size, rays))
+        ours = [pipelines.Ours(each, model, scene, size, rays) for each in opened]
+        for each in ours:
+            found += pipelines.entries(each.executor.name, each.ways(pipes))
         shots = pipelines.moments(scene)
         for name in others:
             try:
@@ -332,9 +336,9 @@ def _entries(
             found += pipelines.entries(name, maker.ways(shots))
         measure(found, repeats, pause_s=pipelines.PAUSE_S)
         pipes.close()
-        for each in opened:
-            seconds = pipelines.first_pictures(each, model, scene, size, rays)
-            found.append(Entry("first picture of a new scene", by=each.name, seconds=seconds))
+        for each in ours:
+            seconds = each.first_pictures()
+            found.append(Entry("first picture of a new scene", by=each.executor.name, seconds=seconds))
     for name in given:
         if (cold := first_picture(name, model, scene, size)) is not None:
             found.append(Entry("first picture, empty caches", by=name, seconds=[cold]))

@@ -28,7 +28,7 @@ from ...compiler.core import ir
 from ...compiler.core.lower import lower
 from ...compiler.core.profiles import profile_named
 from ...compiler.plan import Plan, analysed
-from ...kernels.devices.images import Images
+from ...kernels.devices.kernel import Images
 from ...kernels.devices.registry import EXECUTORS, WAYS
 from ...kernels.judge import apart
 from ...kernels.judge.reduce import Box, Reduced, reduced
@@ -180,7 +180,7 @@ def _concluded(task: Task, verdicts: Sequence[Verdict]) -> Reduced | None:
     say(text)
     if not odd_ones(verdicts):
         return None
-    found = reduced(verdicts, task.model, task.profile, task.images, task.compiled)
+    found = reduced(verdicts, task.model, task.images, task.compiled)
     again = "" if found.repeats else ", because it did not show again"
     say(f"smallest part that reproduces it: {found.box.text}{again}")
     for stage in found.stages:

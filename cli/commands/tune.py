@@ -8,8 +8,7 @@ from ...compiler.variants import FULL, plan_model, with_rank
 from ...kernels import cache as cache_folders
 from ...kernels import open_executor
 from ...kernels.bench.workload import paper_model
-from ...kernels.run import tune as tuning
-from ...kernels.run.tune import Table
+from ...kernels.run.tune import Subject, Table, Tuning
 from ...refimpl.errors import InputError
 from ..common import options
 from ..common.inputs import load_model
@@ -59,9 +58,10 @@ def tune(
     alone = alone_in(folder, "tuning", remedy) if folder and kept else nullcontext()
     with alone, open_executor(executor.value) as runner:
         plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
-        known = None if force else tuning.remembered(runner, tuning.Subject.of(plan), square)
-        found = known or tuning.tune(runner, plan, square)
-        picks = {n: tuning.choose(runner, plan, square, n) for n in (1, MANY)}
+        tuning = Tuning(runner, Subject.of(plan), square)
+        known = None if force else tuning.remembered()
+        found = known or tuning.measured(plan)
+        picks = {n: tuning.picked(n) for n in (1, MANY)}
     show(found)
     if known:
         say(f"measured on {found.day}; --force measures again")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from wamnet.kernels.bench.cost import FLOAT_BYTES, Stage
+from wamnet.kernels.bench.rates import FLOAT_BYTES, Stage
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.activation import SINE
 from wamnet.refimpl.network.dataset import channels_of

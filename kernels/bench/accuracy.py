@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from ...compiler.core.interpret import interpret
 from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
-from ...compiler.plan import Plan, plan_program
-from ...compiler.proof import bounds
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN, windows
 from ...refimpl import metrics
@@ -29,7 +27,7 @@ from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
 from ...refimpl.network.whole import round_image
-from ..devices.images import Images
+from ..devices.kernel import Images
 from .contenders import Variant
 
 Array = NDArray[np.float64]
@@ -61,9 +59,7 @@ class Crop:
 
     def interpreted(self, program: Program) -> Array:
         """Return the output (rows, columns, 3) of a program of one window, in float64."""
-        gather = kernel_gather(program)
-        images = {n: round_image(image) for n, image in self.images.items()} if gather.whole else self.images
-        seen = windows(gather, images)
+        seen = windows(kernel_gather(program), self._read(program))
         (found,) = interpret(program, {"window": seen}, np.float64).values()
         crop: Array = self.cut(found)
         return crop
@@ -73,29 +69,20 @@ class Crop:
 
         `schedule` of `language`: whose sums; a peer without one is checked against the interpreter's.
         """
-        plan = plan_program(
-            variant.program(self.model), language or "numpy", variant.profile, schedule or PLAIN, variant.rank
-        )
+        plan = variant.plan(self.model, language or "numpy", schedule or PLAIN)
         # Most schedules of all targets share one bound, which takes seconds to compute.
         key = variant.name, plan.sine, None if plan.shares_bound else plan.schedule.name
         if key not in self._rounding:
-            self._rounding[key] = self._rounded(plan)
+            held = plan.expected(self._read(plan.analysed, plan.shares_bound))
+            self._rounding[key] = self.cut(held.value), float(self.cut(held.bound).max())
         return self._rounding[key]
 
-    def _rounded(self, plan: Plan) -> tuple[Array, float]:
-        """Compute both; the bound is infinite where a sine promises nothing, and 0 of integers."""
-        if plan.is_whole:
-            return self.interpreted(plan.reference), 0.0
-        near = self._near(plan.analysed) if plan.shares_bound else self.images
-        found = plan.enclosures(near, slice(0, self.rows), of_cut=False)
-        (bound,) = bounds.output_errors(plan.analysed, found).values()
-        return self.interpreted(plan.reference), float(self.cut(bound).max())
-
-    def _near(self, program: Program) -> Images:
-        """Return the crop's images with no more around it than its windows see: bounds take seconds."""
+    def _read(self, program: Program, near: bool = False) -> Images:
+        """Return the images that a program reads; `near`: no more of them than the crop's windows see."""
         gather = kernel_gather(program)
-        rows, columns = self.rows + gather.rows, self.columns + gather.columns
-        return {name: image[:rows, :columns] for name, image in self.images.items()}
+        rows, columns = (self.rows + gather.rows, self.columns + gather.columns) if near else (None, None)
+        images = {image.name: self.images[image.name][:rows, :columns] for image in gather.images}
+        return {name: round_image(image) for name, image in images.items()} if gather.whole else images
 
     def cut(self, picture: NDArray[Any]) -> Any:
         """Return the crop of a picture (H, W, C)."""

@@ -3,7 +3,7 @@
 1. A contender is data until it is opened for a model and a size. One that computes the network says which
    program it computes [`Variant`]; its error is against the full network in float64, whatever it leaves out.
    Another denoiser has no error, only a quality.
-2. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
+2. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`Kernel`].
 3. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
 4. Peers come from another distribution, where it is installed [peers.py].
@@ -14,9 +14,8 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -25,23 +24,22 @@ from numpy.typing import NDArray
 
 from ...compiler import variants
 from ...compiler.artifact import Artifact
-from ...compiler.compile import compile_program
+from ...compiler.compile import compile_plan
 from ...compiler.core import profiles, sine
-from ...compiler.core.ir import Program
 from ...compiler.core.lower import lower
-from ...compiler.plan import analysed
+from ...compiler.plan import Plan, plan_program
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN, Dot
-from ...compiler.targets import DENOISERS, TARGETS, schedule_named
+from ...compiler.targets import DENOISERS, TARGETS, Language, schedule_named
 from ...compiler.variants import parse, vary
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
 from ..devices.executor import Executor
-from ..devices.images import Images
+from ..devices.kernel import Images
 from ..devices.registry import open_executor
 from ..run.denoise_on import bound_of
 from . import peers
-from .cost import Stage, fused, sines_of
+from .rates import Stage, fused, sines_of
 from .workload import Given
 
 Array = NDArray[Any]
@@ -77,28 +75,23 @@ class Variant:
         found = self.model or model
         return found if self.made == variants.FULL else vary(parse(self.made), found).model
 
-    def program(self, model: Model) -> Program:
-        """Return what the form computes when `model` is the benchmark's, without its rank."""
-        return lower(self.of(model))
+    def plan(self, model: Model, language: Language | str, schedule: str = PLAIN) -> Plan:
+        """Return the plan of the form when `model` is the benchmark's."""
+        return plan_program(lower(self.of(model)), language, self.profile, schedule, self.rank)
 
     def facts(self, model: Model) -> dict[str, Any]:
         """Return profile, degree of the sine, rank, window, parameters and steps of training."""
-        found = self.of(model)
+        found, degree = self.of(model), None  # the target's own sine
+        if profiles.profile_named(self.profile).sine is not None:
+            degree = int(self.profile.partition(profiles.DEGREE_WORD)[2] or sine.DEGREE)
         return {
             "profile": self.profile,
-            "degree": degree_of(self.profile),
+            "degree": degree,
             "rank": self.rank or None,
             "window": found.window.size,
             "parameters": parameters_of(found, self.rank),
             "trained_steps": self.steps or None,
         }
-
-
-def degree_of(profile: str) -> int | None:
-    """Return the degree of a profile's sine; None for the target's own."""
-    if profiles.profile_named(profile).sine is None:
-        return None
-    return int(profile.partition(profiles.DEGREE_WORD)[2] or sine.DEGREE)
 
 
 def activation_in(library: str, table: Mapping[str, Any], model: Model) -> Any:
@@ -127,7 +120,7 @@ class Opened:
     """A contender that is ready to be given frames; `run` returns the picture (H, W, 3).
 
     `display` turns what `run` returns into display-encoded colours, outside of what is timed. `stages` are
-    what it does for a pixel [cost.py], `rates` the name of the rates that it has [`MACHINE` or its own].
+    what it does for a pixel [rates.py], `rates` the name of the rates that it has [`MACHINE` or its own].
     `kernel_seconds`: without copies to and from the device. `schedule`: the one that was picked,
     `bound`: what is proven for all images, `certified`: whether the proof is written out.
     """
@@ -139,7 +132,6 @@ class Opened:
     rates: str = MACHINE
     kernel_seconds: Callable[[Given], float] | None = None
     display: Callable[[Array], Array] = np.asarray
-    close: Callable[[], None] = lambda: None
     schedule: str = ""
     bound: float | None = None
     certified: bool = False
@@ -179,24 +171,18 @@ class Contender:
             tools.executor(self.executor)
 
 
-@dataclass
-class Tools:
-    """Executors that contenders share, each opened once; a context manager that closes them."""
+class Tools(ExitStack):
+    """Executors that contenders share, each opened once; with the block they are closed."""
 
-    executors: dict[str, Executor] = field(default_factory=dict)
-    made: ExitStack = field(default_factory=ExitStack)
+    def __init__(self) -> None:
+        super().__init__()
+        self.executors: dict[str, Executor] = {}
 
     def executor(self, name: str) -> Executor:
         """Return an open executor, or raise ExecutorUnavailable."""
         if name not in self.executors:
-            self.executors[name] = self.made.enter_context(open_executor(name))
+            self.executors[name] = self.enter_context(open_executor(name))
         return self.executors[name]
-
-    def __enter__(self) -> Tools:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.made.close()
 
 
 # ---- the list ----------------------------------------------------------------------------------------------
@@ -223,35 +209,42 @@ QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
 
 
-def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
-    """Return the contender that is a kernel of this schedule."""
-    name = f"{executor}:{schedule}" + ("" if variant is FULL else f":{variant.name}")
-    text = schedule_named(executor, schedule).idea if variant is FULL else variant.text
-    open_it = partial(_open_kernel, executor, schedule, variant)
-    return Contender(name, text, open_it, variant, executor, schedule, caches=CACHES.get(executor, NO_CACHE))
+@dataclass(frozen=True)
+class Kernel:
+    """What opens a kernel of an executor with a schedule: of the whole network, or of a variant."""
 
+    executor: str
+    schedule: str
+    variant: Variant = FULL
 
-def _open_kernel(
-    executor: str, schedule: str, variant: Variant, tools: Tools, model: Model, size: int
-) -> Opened:
-    """Compile the kernel and build it."""
-    runner, program = tools.executor(executor), variant.program(model)
-    artifact = compile_program(program, executor, variant.profile, schedule, variant.rank)
-    runner.build(artifact, (size, size))
-    alone = getattr(runner, "kernel_seconds", None)
-    picked = str(artifact.manifest["schedule"]["name"])
-    profile = "" if variant.profile == IEEE else f":{variant.profile}"
-    return Opened(
-        run=lambda given: runner.run(artifact, _read(artifact, given)),
-        device=runner.device,
-        stages=fused(artifact, sines_of(analysed(program))),
-        source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
-        rates=f"{executor}:{picked}{profile}",
-        kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
-        schedule=picked,
-        bound=bound_of(artifact),
-        certified=artifact.certificate is not None,
-    )
+    @property
+    def contender(self) -> Contender:
+        """Return the contender that is this kernel."""
+        full, caches = self.variant is FULL, CACHES.get(self.executor, NO_CACHE)
+        name = f"{self.executor}:{self.schedule}" + ("" if full else f":{self.variant.name}")
+        text = schedule_named(self.executor, self.schedule).idea if full else self.variant.text
+        return Contender(name, text, self, self.variant, self.executor, self.schedule, caches=caches)
+
+    def __call__(self, tools: Tools, model: Model, size: int) -> Opened:
+        """Compile the kernel and build it."""
+        runner, variant = tools.executor(self.executor), self.variant
+        plan = variant.plan(model, self.executor, self.schedule)
+        artifact = compile_plan(plan)
+        runner.build(artifact, (size, size))
+        alone = getattr(runner, "kernel_seconds", None)
+        picked = str(artifact.manifest["schedule"]["name"])
+        profile = "" if variant.profile == IEEE else f":{variant.profile}"
+        return Opened(
+            run=lambda given: runner.run(artifact, _read(artifact, given)),
+            device=runner.device,
+            stages=fused(artifact, sines_of(plan.analysed)),
+            source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
+            rates=f"{self.executor}:{picked}{profile}",
+            kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
+            schedule=picked,
+            bound=bound_of(artifact),
+            certified=artifact.certificate is not None,
+        )
 
 
 def _read(artifact: Artifact, given: Given) -> Images:
@@ -276,26 +269,25 @@ def of_machine(
         except ExecutorUnavailable:
             suits = target.schedules[0].name
         schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
-        found += [kernel(name, schedule) for schedule in schedules]
+        found += [Kernel(name, schedule).contender for schedule in schedules]
         varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
-        if name != "numpy":
-            found += _varied(name, suits, [*varied, *([] if quick else [INTEGERS])])
+        for form in [*varied, *([] if quick else [INTEGERS])] if name != "numpy" else []:
+            found += [Kernel(name, each, form).contender for each in _schedules(target, suits, form)]
     return [*found, *(peer for peer in peers.contenders() if not quick or peer.name in QUICK)]
 
 
-def _varied(executor: str, suits: str, forms: Sequence[Variant]) -> list[Contender]:
-    """Return the kernels of variants: with the schedule that suits, and the direct one where that is another.
+def _schedules(language: Language, suits: str, form: Variant) -> list[str]:
+    """Return the schedules of a variant: the one that suits, and the direct one where that is another.
 
     A first layer in two passes has the direct one only, integers instead those in bytes where a language has
     such. Spectra name what takes their place in two passes.
     """
-    target, schedule = DENOISERS[executor], schedule_named(executor, suits)
+    schedule = schedule_named(language, suits)
     direct = schedule.name if schedule.instead == PLAIN else schedule.instead
-    bytewise, found = [each.name for each in target.schedules if isinstance(each, Dot)], []
-    for form in forms:
-        others = bytewise if form is INTEGERS else [] if form.rank else [suits]
-        found += [kernel(executor, each, form) for each in dict.fromkeys([*others, direct])]
-    return found
+    others = [suits] if not form.rank else []
+    if form is INTEGERS:
+        others = [each.name for each in language.schedules if isinstance(each, Dot)]
+    return list(dict.fromkeys([*others, direct]))
 
 
 def chosen(contenders: Sequence[Contender], only: Sequence[str], executors: Sequence[str]) -> list[Contender]:

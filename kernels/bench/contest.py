@@ -1,7 +1,7 @@
 """One run of the benchmark of denoisers: contenders open, take turns, and are judged.
 
 1. The machine's limits once, and the rates of each executor and schedule [rates.py]. A kernel whose predicted
-   time [cost.py] is far over the budget is left out, and its row says so [`Contest._open`].
+   time is far over the budget is left out, and its row says so [`Contest._open`].
 2. Packages are imported, executors opened; then a contender opens and makes its first frame, which is
    compared with the reference [accuracy.py]. That time less a later frame's is its compilation.
 3. Rounds in which every contender makes a frame and the machine's limits are measured again, in turn
@@ -11,30 +11,45 @@
 5. Other sizes, ascending: what took t at p pixels is taken to need t p' / p at p' pixels, and is left out,
    with that reason, where it is over the budget [`Contest._grow`].
 
-A step that a contender refuses ends in its row, not in the run. Ctrl-C leaves all rows as they are.
+A step that a contender refuses ends in its row, not in the run. Ctrl-C leaves all rows as they are. Rows are
+JSON's types with the keys of spec/bench.md; a number that is not finite, or was not measured, is null.
 """
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from numpy.typing import NDArray
 
 from ...compiler.schedules.names import split
+from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ...refimpl.frame import Frame
 from ...refimpl.network.denoise import Model
-from ..measure import PAUSE_S, Entry, Round, begin, take_turns
+from ..measure import PAUSE_S, Clock, Entry, Times, begin, take_turns
 from ..memory import keep_freed_memory
 from . import accuracy, rates
 from .contenders import IEEE, MACHINE, Contender, Opened, Tools, parameters_of
-from .cost import Rates, predicted_seconds
 from .fresh import first_runs
-from .rows import KERNEL, MEASURED, PEER, SCHEMA, SKIPPED, Row, clean, front
+from .rates import Rates, predicted_seconds
 from .workload import Given, filled, given, noise
+
+SCHEMA = "wamnet-bench-2"
+"""Name and version of the form of the data."""
+
+MEASURED, MISSING, SKIPPED, FAILED, PENDING = "measured", "missing", "skipped", "failed", "pending"
+"""States of a row: `pending` is one that an interrupted run has not come to."""
+
+KERNEL, PEER = "kernel", "peer"
+"""Kinds of rows: what this compiler makes, and what others make."""
+
+MOST_TOLD = 200
+"""Characters of a peer's error that are repeated."""
 
 PROBE_PAUSE_S = 0.05
 """Seconds before a run of a small program: only one library runs, whose threads wait for it."""
@@ -48,6 +63,79 @@ no front sees: those of rounding."""
 
 GROWTH_ROUNDS = 3
 """Most frames of each contender at another size: what grows is seen from few."""
+
+COUNTS = ("products", "sines", "bytes")
+"""What the cost model counts of a pixel."""
+
+
+@dataclass
+class Row(Entry):
+    """A contender whose failure does not end the run: `state` says how far it got, `reason` why no further.
+
+    `opened`: the contender that is ready, if it is.
+    """
+
+    text: str = ""
+    kind: str = KERNEL
+    state: str = PENDING
+    reason: str = ""
+    kernel_seconds: list[float] = field(default_factory=list)
+    opened: Opened | None = None
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Let an error put the row out; a peer may raise what it likes, others only our errors."""
+        try:
+            yield
+            return
+        except ExecutorUnavailable as error:
+            self.state, self.reason = MISSING, str(error)
+        except (WamnetError, MemoryError) as error:
+            self.state, self.reason = FAILED, str(error) or type(error).__name__
+        except Exception as error:
+            if self.kind != PEER:
+                raise
+            told = " ".join(str(error).split())[:MOST_TOLD]
+            self.state, self.reason = FAILED, f"{type(error).__name__}: {told}"
+        self.round = None
+
+    def turn(self, number: int, clock: Clock) -> None:
+        """Do a round; one that fails is the last."""
+        with self.failing():
+            super().turn(number, clock)
+
+    def make(self, shown: Given) -> NDArray[Any]:
+        """Return the picture that an open contender makes of a frame."""
+        assert self.opened is not None, "a row that is measured is open"
+        return self.opened.run(shown)
+
+    def make_in_rounds(self, shown: Given, alone: bool = True) -> None:
+        """Let a round be a frame, whose time counts, and the kernel's `alone`, which is noted."""
+        kernel_seconds = self.opened.kernel_seconds if alone and self.opened else None
+
+        def work(_number: int) -> float:
+            start = time.perf_counter()
+            self.make(shown)
+            seconds = time.perf_counter() - start
+            if kernel_seconds:
+                self.kernel_seconds.append(kernel_seconds(shown))
+            return seconds
+
+        self.round = work
+
+    def leave_out(self, seconds: float, by: str, budget_s: float) -> None:
+        """Note the reason for which something is left out."""
+        budget = f"more than --budget {budget_s:g} s"
+        self.state, self.reason = SKIPPED, f"left out: a frame would take {seconds:.1f} s by {by}, {budget}"
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the row as JSON's types."""
+        # One that was interrupted between its first frame and its rounds has no time.
+        state = PENDING if self.state == MEASURED and not self.seconds else self.state
+        head = {"name": self.name, "text": self.text, "kind": self.kind, "state": state}
+        times = {"ms": milliseconds(self.seconds), "kernel_ms": milliseconds(self.kernel_seconds)}
+        found: dict[str, Any] = clean({**head, "reason": self.reason, **times, **self.facts})
+        return found
 
 
 @dataclass(frozen=True)
@@ -71,6 +159,15 @@ class Request:
     quick: bool = False
     first_runs: bool = False
     pause_s: float = PAUSE_S
+
+    @property
+    def scale(self) -> int:
+        """Return the divisor of the lengths of the machine's measurements."""
+        return 2 if self.quick else 1
+
+    def shown(self, size: int) -> Given:
+        """Return the picture of a size: an unseen frame, or noise."""
+        return given(self.model, filled(self.pairs[0][0], size) if self.pairs else noise(size))
 
 
 @dataclass
@@ -96,9 +193,9 @@ class Contest:
     def run(self) -> None:
         """Do all steps."""
         keep_freed_memory()
-        request, shown = self.request, self._given(self.request.size)
+        request, shown = self.request, self.request.shown(self.request.size)
         crop = accuracy.Crop(request.model, shown.images)
-        ways = rates.machine_ways(self._scale)
+        ways = rates.machine_ways(request.scale)
         self.machine = [Entry(name, lambda way=way: way) for name, way in ways.items()]  # type: ignore[misc]
         begin(self.machine)
         take_turns(self.machine, 1, request.pause_s)
@@ -120,69 +217,50 @@ class Contest:
             self._grow(size)
 
     @property
-    def _scale(self) -> int:
-        """Return the divisor of the lengths of the machine's measurements."""
-        return 2 if self.request.quick else 1
-
-    @property
     def limits(self) -> rates.Limits | None:
         """Return the machine's limits by what has been measured so far."""
-        if not all(entry.seconds for entry in self.machine):
+        if not self.machine or not all(entry.seconds for entry in self.machine):
             return None
-        times = {entry.name: entry.times for entry in self.machine}
-        return rates.limits_of(times, self._scale) if times else None
+        return rates.limits_of({entry.name: entry.times for entry in self.machine}, self.request.scale)
 
     def _going(self) -> list[Row]:
         """Return the rows that are open, and have not failed."""
         return [row for row in self.rows.values() if row.opened and row.state == MEASURED]
 
-    def _given(self, size: int) -> Given:
-        """Return the picture of a size: an unseen frame, or noise."""
-        pairs = self.request.pairs
-        return given(self.request.model, filled(pairs[0][0], size) if pairs else noise(size))
-
     # ---- opening ------------------------------------------------------------------------------------------
 
     def _open(self, contender: Contender, shown: Given, crop: accuracy.Crop) -> None:
         """Open a contender and let it make its first frame, which is compared with the reference."""
-        row = self.rows[contender.name]
+        row, budget_s = self.rows[contender.name], self.request.budget_s
         contender.prepare(self.tools)
         start = time.perf_counter()
         opened = contender.open(self.tools, self.request.model, self.request.size)
         seconds = time.perf_counter() - start
         needed = self._predict(opened, row)
-        if contender.executor and needed is not None and needed > DOUBT * self.request.budget_s:
-            self._leave_out(row, needed, "the cost model")
+        if contender.executor and needed is not None and needed > DOUBT * budget_s:
+            row.leave_out(needed, "the cost model", budget_s)
             return
         start = time.perf_counter()
         picture = opened.display(opened.run(shown))
         row.facts |= {"open_s": seconds, "first_frame_s": time.perf_counter() - start}
         row.state, row.opened = MEASURED, opened
-        self._compare(contender, opened, crop, picture)
-
-    def _compare(
-        self, contender: Contender, opened: Opened, crop: accuracy.Crop, picture: NDArray[Any]
-    ) -> None:
-        """Note the error of a picture; another denoiser has none."""
-        facts = self.rows[contender.name].facts
-        if contender.variant is None:
+        if contender.variant is None:  # another denoiser has no error
             return
-        facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
+        row.facts["error"] = accuracy.errors(crop.cut(picture), crop.full)
         expected, bound = crop.rounding(contender.variant, contender.executor, opened.schedule)
         proven: dict[str, Any] = {"bound": None, "bound_all": None, "certified": False}
         if contender.executor:
             proven = {"bound": bound, "bound_all": opened.bound, "certified": opened.certified}
-        facts["rounding"] = proven | {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
+        row.facts["rounding"] = proven | {"max": accuracy.errors(crop.cut(picture), expected)["max"]}
 
     def _predict(self, opened: Opened, row: Row) -> float | None:
         """Note what a contender is and does for a pixel, and return the time that the cost model gives."""
-        stages, found = opened.stages, self._rates_of(opened.rates)
-        seconds = predicted_seconds(stages, found, self.request.size**2)
+        stages = opened.stages
+        seconds = predicted_seconds(stages, self._rates_of(opened.rates), self.request.size**2)
         row.facts |= {"device": opened.device, "source_bytes": opened.source_bytes}
         row.facts |= {"schedule": opened.schedule or None, "rates": opened.rates if stages else None}
         row.facts["predicted_ms"] = seconds and 1e3 * seconds
-        for name in ("products", "sines", "bytes"):
-            row.facts[name] = sum(getattr(stage, name) for stage in stages) or None
+        row.facts |= {name: sum(getattr(stage, name) for stage in stages) or None for name in COUNTS}
         return seconds
 
     def _rates_of(self, name: str) -> Rates:
@@ -193,15 +271,10 @@ class Contest:
             return limits.rates
         if name not in self.found_rates:
             executor, schedule, profile = split(name)
-            pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
-            times, side = rates.probed(self.tools.executor(executor), schedule, pause_s, profile or IEEE)
+            probe = rates.Probe(self.tools.executor(executor), schedule, profile or IEEE)
+            times, side = probe.times(min(PROBE_PAUSE_S, self.request.pause_s))
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
-
-    def _leave_out(self, row: Row, seconds: float, by: str) -> None:
-        """Note the reason for which something is left out."""
-        budget = f"more than --budget {self.request.budget_s:g} s"
-        row.state, row.reason = SKIPPED, f"left out: a frame would take {seconds:.1f} s by {by}, {budget}"
 
     # ---- times --------------------------------------------------------------------------------------------
 
@@ -212,52 +285,37 @@ class Contest:
         its first frame does not count as a frame.
         """
         repeats, budget, frame = self.request.repeats, self.request.budget_s, row.facts["first_frame_s"]
-        row.round = self._round(row, shown)
+        row.make_in_rounds(shown)
         if row.kind != KERNEL or frame <= budget / 2:
             start = time.perf_counter()
-            row.opened.run(shown)
+            row.make(shown)
             frame = time.perf_counter() - start
         row.most = min(repeats, int(budget / max(frame, 1e-9)) - 1)
         if row.most < 1:
             row.seconds.append(frame)
             row.reason = f"only one frame: it took {frame:.1f} s of --budget {budget:g} s"
         elif row.most < repeats:
-            row.reason = (
-                f"{row.most} of {repeats} rounds: a frame takes {frame:.1f} s, --budget is {budget:g} s"
-            )
-
-    def _round(self, row: Row, shown: Given, alone: bool = True) -> Round:
-        """Return a round: a frame, whose time is returned, and the kernel's `alone`, which is noted."""
-        opened: Opened = row.opened
-
-        def work(_number: int) -> float:
-            start = time.perf_counter()
-            opened.run(shown)
-            seconds = time.perf_counter() - start
-            if alone and opened.kernel_seconds:
-                row.kernel_seconds.append(opened.kernel_seconds(shown))
-            return seconds
-
-        return work
+            took = f"a frame takes {frame:.1f} s, --budget is {budget:g} s"
+            row.reason = f"{row.most} of {repeats} rounds: {took}"
 
     def _grow(self, size: int) -> None:
         """Measure at another size all that its time at the nearest size lets hope for."""
-        shown, rows = self._given(size), self.sizes.setdefault(size, {})
+        shown, rows = self.request.shown(size), self.sizes.setdefault(size, {})
         for main in self._going():
             hoped, predicted = self._hoped(main.name, size), main.facts["predicted_ms"]
             if hoped is None:
                 continue
-            facts = {key: main.facts[key] for key in ("products", "sines", "bytes")}
+            facts = {key: main.facts[key] for key in COUNTS}
             facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
             row = Row(main.name, text=main.text, kind=main.kind, facts=facts, opened=main.opened)
             rows[main.name] = row
             if hoped > self.request.budget_s:
-                self._leave_out(row, hoped, "its time at another size")
+                row.leave_out(hoped, "its time at another size", self.request.budget_s)
                 continue
             with row.failing():
                 row.state = MEASURED
-                row.opened.run(shown)
-                row.round = self._round(row, shown, alone=False)
+                row.make(shown)
+                row.make_in_rounds(shown, alone=False)
             self.told(0.02)
         take_turns([*rows.values()], min(GROWTH_ROUNDS, self.request.repeats), self.request.pause_s)
 
@@ -283,13 +341,14 @@ class Contest:
         pixels = sum(noisy.height * noisy.width for noisy, _ in pairs)
         going = self._going()
         for row in going:
-            opened, hoped = row.opened, self._hoped(row.name, 1)
+            hoped = self._hoped(row.name, 1)
             if hoped is not None and hoped * pixels > self.request.budget_s:
                 row.facts["quality"] = None
                 continue
 
-            def show(frame: Frame, opened: Opened = opened) -> NDArray[Any]:
-                return opened.display(opened.run(images[id(frame)]))
+            def show(frame: Frame, row: Row = row) -> NDArray[Any]:
+                assert row.opened is not None, "a row that goes on is open"
+                return row.opened.display(row.make(images[id(frame)]))
 
             with row.failing():
                 row.facts["quality"] = accuracy.quality(model, pairs, full, show)
@@ -341,9 +400,11 @@ class Contest:
 
     def _data_of(self, rows: Mapping[str, Row], size: int) -> list[dict[str, Any]]:
         """Return the rows of a size as JSON's types, with what follows from their times."""
-        return [
-            data | _derived(data, size * size, self.limits) for data in (r.as_data() for r in rows.values())
-        ]
+        found = [row.as_data() for row in rows.values()]
+        return [data | _derived(data, size * size, self.limits) for data in found]
+
+
+# ---- what follows from rows -------------------------------------------------------------------------------
 
 
 def _derived(row: Mapping[str, Any], pixels: int, limits: rates.Limits | None) -> dict[str, Any]:
@@ -369,3 +430,42 @@ def _point(row: Mapping[str, Any], part: str) -> tuple[float | None, float | Non
     found = (row.get(part) or {}).get(key)
     median = row["ms"] and row["ms"]["median"]
     return median, found if step is None or found is None else step * round(found / step)
+
+
+def milliseconds(seconds: Sequence[float]) -> dict[str, Any] | None:
+    """Return median, extremes, spread (their difference over the median) and all times; None without any."""
+    if not seconds:
+        return None
+    times = Times(tuple(1e3 * value for value in seconds))
+    found = {"median": times.median, "min": min(times.seconds), "max": max(times.seconds)}
+    return {**found, "spread": times.spread, "rounds": list(times.seconds)}
+
+
+def front(points: Mapping[str, tuple[float | None, float | None]]) -> list[str]:
+    """Return the names of the points (time, error) that no other point beats, by time.
+
+    One beats another if it is not worse in either and better in one; equal points stay both. A point with a
+    NaN, an infinity or without a number is on no front, and beats none.
+    """
+    known = {
+        name: (time, error)
+        for name, (time, error) in points.items()
+        if time is not None and error is not None and math.isfinite(time) and math.isfinite(error)
+    }
+
+    def beaten(point: tuple[float, float]) -> bool:
+        return any(o[0] <= point[0] and o[1] <= point[1] and o != point for o in known.values())
+
+    return sorted((name for name, point in known.items() if not beaten(point)), key=lambda name: known[name])
+
+
+def clean(value: Any) -> Any:
+    """Return data with null in place of numbers that JSON does not know, and Python's own numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): clean(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [clean(item) for item in value]
+    if isinstance(value, bool | str | int) or value is None:
+        return value
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -44,10 +44,13 @@ def first_runs(name: str, model: Model, size: int) -> tuple[float | None, float 
         return _in_process(_denoiser, name, model, size), _in_process(_denoiser, name, model, size)
 
 
-def first_picture(executor: str, model: Model, scene: str, size: int) -> float | None:
-    """Return the seconds to the first picture (size, size) of a scene; None where that fails."""
+def first_picture(name: str, model: Model, scene: str, size: int) -> float | None:
+    """Return the seconds to the first picture (size, size) of a scene, on the executor of this name.
+
+    None where that fails.
+    """
     with empty_caches((*CACHES, FOLDER_VARIABLE)):
-        return _in_process(_pipeline, executor, model, scene, size)
+        return _in_process(_pipeline, name, model, scene, size)
 
 
 @contextmanager
@@ -87,9 +90,9 @@ def _denoiser(name: str, model: Model, size: int) -> float:
         return time.perf_counter() - start
 
 
-def _pipeline(executor: str, model: Model, scene: str, size: int) -> float:
+def _pipeline(name: str, model: Model, scene: str, size: int) -> float:
     """Return the seconds in which a pipeline is compiled and its first picture read."""
     start, shown = time.perf_counter(), scene_source(scene).at()
-    with open_executor(executor) as device, Pipeline(device, shown, model, (size, size)) as pipeline:
+    with open_executor(name) as device, Pipeline(device, shown, model, (size, size)) as pipeline:
         pipeline.run()
         return time.perf_counter() - start

@@ -4,9 +4,9 @@
    and compiling, with empty caches of compilers [fresh.py]. A round ends when the frame is in memory: of
    kernels all layers and the variance, of peers only colours. Rounds have different seeds: their spread gives
    the error of a mean colour [`distance`].
-2. A scene of many primitives [crowd.py] in all forms [`forms`]: what statements for each cost, and what
-   tables with a loop or a tree do. Tracing and emitting are timed, then building by a driver without its
-   caches on disk, until it has followed a first row of paths.
+2. A scene of many primitives [`crowd`], the same in every run, in all forms [`forms`]: what statements for
+   each cost, and what tables with a loop or a tree do. Tracing and emitting are timed, then building by a
+   driver without its caches on disk, until it has followed a first row of paths.
 
 A sample is one path: at every vertex but the last a shadow ray and a scattering. The peer is Mitsuba 3, all
 samples in one pass.
@@ -16,20 +16,22 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import compile_path
 from ...models.data.scene_source import scene_source
+from ...refimpl import rng
 from ...refimpl.light.render import Job
-from ...refimpl.light.scene import Scene, primitives
+from ...refimpl.light.scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector, primitives
 from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor
 from ..devices.kernel import Part
@@ -80,17 +82,13 @@ def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) ->
             ways[f"{kind}, {VARIANT}"] = partial(_peer, kind, scene, job)
         else:
             ways[kind] = partial(_kernel, kind, scene, job)
-    return [_entry(name, text, way) for text, way in ways.items()]
+    found = ((text, way, list[float]()) for text, way in ways.items())
+    return [Entry(name, partial(_noting, way, means), text, {"means": means}) for text, way, means in found]
 
 
-def _entry(scene: str, text: str, begin: Callable[[], Frames]) -> Entry:
-    """Return what makes frames of a scene, whose mean colours are noted."""
-    means: list[float] = []
-    return Entry(scene, lambda: _noting(begin(), means), text, {"means": means})
-
-
-def _noting(frames: Frames, means: list[float]) -> Round:
+def _noting(begin: Callable[[], Frames], means: list[float]) -> Round:
     """Return a round: a frame of its seed, whose mean colour is noted."""
+    frames = begin()
 
     def work(seed: int) -> float:
         start = time.perf_counter()
@@ -122,41 +120,42 @@ def _peer(kind: str, scene: Scene, job: Job) -> Frames:
 
 def distance(entry: Entry, other: Entry) -> float | None:
     """Return how far a mean colour is from another's in standard errors; none without a spread."""
-    (mean, error), (its_mean, its_error) = (mean_and_error(each.facts["means"]) for each in (entry, other))
-    both = float(np.hypot(error, its_error))
+    means = [each.facts["means"] for each in (entry, other)]
+    both = float(np.hypot(*(statistics.stdev(values) / len(values) ** 0.5 for values in means)))
+    mean, its_mean = map(statistics.fmean, means)
     return (mean - its_mean) / both if both > 0.0 else None
-
-
-def mean_and_error(values: Sequence[float]) -> tuple[float, float]:
-    """Return the mean of two or more numbers, and its standard error."""
-    return statistics.fmean(values), statistics.stdev(values) / len(values) ** 0.5
 
 
 # ---- forms of primitives -----------------------------------------------------------------------------------
 
 
-def forms(executor: Executor | None, name: str, scene: Scene, part: Part) -> list[Entry]:
-    """Return the forms of a scene, built, whose rounds follow a part of a picture; of a peer its own.
+def forms(executor: Executor, scene: Scene, part: Part) -> list[Entry]:
+    """Return the forms of a scene, built, whose rounds follow a part of a picture.
 
-    Facts: `source`, empty for a peer; `trace_s` and `build_s`; `chosen`: the scene has this form on the
-    executor's target.
+    Facts: `source`; `trace_s` and `build_s`; `chosen`: the scene has this form on the executor's target.
     """
-    if executor is None:
-        shape = (scene, part.width, part.rows, Settings())
-        follow = lambda render: render(part.samples, 0)  # noqa: E731
-        return [_form(VARIANT, lambda: peers.table().renderers[name](*shape), follow, follow)]
-    chosen = _compiled(executor, scene, executor.language.forms).source
-    few, found = primitives(scene) <= MOST_STATEMENTS + 1, dict[str, Entry]()
+
+    def compiled(form: Forms) -> Artifact:
+        return compile_path(lower_scene(scene, Settings(), form), executor.language, lanes=executor.lanes)
+
+    def build(artifact: Artifact) -> None:
+        executor.build(artifact)
+        executor.trace(artifact, replace(part, rows=1, samples=1))
+
+    chosen, found = compiled(executor.language.forms).source, dict[str, Entry]()
+    few = primitives(scene) <= MOST_STATEMENTS + 1
     for form in FORMS if few else [form for form in FORMS if form != "unrolled"]:
-
-        def build(artifact: Artifact) -> None:
-            executor.build(artifact)
-            executor.trace(artifact, replace(part, rows=1, samples=1))
-
-        compiled = partial(_compiled, executor, scene, FORMS[form])
-        entry = _form(form, compiled, build, lambda artifact: executor.trace(artifact, part), chosen)
+        trace = partial(compiled, FORMS[form])
+        entry = _form(form, trace, build, lambda artifact: executor.trace(artifact, part), chosen)
         found.setdefault(entry.facts["source"], entry)
     return [*found.values()]
+
+
+def form_of_peer(name: str, scene: Scene, part: Part) -> Entry:
+    """Return a peer's own form of a scene, as [`forms`] does; its fact `source` is empty."""
+    shape = (scene, part.width, part.rows, Settings())
+    follow = lambda render: render(part.samples, 0)  # noqa: E731
+    return _form(VARIANT, lambda: peers.table().renderers[name](*shape), follow, follow)
 
 
 def _form(
@@ -177,6 +176,62 @@ def _form(
     return Entry(name, facts=facts, round=lambda _number: follow(made))
 
 
-def _compiled(executor: Executor, scene: Scene, forms: Forms) -> Artifact:
-    """Return the kernel of a scene for an executor."""
-    return compile_path(lower_scene(scene, Settings(), forms), executor.language, lanes=executor.lanes)
+# ---- scenes of many primitives ----------------------------------------------------------------------------
+
+
+def _uniform(number: int, block: int, low: float, high: float) -> NDArray[np.float64]:
+    """Return four numbers in [low, high) of a primitive."""
+    words = rng.uniforms(rng.counter(1), rng.counter(number), rng.counter(0), rng.counter(block))
+    return low + (high - low) * np.concatenate(words).astype(np.float64)
+
+
+def _vector(values: ArrayLike) -> Vector:
+    """Return the first three of an array's numbers as a scene's vector."""
+    x, y, z = (float(value) for value in np.asarray(values)[:3])
+    return x, y, z
+
+
+def _rotation(number: int) -> Matrix:
+    """Return a rotation by a random unit quaternion: Shoemake, Graphics Gems III, 1992."""
+    u, a, b, _ = _uniform(number, 3, 0.0, 1.0)
+    x, y = np.sqrt(1 - u) * np.array([np.sin(2 * np.pi * a), np.cos(2 * np.pi * a)])
+    z, w = np.sqrt(u) * np.array([np.sin(2 * np.pi * b), np.cos(2 * np.pi * b)])
+    return (
+        _vector([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)]),
+        _vector([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)]),
+        _vector([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]),
+    )
+
+
+def _part(kind: str, number: int, size: float) -> Box | Sphere | Quad:
+    """Return a primitive: a box with a rotation that all share or its own, a sphere, or a square."""
+    place, color = _vector(_uniform(number, 0, -0.8, 0.8)), _vector(_uniform(number, 1, 0.2, 0.9))
+    if kind == "spheres":
+        return Sphere(place, 0.5 * size, color)
+    if kind == "quads":
+        u, v, _ = (size * np.array(row) for row in _rotation(number))
+        return Quad(place, _vector(u), _vector(v), color)
+    extent = _vector(0.6 * size * _uniform(number, 2, 0.3, 1.0))
+    return Box(place, extent, color, _rotation(0 if kind == "shared" else number))
+
+
+KINDS: Mapping[str, tuple[str, ...]] = {
+    **{kind: (kind,) for kind in ("shared", "turned", "spheres", "quads")},
+    "mixture": ("shared", "turned", "spheres", "quads"),
+}
+"""Kinds of primitives that take turns, by the name of the scene."""
+
+
+def crowd(kind: str, count: int) -> Scene:
+    """Return a room with a light and `count` primitives of a kind."""
+    size, kinds = 0.6 / count ** (1 / 3), KINDS[kind]
+    parts = [_part(kinds[i % len(kinds)], i + 1, size) for i in range(count)]
+    return Scene(
+        f"{kind} {count}",
+        Camera((0.0, 0.0, 0.95), (0.0, 0.0, 0.0), vertical_fov_deg=70.0),
+        Room((-1.0,) * 3, (1.0,) * 3, ((0.7,) * 3,) * 6),
+        boxes=tuple(part for part in parts if isinstance(part, Box)),
+        spheres=tuple(part for part in parts if isinstance(part, Sphere)),
+        quads=tuple(part for part in parts if isinstance(part, Quad)),
+        lights=(Light((-0.3, 0.99, -0.3), (0.6, 0.0, 0.0), (0.0, 0.0, 0.6), (1.0, 1.0, 1.0), 5.0),),
+    )

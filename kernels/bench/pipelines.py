@@ -3,10 +3,10 @@
 1. Ours is one pipeline on a device. A scene that moves shows another moment in every picture: its numbers are
    inputs of one kernel [`moments`]. Its parts are each ended by waiting for the device [`_parts`].
 2. Beside it are the same pipeline of one moment, and the separate way by kernels of the same executor: trace
-   all layers, read them back, encode in float64, upload, denoise, read back [`entries`].
+   all layers, read them back, encode in float64, upload, denoise, read back [`Ours.ways`].
 3. Other makers of whole pictures show the same moments: a renderer and a denoiser [`Maker`].
 4. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
-   [`first_pictures`]; a process that finds empty caches compiles everything [fresh.py].
+   [`Ours.first_pictures`]; a process that finds empty caches compiles everything [fresh.py].
 
 The network has random weights: speed does not depend on them.
 """
@@ -17,7 +17,7 @@ import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from functools import partial
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ...compiler.compile import compile_plan
@@ -32,7 +32,7 @@ from ..measure import Entry
 from ..run.denoise_on import images_of
 from ..run.pipeline import Pipeline
 from ..run.render_on import render_on
-from ..run.tune import choose
+from ..run.tune import Subject, Tuning
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -83,36 +83,58 @@ def entries(by: str, ways: Ways) -> list[Entry]:
     return [Entry(name, lambda way=way: lambda _number: way(), by) for name, way in ways.items()]  # type: ignore[misc]
 
 
-def ways_of(
-    stack: ExitStack, executor: Executor, model: Model, name: str, size: int, rays: int
-) -> dict[str, Callable[[], Any]]:
-    """Return the ways of an executor, whose pipelines are open until the stack is closed.
+@dataclass(frozen=True)
+class Ours:
+    """Pictures (size, size) of a scene by its name, traced and denoised on an executor.
 
     Features are of `rays` camera rays; 0: of the paths' own.
     """
-    shots, scene, shape = moments(name), scene_source(name).at(), (size, size)
-    job = Job(size, size, feature_spp=rays)
-    plan = plan_model(model, executor.name)
-    denoiser = compile_plan(plan.scheduled(choose(executor, plan, shape)[0]))
 
-    def separate() -> None:
-        frame = render_on(executor, scene, job).frame
-        executor.run(denoiser, images_of(model, frame))
+    executor: Executor
+    model: Model
+    scene: str
+    size: int
+    rays: int = 0
 
-    opened = partial(Pipeline, executor, model=model, size=shape, feature_spp=rays)
-    pipeline = stack.enter_context(opened(scene))
-    moving = stack.enter_context(opened(shots[0], moving=shots))
-    turn, seeds = itertools.cycle(shots), itertools.count()
+    def pipeline(self, scene: Scene, **more: Any) -> Pipeline:
+        """Return an open pipeline."""
+        size = (self.size, self.size)
+        return Pipeline(self.executor, scene, self.model, size, feature_spp=self.rays, **more)
 
-    def move() -> None:
-        moving.set_scene(next(turn))
-        moving.run(next(seeds))
+    def ways(self, stack: ExitStack) -> dict[str, Callable[[], Any]]:
+        """Return what is measured, by name; pipelines are open until the stack is closed."""
+        shots, scene, size = moments(self.scene), scene_source(self.scene).at(), self.size
+        job, plan = Job(size, size, feature_spp=self.rays), plan_model(self.model, self.executor.name)
+        schedule, _ = Tuning(self.executor, Subject.of(plan), (size, size)).picked()
+        denoiser = compile_plan(plan.scheduled(schedule))
 
-    ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
-    if pipeline.path.images:
-        ways["with an encoding of its own"] = stack.enter_context(opened(scene, sums=True)).run
-    numbers = {"of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
-    return ways | {MOVING: move} | numbers | _parts(moving)
+        def separate() -> None:
+            frame = render_on(self.executor, scene, job).frame
+            self.executor.run(denoiser, images_of(self.model, frame))
+
+        pipeline = stack.enter_context(self.pipeline(scene))
+        moving = stack.enter_context(self.pipeline(shots[0], moving=shots))
+        turn, seeds = itertools.cycle(shots), itertools.count()
+
+        def move() -> None:
+            moving.set_scene(next(turn))
+            moving.run(next(seeds))
+
+        ways: dict[str, Callable[[], Any]] = {"separate": separate, "one pipeline": pipeline.run}
+        if pipeline.path.images:
+            ways["with an encoding of its own"] = stack.enter_context(self.pipeline(scene, sums=True)).run
+        numbers = {"of it: the scene's numbers": lambda: moving.set_scene(next(turn))}
+        return ways | {MOVING: move} | numbers | _parts(moving)
+
+    def first_pictures(self) -> list[float]:
+        """Return the seconds to the first picture of each of some scenes that are not known."""
+        shots, found = moments(self.scene), []
+        for shot in shots[1 : 1 + NEW_SCENES] or shots:
+            start = time.perf_counter()
+            with self.pipeline(shot) as pipeline:
+                pipeline.run()
+            found.append(time.perf_counter() - start)
+        return found
 
 
 def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
@@ -133,14 +155,3 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
         "of it: denoising": waited(passes.denoise),
         "of it: reading back": lambda: passes.read(PICTURE),
     }
-
-
-def first_pictures(executor: Executor, model: Model, name: str, size: int, rays: int = 0) -> list[float]:
-    """Return the seconds to the first picture of each of some scenes that are not known, by a known model."""
-    shots, found = moments(name), []
-    for shot in shots[1 : 1 + NEW_SCENES] or shots:
-        start = time.perf_counter()
-        with Pipeline(executor, shot, model, (size, size), feature_spp=rays) as pipeline:
-            pipeline.run()
-        found.append(time.perf_counter() - start)
-    return found

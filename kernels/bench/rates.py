@@ -5,16 +5,24 @@
    Balance in Current High Performance Computers", IEEE TCCA Newsletter, 1995), and NumPy's sine; the last two
    in a thread for each core [`machine_ways`, `limits_of`].
 2. An executor with a schedule: three small programs of its own [`probes`]: a window of 2 x 2, one of 6 x 6,
-   and the first one with a chain of sines, on a picture so large that they take milliseconds [`probed`].
+   and the first one with a chain of sines, on a picture so large that they take milliseconds [`Probe`].
    Differences of their times give products and sines a second, and what is left of the first one's time is
    that of a pixel [`rates_of`].
+3. A way to denoise is a list of stages that run one after another: a kernel, or an operation of a library
+   that reads and writes whole pictures [`Stage`]. A stage takes as long as its arithmetic or its memory,
+   whichever is longer: S. Williams, A. Waterman and D. Patterson, "Roofline: An Insightful Visual Performance
+   Model for Multicore Architectures", Communications of the ACM 52(4), 2009, figure 1 [`predicted_seconds`]
+
+       pixels * max(pixel + products / products_per_s + sines / sines_per_s, bytes / bytes_per_s)
+
+Departure from the source: sines are counted apart from products, because one takes as long as many of those.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -23,16 +31,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_program
 from ...compiler.core.ir import Gather, Image, Program, Type
 from ...compiler.core.trace import trace
+from ...compiler.schedules.common import kernel_gather, output_channels
 from ...refimpl import rng
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor
 from ..measure import Round, Times, in_turns
 from ..run.denoise_on import products_of
 from ..run.tune import noise
-from .cost import FLOAT_BYTES, Rates, sines_of
 
 MATRIX = 4096
 """Rows and columns of the matrices whose product is the machine's rate: larger ones are hardly faster."""
@@ -143,39 +152,42 @@ def probes() -> Mapping[str, Program]:
     return {"small": _probe(2, 0), "window": _probe(6, 0), "sines": _probe(2, PROBE_SINES)}
 
 
-def probed(
-    executor: Executor, schedule: str, pause_s: float, profile: str = "ieee"
-) -> tuple[dict[str, Times], int]:
-    """Return the times of the small programs by name, and the size of the picture on which they ran."""
-    made = {name: compile_program(p, executor.name, profile, schedule) for name, p in probes().items()}
-    for size in PROBE_PX:
-        images = noise(probes()["small"], (size, size))
-        for artifact in made.values():
-            executor.build(artifact, (size, size))
-        # Without copies, where the executor can tell.
-        alone = getattr(executor, "kernel_seconds", executor.run)
-        ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
-        small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
-        if min(small.seconds) >= PROBE_S or size == PROBE_PX[-1]:
-            break
-    return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
+@dataclass(frozen=True)
+class Probe:
+    """The small programs on an executor, with a schedule and a profile."""
+
+    executor: Executor
+    schedule: str
+    profile: str = "ieee"
+
+    def times(self, pause_s: float) -> tuple[dict[str, Times], int]:
+        """Return the times of the programs by name, and the size of the picture on which they ran."""
+        executor, how = self.executor, (self.executor.language, self.profile, self.schedule)
+        made = {name: compile_program(program, *how) for name, program in probes().items()}
+        for size in PROBE_PX:
+            images = noise(probes()["small"], (size, size))
+            for artifact in made.values():
+                executor.build(artifact, (size, size))
+            # Without copies, where the executor can tell.
+            alone = getattr(executor, "kernel_seconds", executor.run)
+            ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
+            small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
+            if min(small.seconds) >= PROBE_S or size == PROBE_PX[-1]:
+                break
+        return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
 
 
 def rates_of(times: Mapping[str, Times], pixels: int, bytes_per_s: float) -> Rates:
     """Return the rates behind the times of [`probes`]; products whose time drowns in noise have rate NaN."""
     programs, per_pixel = probes(), {name: found.median / pixels for name, found in times.items()}
     more = products_of(programs["window"]) - products_of(programs["small"])
-    products = _rate(more, per_pixel["window"] - per_pixel["small"])
+    waited = per_pixel["window"] - per_pixel["small"]
+    products = more / waited if waited > 0.0 else math.nan
     # Sines whose time drowns in noise cost nothing that could be seen.
     waited = max(0.0, per_pixel["sines"] - per_pixel["small"])
     sines = sines_of(programs["sines"]) / waited if waited > 0.0 else math.inf
     rest = per_pixel["small"] - products_of(programs["small"]) / products
     return Rates(products, sines, bytes_per_s, max(0.0, rest))
-
-
-def _rate(count: float, seconds: float) -> float:
-    """Return count / seconds; NaN where the difference of two times is not positive."""
-    return count / seconds if seconds > 0.0 else math.nan
 
 
 def _probe(window: int, sines: int) -> Program:
@@ -198,3 +210,57 @@ def _weights(stream: int, shape: tuple[int, int]) -> NDArray[np.float32]:
     pixels = rng.counter(np.arange(math.prod(shape)))
     found: NDArray[np.float32] = rng.uniforms(rng.counter(stream), pixels, rng.counter(0), rng.counter(0))[0]
     return found.reshape(shape)
+
+
+# ---- the cost model ---------------------------------------------------------------------------------------
+
+
+FLOAT_BYTES = 4
+"""Bytes of a float32."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What one pass over a picture does for a pixel: products with their sums, sines, bytes of memory."""
+
+    products: float
+    sines: float
+    bytes: float
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What a device does in a second, and the seconds that a pixel takes in addition."""
+
+    products_per_s: float
+    sines_per_s: float
+    bytes_per_s: float
+    pixel_s: float = 0.0
+
+
+def predicted_seconds(stages: Sequence[Stage], rates: Rates, pixels: int) -> float | None:
+    """Return the time of a picture; None without stages, or where a rate is not positive."""
+    known = (rates.products_per_s, rates.sines_per_s, rates.bytes_per_s)
+    if not stages or not all(rate > 0.0 for rate in known):
+        return None
+    return pixels * sum(
+        max(
+            rates.pixel_s + stage.products / rates.products_per_s + stage.sines / rates.sines_per_s,
+            stage.bytes / rates.bytes_per_s,
+        )
+        for stage in stages
+    )
+
+
+def sines_of(program: Program) -> int:
+    """Return the sines of a pixel, in a program whose sines are single nodes."""
+    return sum(math.prod(node.type.shape) for node in program.nodes if node.op == "sin")
+
+
+def fused(artifact: Artifact, sines: int) -> tuple[Stage, ...]:
+    """Return the stages of compiled kernels: each reads its images and writes one; the last has the sines."""
+    channels = [kernel_gather(k.programs).channels + output_channels(k.programs) for k in artifact.kernels]
+    return tuple(
+        Stage(products_of(kernel.programs), sines if kernel is artifact else 0, FLOAT_BYTES * count)
+        for kernel, count in zip(artifact.kernels, channels, strict=True)
+    )

@@ -20,7 +20,7 @@ from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.whole import round_image
-from ..devices.images import Images
+from ..devices.kernel import Images
 from ..run.denoise_on import images_of
 
 HIDDEN = (32, 32, 32, 32)

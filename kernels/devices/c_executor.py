@@ -27,21 +27,11 @@ from typing import Any
 import numpy as np
 
 from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import (
-    DENOISE,
-    ENCODE,
-    FOLLOW,
-    GUIDE,
-    INTEGERS,
-    PATH,
-    PLAIN,
-    SMOOTH,
-)
-from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
+from ...compiler.kernel.interface import ENCODE, INTEGERS, PATH, PLAIN
+from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .. import cache
 from ..folders import discard, new_temporary
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
-from .images import widest
 from .kernel import Memory, words
 
 COMPILER_VARIABLE = "CC"
@@ -165,50 +155,37 @@ void wamnet_rows(float *const *arrays, const uint32_t *integers, int first, int 
 """
 """The function that is called: rows [first, end), arrays and integers in the interface's order."""
 
-OF_PLANES = """\
-    for (int y = first; y < end; ++y) {{{{
-        for (int x = 0; x < (int)integers[0]; ++x) {{{{
-            {{entry}}({{arrays}}, {integers}, x, y);
-        }}}}
-    }}}}"""
-"""What kernels on planes do, by their number of integers."""
-
-BODIES = {
-    DENOISE: """\
-    int width = (int)integers[0], height = (int)integers[1];
+ITEMS = """\
     for (int y = first; y < end; y += {rows}) {{
-        for (int x = 0; x < width; x += {columns}) {{
-            {entry}({arrays}, width, height, x, y);
+        for (int x = 0; x < (int)integers[0]; x += {columns}) {{
+            {entry}({arguments}, x, y);
         }}
-    }}""",
-    PATH: """\
+    }}"""
+"""What it does: it calls a kernel for all work items of these rows."""
+
+PART = """\
     wamnet_part part;
     memcpy(&part, integers, sizeof part);
-    for (int row = first; row < end; ++row) {{
-        for (int column = 0; column < part.width; column += WAMNET_PATHS) {{
-            {entry}(&part, {arrays}, column, row);
-        }}
-    }}""",
-    ENCODE: """\
+"""
+"""What comes before that where a kernel traces paths: its integers are one structure."""
+
+AT_ONCE = """\
     (void)first;
     (void)end;
-    {entry}({arrays}, (int)integers[0], (int)integers[1], (int)integers[2]);""",
-    **{
-        role: OF_PLANES.format(integers=", ".join(f"(int)integers[{i}]" for i in range(len(INTEGERS[role]))))
-        for role in (GUIDE, SMOOTH, FOLLOW)
-    },
-}
-"""What it does, by role; an encoding takes all rows at once: a thousandth of the time of the paths."""
+    {entry}({arguments});"""
+"""What it does for an encoding, which takes all rows at once: a thousandth of the time of the paths."""
 
 
 def glue_of(kernel: Artifact, header: str) -> str:
     """Return the text with the function that is called, around a kernel's source in a file."""
-    schedule = kernel.manifest["schedule"] if kernel.role == DENOISE else {}
-    taken = kernel.interface
-    body = BODIES[taken.role].format(
+    taken, schedule = kernel.interface, kernel.manifest.get("schedule", {})
+    arrays = [f"arrays[{place}]" for place in range(len(taken.arrays))]
+    integers = [f"(int)integers[{place}]" for place in range(len(INTEGERS[taken.role]))]
+    paths = taken.role == PATH
+    body = (AT_ONCE if taken.role == ENCODE else PART + ITEMS if paths else ITEMS).format(
         entry=kernel.entry_point,
-        arrays=", ".join(f"arrays[{place}]" for place in range(len(taken.arrays))),
-        columns=schedule.get("pixels", 1),
+        arguments=", ".join(["&part", *arrays] if paths else [*arrays, *integers]),
+        columns="WAMNET_PATHS" if paths else schedule.get("pixels", 1),
         rows=schedule.get("rows", 1),
     )
     return GLUE.format(header=header, body=body)
@@ -220,6 +197,7 @@ class CExecutor(Executor):
     name = "c"
     paints = True
     smooths = True
+    largest_bytes = 4 * INDEX_LIMIT
 
     def __init__(self) -> None:
         super().__init__()
@@ -319,17 +297,6 @@ class CExecutor(Executor):
             raise ExecutorUnavailable(
                 f"c: the compiler {self._command[0]!r} cannot be run ({error.strerror}); {WAY_OUT}"
             ) from None
-
-    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
-        """Refuse images whose indices `int` does not hold."""
-        most = widest(artifact)
-        if size[0] * size[1] * most >= INDEX_LIMIT:
-            raise InputError(
-                "size of the image for C",
-                f"{size[1]} x {size[0]} with {most} channels",
-                f"one image must hold fewer than {INDEX_LIMIT} values",
-                "split the image, or use executor numpy",
-            )
 
     def _start(
         self, kernel: Artifact, prepared: Any, arrays: Mapping[str, Memory], integers: Mapping[str, int]

@@ -3,12 +3,11 @@
     run      images -> denoising kernel, or both of its passes -> picture
     call     arrays -> a kernel of any other role -> what it writes
     trace    path kernel -> sums
-    encode   sums -> encoding kernel -> images
-    passes   all three, without leaving the device [passes.py]
-    smooth   layers -> edge-avoiding filter -> image [planes.py]
-    follow   first hits, last picture, colour -> history -> this picture [planes.py]
+    passes   paths, encoding and denoiser, without leaving the device [passes.py]
+    smooth   layers -> edge-avoiding filter -> image [passes.py]
+    follow   first hits, last picture, colour -> history -> this picture
 
-The first four are written once, here; the others are functions of an executor. A device makes a kernel ready
+The first three are written once, here; the others are functions of an executor. A device makes a kernel ready
 [`Executor._prepare`] and starts it [`_start`]. One with separate memory also makes memory, with a content or
 without one [`_store`, `_memory`], copies from it [`_fetch`], and gives it back [`_release`]; others work on
 the host's.
@@ -20,6 +19,7 @@ and copies the result back; the times that wamnet reports mean these two [`denoi
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -44,8 +44,19 @@ from ...compiler.kernel.interface import (
     WEIGHTS,
 )
 from ...refimpl.errors import InputError
-from .images import Images, black, checked
-from .kernel import Memory, Part, Size, numbers_for, plane_integers, plane_shape, shapes
+from .kernel import (
+    Images,
+    Memory,
+    Part,
+    Size,
+    black,
+    checked,
+    numbers_for,
+    plane_integers,
+    plane_shape,
+    shapes,
+    widest,
+)
 
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
@@ -87,7 +98,7 @@ class Executor(ABC):
     [compiler/kernel/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
     `interprets`: it runs programs as they are, without kernels. `software`: a graphics library's own renderer
-    on the processor, slower than the reference.
+    on the processor, slower than the reference. `largest_bytes`: those of an image, where there is a limit.
     """
 
     name: str
@@ -104,6 +115,7 @@ class Executor(ABC):
     smooths: bool = False
     interprets: bool = False
     software: bool = False
+    largest_bytes: int = 0
 
     def __init__(self) -> None:
         self._built: dict[str, Built] = {}
@@ -114,6 +126,12 @@ class Executor(ABC):
         from ...compiler.targets import language_named
 
         return language_named(self.name)
+
+    @property
+    def identity(self) -> list[Any]:
+        """Return what names the device with its driver, for keys of the cache."""
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        return [self.name, self.device, self.driver, cores]
 
     # ---- what a device provides --------------------------------------------------------------------------
 
@@ -180,7 +198,16 @@ class Executor(ABC):
         return len(kernel.planes), rows, width
 
     def check_size(self, artifact: Artifact, size: Size) -> None:
-        """Refuse images of a size (height, width) that the device cannot hold."""
+        """Refuse images of a size (height, width) beyond `largest_bytes`, or the indices of an `int`."""
+        most = widest(artifact)
+        count = size[0] * size[1] * most
+        if self.largest_bytes and (count >= INDEX_LIMIT or 4 * count > self.largest_bytes):
+            raise InputError(
+                f"size of the image on {self.device}",
+                f"{size[1]} x {size[0]} with {most} channels",
+                f"one image must hold fewer than {INDEX_LIMIT} values and at most {self.largest_bytes} bytes",
+                "split the image, or use executor numpy",
+            )
 
     def open_trainer(self, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
@@ -334,14 +361,6 @@ class Executor(ABC):
         sums = self.call(kernel, _numbers(kernel, numbers), part.integers)[SUMS]
         return sums[:, : part.rows, : part.width]
 
-    def paint(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> Images:
-        """Return the encoded images (H, W, C) of a part that is the whole picture, by name."""
-        if (part.first_row, part.rows) != (0, part.height):
-            rows = f"{part.first_row} to {part.first_row + part.rows} of {part.height}"
-            rule = "a kernel that writes encoded images computes the full image"
-            raise InputError("rows of the image", rows, rule, "trace the part by a kernel of sums")
-        return _of_features(self.call(kernel, _numbers(kernel, numbers), part.integers))
-
     def _made(self, name: str, shape: tuple[int, ...], made: ExitStack) -> Memory:
         """Return memory that a kernel will write, which `made` gives back."""
         memory = self._memory(name, shape)
@@ -354,21 +373,6 @@ class Executor(ABC):
         for image in images:
             written[image.name] = self._made(f"{IMAGE}{image.name}", (*size, image.channels), made)
         return written
-
-    def encode(self, kernel: Artifact, sums: NDArray[np.float32], samples: int) -> Images:
-        """Return the encoded images (H, W, C) of sums (planes, H, W) over so many samples, by name."""
-        wanted = len(kernel.planes)
-        if sums.dtype != np.float32 or sums.ndim != 3 or len(sums) != wanted or 0 in sums.shape:
-            raise InputError(
-                "sums for the encoding",
-                f"{sums.dtype} of shape {sums.shape}",
-                f"must be float32 of shape ({wanted}, height, width): planes {', '.join(kernel.planes)}",
-                "add up the planes that the encoding was compiled for",
-            )
-        height, width = sums.shape[1:]
-        strides = {"width": width, "height": height, "row_stride": width, "plane_stride": height * width}
-        given = {SUMS: np.ascontiguousarray(sums)}
-        return _of_features(self.call(kernel, given, {**strides, "sample_count": samples}))
 
     def _turn(self, kernel: Artifact, sums: Memory, written: Mapping[str, Memory], samples: int) -> None:
         """Start a built encoding of sums that may be larger than the images."""
@@ -401,8 +405,3 @@ def _numbers(kernel: Artifact, numbers: NDArray[np.float32] | None) -> Images:
     """Return the array of a scene's numbers, where they are inputs."""
     taken = kernel.interface.named(SCENE_NUMBERS)
     return {SCENE_NUMBERS: numbers_for(kernel, numbers)} if taken else {}
-
-
-def _of_features(written: Images) -> Images:
-    """Return encoded images by the names of their features."""
-    return {name.removeprefix(IMAGE): image for name, image in written.items()}

@@ -1,4 +1,4 @@
-"""What kernels are given: parts of a render, integers, and arrays on a device."""
+"""What kernels are given: parts of a render, integers, arrays on a device, and checked images."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
+from ...compiler.core.ir import Image
 from ...compiler.kernel.interface import UNSIGNED, Interface
 from ...refimpl.errors import InputError
 
@@ -98,3 +99,67 @@ def plane_integers(kernel: Artifact, size: Size) -> dict[str, int]:
 def plane_shape(named: tuple[int | str, ...], integers: Mapping[str, int]) -> tuple[int, ...]:
     """Return an array's shape in numbers."""
     return tuple(integers[n] if isinstance(n, str) else n for n in named)
+
+
+# ---- images -----------------------------------------------------------------------------------------------
+
+
+Images = Mapping[str, NDArray[np.float32]]
+"""Images (H, W, C) by name."""
+
+ENCODE = "encode the frame's features (refimpl.network.dataset.feature_image)"
+"""The remedy for images that a kernel does not read."""
+
+
+def images_of(artifact: Artifact) -> tuple[Image, ...]:
+    """Return the images that a caller gives: those of the first kernel."""
+    return artifact.kernels[0].images
+
+
+def checked(artifact: Artifact, inputs: Images) -> Images:
+    """Return the images in the kernel's order, contiguous, or say what is wrong with them."""
+    wanted = images_of(artifact)
+    if sorted(inputs) != sorted(image.name for image in wanted):
+        raise InputError(
+            "images for the kernel",
+            ", ".join(inputs),
+            f"must be {', '.join(image.name for image in wanted)}",
+            "give each encoded feature once, by name",
+        )
+    size = inputs[wanted[0].name].shape[:2]
+    for image in wanted:
+        array = inputs[image.name]
+        if array.dtype != np.float32 or array.shape != (*size, image.channels) or 0 in array.shape:
+            raise InputError(
+                f"image {image.name!r}",
+                f"{array.dtype} of shape {array.shape}",
+                f"must be float32 of shape (height, width, {image.channels}), all images of equal size",
+                ENCODE,
+            )
+        _check_range(image, array)
+    return {image.name: np.ascontiguousarray(inputs[image.name]) for image in wanted}
+
+
+def widest(artifact: Artifact) -> int:
+    """Return the most channels of an image that one of the artifact's kernels reads or writes."""
+    written = [kernel.channels for kernel in artifact.kernels]
+    return max(*written, *(image.channels for image in images_of(artifact)))
+
+
+def _check_range(image: Image, array: NDArray[np.float32]) -> None:
+    """Refuse numbers outside the range on which the kernel's bound rests, and what is not a number."""
+    # NaN among the numbers makes both NaN, and fails.
+    if image.low <= float(array.min()) and float(array.max()) <= image.high:
+        return
+    wrong, rule, remedy = ~np.isfinite(array), "all values must be finite", "fix or mask the frame first"
+    if not wrong.any():
+        # In float64: a Python number would be rounded to the array's float32 first.
+        wrong = (array < np.float64(image.low)) | (array > np.float64(image.high))
+        rule, remedy = f"the kernel's bound holds for values in {image.range_text}", ENCODE
+    y, x, _ = np.argwhere(wrong)[0]
+    raise InputError(f"image {image.name!r} at row {y}, column {x}", array[y, x].tolist(), rule, remedy)
+
+
+def black(artifact: Artifact, size: tuple[int, int]) -> Images:
+    """Return black images of `size` (height, width), for the run that makes drivers finish compiling."""
+    return {i.name: np.zeros((*size, i.channels), np.float32) for i in images_of(artifact)}

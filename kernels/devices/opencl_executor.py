@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from ...compiler.kernel.interface import BLOCK, DENOISE, RESULT, SCENE_NUMBERS
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
-from .images import Images, widest
-from .kernel import Memory, Size, in_order, shapes
+from .executor import BYTE_SCHEDULE, VECTOR_SCHEDULES, Executor
+from .kernel import Images, Memory, Size, in_order, shapes
 
 if TYPE_CHECKING:
     from ...compiler.artifact import Artifact
@@ -84,7 +83,7 @@ class OpenCLExecutor(Executor):
         chosen = _choose(device or os.environ.get(DEVICE_VARIABLE) or "")
         self.device = _describe(chosen)
         _check_arithmetic(chosen)
-        self._device = chosen
+        self._device, self.largest_bytes = chosen, int(chosen.max_mem_alloc_size)
         # PoCL keeps the records of all devices in one block: only the first one's address is that of a block.
         if chosen.platform.name == pocl_cpu.PLATFORM and chosen == chosen.platform.get_devices()[0]:
             pocl_cpu.name_the_processor(chosen.int_ptr)
@@ -130,19 +129,6 @@ class OpenCLExecutor(Executor):
         """Return a copy of the weights; an empty buffer is not a buffer."""
         held = self._copied(kernel.weights if kernel.weights.size else np.zeros(1, np.float32))
         return Memory(kernel.weights.shape, held)
-
-    def check_size(self, artifact: Artifact, size: tuple[int, int]) -> None:
-        """Refuse images that do not fit one buffer of the device, or whose indices `int` does not hold."""
-        height, width = size
-        most = widest(artifact)
-        count, largest = height * width * most, self._device.max_mem_alloc_size
-        if count >= INDEX_LIMIT or 4 * count > largest:
-            raise InputError(
-                f"size of the image on {self.device}",
-                f"{width} x {height} with {most} channels",
-                f"one image must hold fewer than {INDEX_LIMIT} values and at most {largest} bytes",
-                "split the image, or use executor numpy",
-            )
 
     def _local_size(self, artifact: Artifact) -> tuple[int, int]:
         """Return the size of a group: smaller on a processor for kernels with large arrays."""
@@ -325,7 +311,11 @@ def _whole(items: tuple[int, ...], local: tuple[int, ...]) -> tuple[int, ...]:
 
 def _choose(wanted: str) -> Any:
     """Return the first device whose description holds `wanted`, GPUs first."""
-    found = _devices()
+    found: list[Any] = []
+    with suppress(cl.Error):
+        for platform in cl.get_platforms():
+            with suppress(cl.Error):  # a platform that fails has none
+                found += platform.get_devices()
     if not found:
         raise ExecutorUnavailable(
             "OpenCL: no platform is installed; pip install 'wamnet[opencl]' installs PoCL on x86-64; other "
@@ -337,16 +327,6 @@ def _choose(wanted: str) -> Any:
         names = "; ".join(map(_describe, found))
         raise ExecutorUnavailable(f"OpenCL: no device matches {wanted!r}; choose a part of one of: {names}")
     return matching[0]
-
-
-def _devices() -> list[Any]:
-    """Return the devices of all platforms; a platform that fails has none."""
-    found: list[Any] = []
-    with suppress(cl.Error):
-        for platform in cl.get_platforms():
-            with suppress(cl.Error):
-                found += platform.get_devices()
-    return found
 
 
 def _check_arithmetic(device: Any) -> None:

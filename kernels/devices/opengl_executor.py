@@ -132,8 +132,7 @@ class OpenGLExecutor(Executor):
     def _prepare(self, kernel: Artifact) -> tuple[tuple[Any, ...], Any]:
         """Return the programs, one for each launch, and the triangle of one that draws; others have none."""
         if kernel.role == DENOISE:
-            self._check_promise(kernel)
-            self._check_loops(kernel)
+            self._check(kernel)
         with ExitStack() as made:
             if _computes(kernel):
                 programs, triangle = self._computing(kernel, made), None
@@ -143,17 +142,14 @@ class OpenGLExecutor(Executor):
             made.pop_all()
             return programs, triangle
 
-    def _check_promise(self, artifact: Artifact) -> None:
-        """Refuse a bound that the device cannot keep."""
+    def _check(self, artifact: Artifact) -> None:
+        """Refuse a bound that the device cannot keep, and loops that Mesa's renderer ends too early."""
         rounds = any(artifact.manifest["bound"]["output"] or ())
         if rounds and ORDER_EXTENSION not in self._context.extensions:
             raise CompileError(
                 f"{self.device} lacks {ORDER_EXTENSION}, which the error bound needs (`precise`): use "
                 "profile native, which then has no bound, or executor opencl or numpy"
             )
-
-    def _check_loops(self, artifact: Artifact) -> None:
-        """Refuse loops that Mesa's software renderer ends too early."""
         count = llvmpipe.iterations(artifact.source) if llvmpipe.NAME in self.device else 0
         if count > llvmpipe.MOST_ITERATIONS:
             raise CompileError(
@@ -322,7 +318,12 @@ class OpenGLExecutor(Executor):
             self._context.memory_barrier()
             return
         batch, firsts = batches(schedule, (height, width))
-        self._reserve([4 * count * batch for count in schedule["memory"].values()])
+        sizes = [4 * count * batch for count in schedule["memory"].values()]
+        if [buffer.size for buffer in self._between_passes] != sizes:
+            while self._between_passes:
+                self._between_passes.pop().release()
+            for size in sizes:
+                self._between_passes.append(self._context.buffer(reserve=size))
         for number, buffer in enumerate(self._between_passes, 1):
             buffer.bind_to_storage_buffer(number)
         for first in firsts:
@@ -330,14 +331,6 @@ class OpenGLExecutor(Executor):
                 self._bind(program, textures, {"first_tile": first, "tile_count": batch})
                 program.run(batch // (launch["tiles"] * schedule["items"]), launch["lines"], 1)
                 self._context.memory_barrier()
-
-    def _reserve(self, sizes: Sequence[int]) -> None:
-        """Reserve buffers of so many bytes for what passes hand on, unless they are as large."""
-        if [buffer.size for buffer in self._between_passes] != sizes:
-            while self._between_passes:
-                self._between_passes.pop().release()
-            for size in sizes:
-                self._between_passes.append(self._context.buffer(reserve=size))
 
     def _bind(self, program: Any, textures: Mapping[str, Any], values: Mapping[str, Any]) -> None:
         """Give a program its textures and numbers."""

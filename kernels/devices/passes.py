@@ -1,44 +1,59 @@
-"""The three passes of a pipeline on one device, for kernels/run/pipeline.py.
+"""What runs on one device without leaving it: the passes of a pipeline, and the edge-avoiding filter.
 
     path kernel -> sums -> encoding kernel -> feature images -> denoising kernel -> picture
 
-Sums, images and picture are made once for a size and stay on the device; only [`Passes.read`] copies
-anything to the host. Passes are ordered: each sees what the one before it has written.
+Sums, images and picture of a pipeline are made once for a size and stay on the device; only [`Passes.read`]
+copies anything to the host. Passes are ordered: each sees what the one before it has written.
+
+The edge-avoiding filter takes layers of a frame, and an encoded feature image comes back [`Filter`]; light
+is in two arrays that change places from level to level:
+
+    layers -> guide -> guides, light -> smooth, gaps of 1, 2, 4 -> light -> encode -> feature image
+
+Rows of planes are filled up to whole work items; what is beyond the picture means nothing, and is not read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact
-from ...compiler.kernel.interface import IMAGE, RESULT, SCENE_NUMBERS, SUMS
+from ...compiler.artifact import Artifact, SmoothKernels
+from ...compiler.kernel.interface import GUIDES, IMAGE, LIGHT, RESULT, SCENE_NUMBERS, SUMS
+from ...compiler.scenes.smooth_kernel import FEATURE
+from ...refimpl.network.dataset import known
+from ...refimpl.network.smoothing import LEVELS
 from .executor import Executor
-from .images import images_of
-from .kernel import Memory, Part, Size, numbers_for, shapes
+from .kernel import Memory, Part, Size, images_of, numbers_for, plane_integers, plane_shape, shapes
 
 PICTURE = "picture"
 """Name under which the result is read."""
 
 
+@dataclass
 class Passes:
-    """Kernels with their images on a device; a context manager that gives the images back."""
+    """Kernels with their images of `size` (height, width) on a device, which a context manager gives back."""
 
-    def __init__(self, executor: Executor, encode: Artifact, denoise: Artifact, size: Size) -> None:
-        """Keep images of `size` (height, width) on the device for these kernels."""
-        for artifact in (encode, denoise):
+    executor: Executor
+    encoder: Artifact
+    denoiser: Artifact
+    size: Size
+
+    def __post_init__(self) -> None:
+        """Make the images."""
+        executor, size = self.executor, self.size
+        for artifact in (self.encoder, self.denoiser):
             executor._check_target(artifact)
-        executor.check_size(denoise, size)
-        self.encoder, self.denoiser, self.size = encode, denoise, size
-        self._executor, self._sums = executor, Memory((), None)
-        self._numbers, self._given = Memory((), None), np.zeros(0, np.float32)
+        executor.check_size(self.denoiser, size)
+        self._sums, self._numbers, self._given = Memory((), None), Memory((), None), np.zeros(0, np.float32)
         with executor._session(size), ExitStack() as made:
-            self._images = executor._images(encode.images, size, made)
-            self._written = [executor._made(RESULT, shape, made) for shape in shapes(denoise, size)]
+            self._images = executor._images(self.encoder.images, size, made)
+            self._written = [executor._made(RESULT, shape, made) for shape in shapes(self.denoiser, size)]
             self._giving_back = made.pop_all()
 
     def trace(self, kernel: Artifact, part: Part, numbers: NDArray[np.float32] | None = None) -> None:
@@ -47,7 +62,7 @@ class Passes:
         One that writes encoded images leaves nothing to encode. `numbers` (n,): those of the scene that are
         the kernel's inputs, by default those of its own scene.
         """
-        executor = self._executor
+        executor = self.executor
         executor.build(kernel)
         if kernel.images:
             written = {f"{IMAGE}{image.name}": self._images[image.name] for image in kernel.images}
@@ -69,19 +84,19 @@ class Passes:
         found = numbers_for(kernel, numbers)
         if found.tobytes() != self._given.tobytes():
             self._numbers = self._dropped(self._numbers)
-            self._numbers, self._given = self._executor._store(SCENE_NUMBERS, found), found
+            self._numbers, self._given = self.executor._store(SCENE_NUMBERS, found), found
         return {SCENE_NUMBERS: self._numbers}
 
     def encode(self, samples: int) -> None:
         """Start the encoding of sums over so many samples."""
-        executor = self._executor
+        executor = self.executor
         executor.build(self.encoder)
         with executor._session(self.size):
             executor._turn(self.encoder, self._sums, self._images, samples)
 
     def denoise(self) -> None:
         """Start the denoiser on the images that it reads."""
-        executor = self._executor
+        executor = self.executor
         executor.build(self.denoiser, self.size)
         images = {image.name: self._images[image.name] for image in images_of(self.denoiser)}
         with executor._session(self.size):
@@ -89,13 +104,13 @@ class Passes:
 
     def read(self, name: str) -> NDArray[np.float32]:
         """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
-        with self._executor._session(self.size):
-            return self._executor._fetch(*self._held(name))
+        with self.executor._session(self.size):
+            return self.executor._fetch(*self._held(name))
 
     def read_later(self, name: str) -> Callable[[], NDArray[np.float32]]:
         """Begin to copy an image to the host, and return what waits for it: passes may start meanwhile."""
-        with self._executor._session(self.size):
-            return self._executor._fetch_later(*self._held(name))
+        with self.executor._session(self.size):
+            return self.executor._fetch_later(*self._held(name))
 
     def _held(self, name: str) -> tuple[str, Memory]:
         """Return a kernel's name for an image, and its memory."""
@@ -103,12 +118,12 @@ class Passes:
 
     def finish(self) -> None:
         """Wait until all passes that were started have ended; reading waits by itself."""
-        with self._executor._session(self.size):
-            self._executor._finish()
+        with self.executor._session(self.size):
+            self.executor._finish()
 
     def close(self) -> None:
         """Give the images back."""
-        with self._executor._session():
+        with self.executor._session():
             self._sums, self._numbers = self._dropped(self._sums), self._dropped(self._numbers)
             self._giving_back.close()
         self._images, self._written = {}, []
@@ -116,7 +131,7 @@ class Passes:
     def _dropped(self, old: Memory) -> Memory:
         """Give memory back, if there is any, and return none."""
         if old.shape:
-            self._executor._release(old)
+            self.executor._release(old)
         return Memory((), None)
 
     def __enter__(self) -> Any:
@@ -124,3 +139,47 @@ class Passes:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+# ---- kernels on planes ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The kernels of the filter, built on a device."""
+
+    executor: Executor
+    kernels: SmoothKernels
+
+    def __post_init__(self) -> None:
+        """Build the kernels."""
+        for kernel in self.kernels:
+            self.executor._check_target(kernel)
+            self.executor.build(kernel)
+
+    def image(self, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """Return the feature image (H, W, 3) of layers (H, W, C) by what they are to the filter.
+
+        They are color, normal, albedo, position and depth; NaN counts as 0.
+        """
+        executor, (guide, smooth, encode) = self.executor, self.kernels
+        with np.errstate(over="ignore"):
+            layers = {name: known(values.astype(np.float32)) for name, values in layers.items()}
+        height, width = layers[FEATURE].shape[:2]
+        with executor._session((height, width)), ExitStack() as made:
+            integers = plane_integers(smooth, (height, width))
+            images = {f"{IMAGE}{name}": values for name, values in layers.items()}
+            arrays = {name: executor._stored(name, values, made) for name, values in images.items()}
+            shapes = {array.name: array.shape for array in smooth.interface.arrays}
+            guides, light, other = (
+                executor._made(name, plane_shape(shapes[name], integers), made)
+                for name in (GUIDES, LIGHT, LIGHT)
+            )
+            executor.start(guide, {**arrays, GUIDES: guides, LIGHT: light}, integers)
+            for level in range(LEVELS):
+                integers["gap"] = 2**level
+                executor.start(smooth, {GUIDES: guides, LIGHT: light, RESULT: other}, integers)
+                light, other = other, light
+            written = executor._images(encode.images, (height, width), made)
+            executor._turn(encode, light, written, 1)
+            return executor._fetch(f"{IMAGE}{FEATURE}", written[FEATURE])

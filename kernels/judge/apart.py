@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ..devices.executor import Executor
-from ..devices.images import Images
+from ..devices.kernel import Images
 from ..devices.registry import WAYS, open_executor
 from ..orphans import Worker, WorkerEnded
 

@@ -1,7 +1,7 @@
 """Path kernels against the reference, step by step: what differs must be explained by rounding.
 
 1. A kernel reports the state of each path after its last arrival; stopped at depth 0, 1, ... it reports every
-   state [`_states`]. These are builds of the same text except for the depth: a compiler that made different
+   state [`_Paths`]. These are builds of the same text except for the depth: a compiler that made different
    code of them would show as unexplained.
 2. One step of the reference starts from the *kernel's own* state, so that errors do not pile up: `start` or
    `scatter` gives ranges for the ray that the kernel has next, `arrive` on that ray gives ranges for the
@@ -10,8 +10,9 @@
    of the step is closer to its threshold than rounding, it is *undecided* and the range holds both ways;
    when the kernel then went another way than the float32 reference, it is *different*.
 4. Beside the steps, the reference's own paths are followed, and how far the kernel's have moved from them is
-   reported: that needs no explanation, it grows from bounce to bounce [`_own_paths`].
-5. The random numbers' generator is compared to the bit (random_words.py).
+   reported: that needs no explanation, it grows from bounce to bounce [`_moved`].
+5. The random numbers' generator is compared to the bit, by a path kernel of the empty scene whose features of
+   the first surface are its words, in halves of 16 bits, which floats hold exactly [`wrong_words`].
 
 The picture as a whole is compared by compare_images.py.
 """
@@ -20,26 +21,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
+from ...compiler.core.ir import Type
+from ...compiler.core.passes import pipeline
+from ...compiler.core.trace import trace
 from ...compiler.proof import ranges
 from ...compiler.proof.ranges import Arithmetic, Range
-from ...compiler.scenes.emit_path import END
-from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_scene
+from ...compiler.scenes.emit_path import END, planes
+from ...compiler.scenes.lower_scene import PASSES, PATH, SURFACE, PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.values import kinds, names
+from ...refimpl import rng
 from ...refimpl.light import render
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from ...refimpl.light.transport import Settings
+from ...refimpl.light.scenes import canonical
+from ...refimpl.light.transport import BLOCKS_PER_BOUNCE, Settings
 from ..devices.executor import Executor
 from ..devices.kernel import Part
-from ..devices.numpy_executor import follow
-from . import random_words
+from ..devices.registry import open_executor
 
 QUANTITIES: Mapping[str, list[str]] = {
     name: names({name: value}) for name, value in {**PATH, **SURFACE}.items() if name != "surface"
@@ -172,8 +178,8 @@ def compare_paths(
     before: State | None = None
     together = np.ones(view.width * view.height, bool)
     depths, examples = [], list[Unexplained]()
-    own = _own_paths(programs, given)
-    for depth, after in enumerate(_states(executor, programs, view, build)):
+    own = _Paths(open_executor("numpy"), programs, view, kernel_of_states).states()
+    for depth, after in enumerate(_Paths(executor, programs, view, build).states()):
         step = _Step(programs, arithmetic, depth, given, before, after)
         verdict = _judge(step, view)
         examples += verdict.examples[: SHOWN - len(examples)]
@@ -193,7 +199,7 @@ def compare_paths(
         before = {**after, "alive": step.entered & after["alive"]}
         if on_progress is not None:
             on_progress(1)
-    wrong = random_words.wrong_words(executor, given, settings.max_depth, view.width, view.height)
+    wrong = wrong_words(executor, given, settings.max_depth, view.width, view.height)
     return PathReport(view, tuple(depths), tuple(examples), wrong)
 
 
@@ -211,22 +217,28 @@ def _given(view: View) -> State:
     }
 
 
-def _stopped(programs: PathPrograms, depth: int) -> PathPrograms:
-    """Return the programs of paths that end after `depth` scatterings and one more arrival."""
-    return replace(programs, settings=replace(programs.settings, max_depth=depth))
+@dataclass(frozen=True)
+class _Paths:
+    """The paths of a view on an executor, by kernels that `build` makes of programs."""
 
+    executor: Executor
+    programs: PathPrograms
+    view: View
+    build: Build
 
-def _states(executor: Executor, programs: PathPrograms, view: View, build: Build) -> Iterator[State]:
-    """Yield, for each depth, the state of all paths (P,) as the kernel has it."""
-    kind = {**kinds({**PATH, **SURFACE}), "alive": "bool"}
-    part = Part(view.width, view.height, 0, view.height, view.sample, 1, view.seed)
-    for depth in range(programs.settings.max_depth + 1):
-        kernel = build(_stopped(programs, depth), executor)
-        sums = executor.trace(kernel, part).reshape(len(kernel.planes), -1)
-        yield {
-            plane.removeprefix("last_"): _as_kind(values, kind[plane.removeprefix("last_")])
-            for plane, values in zip(kernel.planes, sums, strict=True)
-        }
+    def states(self) -> Iterator[State]:
+        """Yield, for each depth, the state of all paths (P,) as the kernel has it."""
+        view, kind = self.view, {**kinds({**PATH, **SURFACE}), "alive": "bool"}
+        part = Part(view.width, view.height, 0, view.height, view.sample, 1, view.seed)
+        for depth in range(self.programs.settings.max_depth + 1):
+            # Paths end after so many scatterings and one more arrival.
+            stopped = replace(self.programs, settings=replace(self.programs.settings, max_depth=depth))
+            kernel = self.build(stopped, self.executor)
+            sums = self.executor.trace(kernel, part).reshape(len(kernel.planes), -1)
+            yield {
+                plane.removeprefix("last_"): _as_kind(values, kind[plane.removeprefix("last_")])
+                for plane, values in zip(kernel.planes, sums, strict=True)
+            }
 
 
 def _as_kind(values: NDArray[Any], kind: str) -> NDArray[Any]:
@@ -361,17 +373,6 @@ def _examples(
     ]
 
 
-# ---- the reference's own paths ----------------------------------------------------------------------------
-
-
-def _own_paths(programs: PathPrograms, given: State) -> Iterator[State]:
-    """Yield, for each depth, the state of the float32 reference's paths (P,)."""
-    for depth in range(programs.settings.max_depth + 1):
-        # Paths that have ended are computed on.
-        with np.errstate(all="ignore"):
-            yield follow(_stopped(programs, depth), given)[1]
-
-
 def _moved(found: State, own: State, together: Any) -> tuple[Any, dict[str, float]]:
     """Return which paths (P,) still go as the reference's own, and how far those have moved, by quantity."""
     alive = own["alive"]
@@ -384,3 +385,63 @@ def _moved(found: State, own: State, together: Any) -> tuple[Any, dict[str, floa
         differences = [np.abs(found[n][going] - e) for n, e in zip(components, expected, strict=True)]
         moved[quantity] = float(np.max(np.concatenate(differences), initial=0.0))
     return together, moved
+
+
+# ---- the random numbers -----------------------------------------------------------------------------------
+
+
+COUNTERS = ("seed", "pixel", "sample_number")
+"""Inputs of the words, in the order of refimpl/rng.py: random_block."""
+
+CARRIERS = ("albedo", "normal", "depth", "position")
+"""Groups of planes that carry the halves: ten planes for eight halves."""
+
+HALF = 16
+"""Bits of half a word."""
+
+
+def words(given: Mapping[str, Any], max_depth: int) -> list[Any]:
+    """Return four words (...): those of all blocks that paths of this depth use, joined by exclusive or."""
+    seed, pixel, sample = (given[name] for name in COUNTERS)
+    blocks = [
+        rng.random_block(seed, pixel, sample, np.uint32(block))
+        for block in range(1 + BLOCKS_PER_BOUNCE * max_depth)
+    ]
+    return [reduce(lambda a, b: a ^ b, same) for same in zip(*blocks, strict=True)]
+
+
+def wrong_words(
+    executor: Executor, given: Mapping[str, NDArray[Any]], max_depth: int, width: int, height: int
+) -> int:
+    """Return for how many paths (P,) of an image the executor's generator gives other words."""
+    kernel = compile_path(_programs(max_depth), executor.language, "ieee", executor.lanes, CARRIERS)
+    sample, seed = (int(given[name][0]) for name in ("sample_number", "seed"))
+    found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(
+        len(kernel.planes), -1
+    )
+    expected = [half.astype(np.float32) for word in words(given, max_depth) for half in _halves(word)]
+    return int(np.any(found[: len(expected)] != np.stack(expected), axis=0).sum())
+
+
+def _programs(max_depth: int) -> PathPrograms:
+    """Return the programs of the empty scene with words instead of features."""
+
+    def look(*values: Any) -> dict[str, Any]:
+        halves = [
+            half
+            for word in words(dict(zip(COUNTERS, values, strict=True)), max_depth)
+            for half in _halves(word)
+        ]
+        carriers = planes(CARRIERS)
+        # The planes that are left over repeat the first halves.
+        return {name: halves[i % len(halves)].astype(np.float32) for i, name in enumerate(carriers)}
+
+    program = trace(look, dict.fromkeys(COUNTERS, Type("uint32")))
+    programs = lower_scene(canonical("empty"), Settings(max_depth=0))
+    return replace(programs, parts={**programs.parts, "look": pipeline.run(program, PASSES)})
+
+
+def _halves(word: Any) -> tuple[Any, Any]:
+    """Return the upper and the lower 16 bits (...) of words (...)."""
+    upper = word >> np.uint32(HALF)
+    return upper, word - upper * np.uint32(1 << HALF)

@@ -26,8 +26,7 @@ from ...refimpl.network.activation import SINE, activation_named
 from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
 from ...refimpl.network.whole import Whole, sine_layers
-from ..devices.images import Images
-from .apart import Apart
+from ..devices.kernel import Images
 from .triage import Compile, Judge, Kernel, Verdict, judged, kernels_of, odd_ones
 
 MOST_RUNS = 80
@@ -166,19 +165,15 @@ def stage_program(model: Model, stage: Stage) -> Program:
 
 
 def first_stage(
-    runner: Apart,
-    schedule: str,
-    model: Model,
-    profile: str,
-    images: Images,
-    compiled: Compile = compile_plan,
+    kernel: Kernel, model: Model, images: Images, compiled: Compile = compile_plan
 ) -> tuple[Stage, Verdict] | None:
     """Return the first stage whose kernel deviates on images (H, W, C), or None if none does by itself."""
-    most = language_named(runner.target).dialect.max_output_channels
+    assert kernel.artifact is not None, "a kernel that deviates has run"
+    most = language_named(kernel.runner.target).dialect.max_output_channels
     size = next(iter(images.values())).shape[:2]
+    how = kernel.artifact.profile, size, kernel.schedule, compiled
     for stage in stages(model.siren, most):
-        program = stage_program(model, stage)
-        kernels = kernels_of([runner], program, profile, size, schedule, compiled)
+        kernels = kernels_of([kernel.runner], stage_program(model, stage), *how)
         (verdict,) = judged(kernels, images)
         if verdict.deviates:
             return stage, verdict
@@ -219,11 +214,7 @@ class Reduced:
 
 
 def reduced(
-    verdicts: Sequence[Verdict],
-    model: Model,
-    profile: str,
-    images: Images,
-    compiled: Compile = compile_plan,
+    verdicts: Sequence[Verdict], model: Model, images: Images, compiled: Compile = compile_plan
 ) -> Reduced:
     """Return a small part of images (H, W, C) on which the kernels that deviate still do, and since where.
 
@@ -252,6 +243,6 @@ def reduced(
     found = []
     for verdict in {v.kernel.runner.way: v for v in odd_ones(again)[::-1]}.values():
         kernel = verdict.kernel
-        stage = first_stage(kernel.runner, kernel.schedule, model, profile, part, compiled)
+        stage = first_stage(kernel, model, part, compiled)
         found.append(Found(kernel, *(stage or (None, None))))
     return Reduced(box, tuple(again), tuple(found[::-1]), repeats)

@@ -27,7 +27,7 @@ from ...compiler.core.ir import Program
 from ...compiler.plan import Expected, Plan, plan_program
 from ...compiler.targets import language_named
 from ...refimpl.errors import CompileError
-from ..devices.images import Images
+from ..devices.kernel import Images
 from .apart import Apart, Outcome
 
 Compile = Callable[[Plan], Artifact]
@@ -154,15 +154,12 @@ class Judge:
         outcome = kernel.runner.run(kernel.artifact, self.images)
         if outcome.image is None:
             return Verdict(kernel, refusal=outcome.refusal, failure=outcome.failure)
-        return _judged(kernel, outcome, self._expected(kernel.artifact.plan))
-
-    def _expected(self, plan: Plan) -> Expected:
-        """Return what a plan's kernel may write; most schedules share one bound."""
-        own = None if plan.shares_bound else plan.schedule.name
-        key = (ir.digest(plan.analysed), plan.sine, own)
+        plan = kernel.artifact.plan
+        # Most schedules share one bound.
+        key = (ir.digest(plan.analysed), plan.sine, None if plan.shares_bound else plan.schedule.name)
         if key not in self._known:
             self._known[key] = plan.expected(self.images)
-        return self._known[key]
+        return _judged(kernel, outcome, self._known[key])
 
 
 def judged(kernels: Sequence[Kernel], images: Images) -> list[Verdict]:

@@ -4,23 +4,44 @@
    full network's in float64 (largest and mean difference of display-encoded colour), what it loses of the
    full network's PSNR against references, and what is proven for all images [`Point`].
 2. A curve is a list of points of one model, device, size and profile, as JSON [`Curve`], [`from_data`]. It is
-   kept in the user's cache folder under all that it depends on [`key_of`]; what is damaged, or of something
-   else, is measured again [`cached`].
+   kept in the user's cache folder under all that it depends on [`Curve.key`]; what is damaged, or of
+   something else, is measured again [`cached`].
 3. The choice: points that break no rule, the cheapest of them where an error is limited, the most accurate
    where only time is [`choose`]. A number that is missing or no number breaks every rule.
+4. Every variant is measured under every schedule of an executor that may pay [`Measurement`]: the full
+   network runs under each schedule on a small picture first, of which the [`MOST_SCHEDULES`] fastest remain.
+   Errors and losses are those of the device's own kernels on given frames, against the full network in
+   float64 [`quality`]; times are of random numbers, interleaved [measure.py].
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...compiler import variants
-from ...refimpl.errors import InputError
+from ...compiler.artifact import Artifact
+from ...compiler.compile import compile_plan
+from ...compiler.plan import Plan
+from ...compiler.schedules.schedules import PLAIN
+from ...refimpl import metrics
+from ...refimpl.errors import CompileError, InputError
+from ...refimpl.frame import Frame
+from ...refimpl.network import dataset
+from ...refimpl.network.denoise import Model, denoise
 from ...refimpl.reading import parse_json, read_file, refusing
 from .. import cache
+from ..devices.executor import Executor
+from ..measure import in_turns
+from .denoise_on import images_of
+from .tune import TRIAL, Subject, Tuning, noise
 
 SCHEMA = "wamnet-curve-1"
 """Name and version of a curve's form; described in spec/variants.md."""
@@ -70,6 +91,11 @@ class Curve:
             points.append(data)
         head = {"schema": SCHEMA, "model": self.model, "device": self.device, "size": list(self.size)}
         return {**head, "profile": self.profile, "points": points}
+
+    def key(self, *others: object) -> str:
+        """Return the name under which it is kept: of all that it depends on, such as frames."""
+        head = (SCHEMA, self.model, self.device, list(self.size), self.profile)
+        return f"curve-{cache.key(*head, *others)}"
 
 
 @dataclass(frozen=True)
@@ -213,12 +239,6 @@ def check_fits(curve: Curve, wanted: Curve, where: str) -> None:
             raise InputError(f"{where}: {name}", has, rule, "give its own curve, or leave out --curve")
 
 
-def key_of(curve: Curve, executor: str, frames: str, names: Sequence[str]) -> str:
-    """Return the name under which a curve is kept: of all that it depends on."""
-    head = (SCHEMA, curve.model, curve.device, list(curve.size), curve.profile)
-    return f"curve-{cache.key(*head, executor, frames, list(names))}"
-
-
 def cached(key: str, wanted: Curve) -> Curve | None:
     """Return the curve that is kept, if it is there, whole, and of what is wanted."""
     data = cache.read_json(key)
@@ -230,3 +250,130 @@ def cached(key: str, wanted: Curve) -> Curve | None:
         return None
     same = (curve.model, curve.device, curve.size, curve.profile)
     return curve if same == (wanted.model, wanted.device, wanted.size, wanted.profile) else None
+
+
+# ---- measuring --------------------------------------------------------------------------------------------
+
+
+NAMES = (
+    *("full", "sine9", "sine7", "sine5", "window10", "window8", "window6", "rank24", "rank16", "rank12"),
+    *("window8+rank24", "window8+rank16", "window8+rank12", "window6+rank12", "window8+rank16+sine7"),
+)
+"""Variants that are measured when none are named; those that a model cannot have are left out."""
+
+MOST_SCHEDULES = 2
+"""Schedules that all variants are measured under."""
+
+REPEATS = 5
+"""Rounds of the measurement; their median counts."""
+
+PAUSE_S = 0.05
+"""Seconds before each run: no other library runs here whose threads would still spin."""
+
+Pairs = Sequence[tuple[Frame, Frame]]
+Done = Callable[[float], None]
+
+
+def names_for(model: Model, wanted: Sequence[str] = NAMES) -> tuple[str, ...]:
+    """Return the variants that this model can have."""
+    found = []
+    for name in wanted:
+        with suppress(InputError):
+            variants.vary(variants.parse(name), model)
+            found.append(name)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A model on an open device at a size (height, width), under a profile; errors are those of `pairs`."""
+
+    executor: Executor
+    model: Model
+    size: tuple[int, int]
+    profile: str
+    pairs: Pairs
+
+    def curve(
+        self,
+        names: Sequence[str],
+        schedules: Sequence[str] = (),
+        repeats: int = REPEATS,
+        on_done: Done = lambda share: None,
+    ) -> Curve:
+        """Return the points of variants; `on_done` gets each variant's share.
+
+        `schedules`: which to measure; by default those that may be fast.
+        """
+        model = self.model
+        pictures = [denoise(model, noisy, np.float64) for noisy, _ in self.pairs]
+        chosen = tuple(schedules) or self.promising()
+        numbers = noise(self._plan().analysed, self.size)
+        points: dict[str, Point] = {}
+        ways: dict[str, Callable[[], object]] = {}
+        for name in names:
+            for schedule in chosen:
+                artifact = _compiled(self._plan(schedule, name))
+                if artifact is None:
+                    continue
+                given = {feature: numbers[feature] for feature in artifact.plan.model.features}
+                key = f"{name} {schedule}"
+                points[key] = self._untimed(artifact, pictures)
+                ways[key] = partial(self.executor.run, artifact, given)
+            on_done(1 / (len(names) + 1))
+        times = in_turns(ways, repeats, pause_s=PAUSE_S)
+        on_done(1 / (len(names) + 1))
+        timed = (replace(points[key], milliseconds=1e3 * found.median) for key, found in times.items())
+        return Curve(variants.digest_of(model), self.executor.device, self.size, self.profile, tuple(timed))
+
+    def _plan(self, schedule: str = PLAIN, variant: str = variants.FULL) -> Plan:
+        """Return the plan of a variant."""
+        return variants.plan_model(self.model, self.executor.language, self.profile, schedule, variant)
+
+    def promising(self) -> tuple[str, ...]:
+        """Return the schedules under which the full network is fastest on a small picture, the best first."""
+        plan = self._plan()
+        found = (_compiled(plan.scheduled(schedule.name)) for schedule in plan.target.schedules)
+        small = Tuning(self.executor, Subject.of(plan), (TRIAL, TRIAL))
+        trials = {artifact.plan.asked: small.trial(artifact) for artifact in found if artifact}
+        return tuple(sorted(trials, key=trials.__getitem__)[:MOST_SCHEDULES])
+
+    def _untimed(self, artifact: Artifact, full: Sequence[NDArray[np.floating]]) -> Point:
+        """Return the point of a variant's kernel, which lacks its time."""
+        plan, model = artifact.plan, artifact.plan.model
+        pictures = [self.executor.run(artifact, images_of(model, noisy)) for noisy, _ in self.pairs]
+        targets = [dataset.target_image(clean, model.normalization) for _, clean in self.pairs]
+        found, bound = quality(pictures, full, targets), variants.bound_of(plan)
+        most = math.nan if bound is None else float(bound.max())
+        name = plan.varied.variant.name
+        return Point(name, plan.asked, self.executor.name, math.nan, *found, most)
+
+
+def quality(
+    pictures: Sequence[NDArray[np.floating]],
+    full: Sequence[NDArray[np.floating]],
+    targets: Sequence[NDArray[np.floating]],
+) -> tuple[float, float, float]:
+    """Return the largest and the mean error of pictures (H, W, 3), and the mean PSNR that they lose in dB.
+
+    All are NaN if a picture holds what is not a number.
+    """
+    if not all(np.isfinite(picture).all() for picture in pictures):
+        return math.nan, math.nan, math.nan
+    wide = [picture.astype(np.float64) for picture in pictures]
+    errors = [np.abs(picture - wanted) for picture, wanted in zip(wide, full, strict=True)]
+    losses = [
+        metrics.psnr(wanted, target) - metrics.psnr(picture, target)
+        for picture, wanted, target in zip(wide, full, targets, strict=True)
+    ]
+    mean = math.fsum(float(error.sum()) for error in errors) / sum(error.size for error in errors)
+    return max(float(error.max()) for error in errors), mean, math.fsum(losses) / len(losses)
+
+
+def _compiled(plan: Plan) -> Artifact | None:
+    """Return the kernel of a plan, or None where its schedule or target cannot hold it."""
+    try:
+        artifact = compile_plan(plan)
+    except CompileError:
+        return None
+    return artifact if artifact.manifest["schedule"]["name"] == plan.asked else None

@@ -1,10 +1,12 @@
 """Denoise frames on an executor: choose, compile, encode, run, with both times.
 
 1. [`Denoiser`] is a network on a device: its kernel is chosen for a size, and compiled or, for a command,
-   taken from the cache [kept.py], before the frame is encoded.
+   taken from the cache, before the frame is encoded.
 2. Features are encoded by the reference, in blocks of rows that fit a processor's cache; the edge-avoiding
-   filter, which takes it longer than a kernel takes for the network, runs on the device [`images_on`].
+   filter, which takes it longer than a kernel takes for the network, runs on the device [`Denoiser.images`].
 3. [`denoise_on`] does both for one frame.
+4. What a device reads of a kernel is kept as data of JSON's types, and read back as a kernel without its
+   program or plan, so that the compiler is not even imported [`kept_kernels`].
 """
 
 from __future__ import annotations
@@ -28,16 +30,23 @@ from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
 from ..devices.executor import Executor
-from ..devices.images import Images
-from ..devices.kernel import Size
-from ..devices.planes import smoothed
+from ..devices.kernel import Images, Size
+from ..devices.passes import Filter
 from ..memory import keep_freed_memory
-from .kept import kept_kernels
-from .tune import Subject, pick
+from .tune import Subject, Tuning
 
 if TYPE_CHECKING:
     from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
+import base64
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from ...compiler.artifact import weight_bytes
+from ...compiler.core.ir import Image
+from ...compiler.kernel.interface import Array, Interface
+from .. import cache
 
 BLOCK_PIXELS = 2**14
 """Pixels of a block of rows that is encoded at once: some copies of it fit a processor's cache."""
@@ -90,25 +99,6 @@ def _image(model: Model, frame: Frame, name: str) -> NDArray[np.float32]:
     return image
 
 
-def filter_of(
-    executor: Executor, model: Model, frame: Frame, profile: str, keeps: bool = False
-) -> SmoothKernels | None:
-    """Return the kernels, built, that smooth a frame's features on a device; None: the reference does.
-
-    The reference smooths where a device would take longer, where a picture has the same bits on all devices
-    (integers), and layers with more digits than a kernel reads.
-    """
-    layers = [layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers]
-    if not layers or not executor.smooths or model.is_whole:
-        return None
-    if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
-        return None
-    kernels = _filter(model.normalization, executor.name, profile, executor.lanes, keeps)
-    for kernel in kernels:
-        executor.build(kernel)
-    return kernels
-
-
 @lru_cache(maxsize=16)
 def _filter(
     normalization: Normalization, language: str, profile: str, lanes: int, keeps: bool
@@ -122,22 +112,6 @@ def _filter(
 
     key = asdict(normalization), language, profile, lanes
     return SmoothKernels(*(kept_kernels("filter", key, compiled) if keeps else compiled()))
-
-
-def images_on(
-    executor: Executor, model: Model, frame: Frame, profile: str = "ieee", keeps: bool = False
-) -> Images:
-    """Return the images of [`images_of`], smoothed ones by the device where it does that: up to SMO-5."""
-    kernels = filter_of(executor, model, frame, profile, keeps)
-    if kernels is None:
-        return images_of(model, frame)
-    others = [name for name in model.features if not FEATURES[name].guides]
-    found = dict(images_of(replace(model, features=tuple(others)), frame))
-    for feature in (FEATURES[name] for name in model.features if name not in found):
-        given = {"color": feature.layer, **feature.guides}
-        layers = {what: frame[layer] for what, layer in given.items()}
-        found[feature.name] = smoothed(executor, kernels, layers)
-    return {name: found[name] for name in model.features}
 
 
 @dataclass
@@ -181,18 +155,18 @@ class Denoiser:
     def kernel(self, size: Size) -> tuple[Artifact, str]:
         """Return the kernel for frames of `size` (height, width), built, and why it has this schedule."""
         if size not in self.ready:
-            self.ready[size] = self._kernel(size)
+            self.ready[size] = self._scheduled(size)
             keep_freed_memory()
         kernel, reason = self.ready[size]
         self.executor.build(kernel, size)
         return kernel, reason
 
-    def _kernel(self, size: Size) -> tuple[Artifact, str]:
+    def _scheduled(self, size: Size) -> tuple[Artifact, str]:
         """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
             subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.profile)
-            name, reason = pick(self.executor, subject, size, self.pictures)
+            name, reason = Tuning(self.executor, subject, size).picked(self.pictures)
         if not self.keeps:
             return self._compiled(name)[0], reason
         digest = hashlib.sha256(model_bytes(self.full)).hexdigest()
@@ -206,9 +180,34 @@ class Denoiser:
         self.plan = self.plan or self._planned()
         return (compile_plan(self.plan.scheduled(schedule)),)
 
+    def filter(self, frame: Frame) -> Filter | None:
+        """Return what smooths a frame's features on the device; None: the reference does.
+
+        The reference smooths where a device would take longer, where a picture has the same bits on all
+        devices (integers), and layers with more digits than a kernel reads.
+        """
+        executor, model = self.executor, self.model
+        layers = [
+            layer for name in model.features if FEATURES[name].guides for layer in FEATURES[name].layers
+        ]
+        if not layers or not executor.smooths or model.is_whole:
+            return None
+        if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
+            return None
+        kernels = _filter(model.normalization, executor.name, self.profile, executor.lanes, self.keeps)
+        return Filter(executor, kernels)
+
     def images(self, frame: Frame) -> Images:
-        """Return the images (H, W, C) that the kernel reads, by name."""
-        return images_on(self.executor, self.model, frame, self.profile, self.keeps)
+        """Return the images of [`images_of`], smoothed ones by the device where it does that: up to SMO-5."""
+        smoother, model = self.filter(frame), self.model
+        if smoother is None:
+            return images_of(model, frame)
+        others = [name for name in model.features if not FEATURES[name].guides]
+        found = dict(images_of(replace(model, features=tuple(others)), frame))
+        for feature in (FEATURES[name] for name in model.features if name not in found):
+            given = {"color": feature.layer, **feature.guides}
+            found[feature.name] = smoother.image({what: frame[layer] for what, layer in given.items()})
+        return {name: found[name] for name in model.features}
 
     def image(self, images: Images) -> NDArray[np.float32]:
         """Return the denoised image (H, W, 3), display-encoded, of a frame's images."""
@@ -219,7 +218,7 @@ class Denoiser:
         """Return a denoised frame and the times; `images` are its encoded features, if they are there."""
         start = time.perf_counter()
         if images is None:
-            filter_of(self.executor, self.model, frame, self.profile, self.keeps)
+            self.filter(frame)
         before = time.perf_counter() - start
         # A frame that lacks a layer is refused before its kernel is compiled; encoding is not part of that.
         images = self.images(frame) if images is None else images
@@ -247,7 +246,7 @@ def denoise_on(
     """Return the denoised frame and the times, by a [`Denoiser`].
 
     `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
-    with the reference's image; by default the device may make them [`images_on`].
+    with the reference's image; by default the device may make them [`Denoiser.images`].
     """
     return Denoiser(executor, model, profile, schedule, variant, pictures, keeps).run(frame, images)
 
@@ -272,3 +271,48 @@ def _text_of(artifact: Artifact) -> str:
     bound, share = found["bound"]["output"], found["products"] / found["products_of_full"]
     moves = f"moves a colour by at most {max(bound):g}" if bound else "moves colours without a bound"
     return f"variant {found['name']}: {share:.0%} of the multiplications; {moves}, whatever the picture"
+
+
+# ---- kernels that are kept between runs -------------------------------------------------------------------
+
+
+def kept_kernels(
+    kind: str, parts: Sequence[object], compiled: Callable[[], Sequence[Artifact]]
+) -> list[Artifact]:
+    """Return the kernels that depend on `parts`, from the cache, or compiled and put there."""
+
+    def data() -> list[dict[str, Any]]:
+        return [data_of(kernel) for kernel in compiled()]
+
+    entry = cache.kept(kind, parts, data)
+    with suppress(KeyError, TypeError, ValueError):
+        if kernels := [kernel_of(each) for each in entry]:
+            return kernels
+    # An entry of the right name and checksum that this program has not written.
+    return [kernel_of(each) for each in data()]
+
+
+def data_of(kernel: Artifact) -> dict[str, Any]:
+    """Return a kernel as JSON's types."""
+    return {
+        "source": kernel.source,
+        "manifest": kernel.manifest,
+        "interface": asdict(kernel.interface),
+        "images": [asdict(image) for image in kernel.images],
+        "weights": base64.b64encode(weight_bytes(kernel)).decode(),
+        "before": data_of(kernel.before) if kernel.before else None,
+    }
+
+
+def kernel_of(data: Mapping[str, Any]) -> Artifact:
+    """Return the kernel that [`data_of`] wrote."""
+    taken = data["interface"]
+    arrays = tuple(Array(**{**array, "shape": tuple(array["shape"])}) for array in taken["arrays"])
+    return Artifact(
+        data["source"],
+        data["manifest"],
+        Interface(taken["role"], arrays, tuple(taken["integers"])),
+        tuple(Image(**facts) for facts in data["images"]),
+        weights=np.frombuffer(base64.b64decode(data["weights"]), "<f4").astype(np.float32),
+        before=kernel_of(data["before"]) if data["before"] else None,
+    )

@@ -120,10 +120,6 @@ class Network:
     schedule: str = MANY
     target: str = TARGET
 
-    def is_like(self, other: Network) -> bool:
-        """Return whether both are one function, in two schedules."""
-        return self.model is other.model and self.rank == other.rank
-
 
 def networks_of(
     model: Model, fast: Model | None = None, rank: int = RANK, processor: bool = False
@@ -141,22 +137,18 @@ def networks_of(
             raise InputError("second model", NO_VALUE, rule, "leave it out")
         return (Network("full", model),)
     cut = fast or model
+    integers: list[Network] = []
+    with suppress(InputError):  # a network without angles, or with too large sums, has none
+        integers = [Network("whole", vary(parse(WHOLE), model).model)]
     n_out, n_in = cut.siren.weights[0].shape
     most = min(rank, factored.largest_rank(cut.window.size, n_in, n_out), 4 * MOST_BUFFERS)
     return (
         Network("full", model),
         Network("fast", cut, most, FEW),
         Network("fast-texture", cut, most),
-        *_integers_of(model),
+        *integers,
         *[Network("processor", model, 0, PROCESSOR[1], PROCESSOR[0])][: int(processor)],
     )
-
-
-def _integers_of(model: Model) -> list[Network]:
-    """Return the network in integers of 8 bits; nothing where it has no angles, or too large sums."""
-    with suppress(InputError):
-        return [Network("whole", vary(parse(WHOLE), model).model)]
-    return []
 
 
 def page_data(
@@ -191,7 +183,10 @@ def page_data(
         "times": list(animation.times),
         "turn_s": TURN_SECONDS,
         "camera": asdict(scene.camera),
-        "lights": _lights(scene),
+        "lights": [
+            {"color": list(light.color), "power": light.power, "area": 1.0 / quad_area_pdf(light)}
+            for light in scene.lights
+        ],
         "share": transport.SKY_SHARE if scene.environment is not None else 1.0,
         "numbers": numbers,
         "rays": rays.count if rays else 1,
@@ -265,16 +260,15 @@ def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInput
     rows = np.stack([inputs.values(one) for one in animation.scenes])
     moving = np.flatnonzero(np.any(rows != rows[0], axis=0))
     return inputs, {
-        "names": [list(_named(places)) for places in inputs.places],
+        # A page knows a number by the place that it computes, if there is one.
+        "names": [
+            list(next((place for place in places if place[0].startswith(COMPUTED)), places[0]))
+            for places in inputs.places
+        ],
         "still": [float(value) for value in rows[0]],
         "moving": [int(place) for place in moving],
         "rows": _packed(rows[:, moving]),
     }
-
-
-def _named(places: Sequence[tuple[str, int]]) -> tuple[str, int]:
-    """Return the place by which a page knows a number: one that it computes, if there is one."""
-    return next((place for place in places if place[0].startswith(COMPUTED)), places[0])
 
 
 def _drawn(scene: Scene, number: int) -> Scene:
@@ -286,14 +280,6 @@ def _drawn(scene: Scene, number: int) -> Scene:
     lights = tuple(replace(light, color=c) for light, c in zip(scene.lights, colors, strict=True))
     camera = replace(scene.camera, position=(float(moved[0]), float(moved[1]), float(moved[2])))
     return replace(scene, camera=camera, lights=lights)
-
-
-def _lights(scene: Scene) -> list[dict[str, Any]]:
-    """Return what a page computes the tables of the lights from."""
-    return [
-        {"color": list(light.color), "power": light.power, "area": 1.0 / quad_area_pdf(light)}
-        for light in scene.lights
-    ]
 
 
 def encoders(features: Sequence[str], levels: int, model: Model, path: Artifact) -> list[dict[str, Any]]:
@@ -309,28 +295,25 @@ def variants(
     networks: Sequence[Network], images: Mapping[str, NDArray[np.float32]], scene: str
 ) -> list[dict[str, Any]]:
     """Return the networks of a page, each with what it has learned and how far it is from the first one."""
-    found: list[dict[str, Any]] = []
+    found, expected = list[dict[str, Any]](), list[tuple[Network, Expected]]()
     for network in networks:
         # Two schedules of one network have one reference and one bound, which take seconds.
-        like = next((n for n in networks[: len(found)] if n.is_like(network)), None)
-        held = None if like is None else found[networks.index(like)]["held"]
-        found.append(variant(network, images, held))
+        same = (n for n in expected if n[0].model is network.model and n[0].rank == network.rank)
+        like = next(same, None)
+        one, held = variant(network, images, like and like[1])
+        expected.append((network, held))
         if like is not None:
-            found[-1]["check"] = like.name
-    for one, network in zip(found, networks, strict=True):
-        one["ranges"] = learned_ranges(network.model, scene)
-        one["rays"] = max(feature_rays(network.model), 1)
+            one["check"] = like[0].name
         # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
-        off = one["held"].value - found[0]["held"].value
-        one["rms_to_first"] = float(np.sqrt(np.mean(off**2)))
-    for one in found:
-        del one["held"]
+        off = held.value - expected[0][1].value
+        facts = {"ranges": learned_ranges(network.model, scene), "rays": max(feature_rays(network.model), 1)}
+        found.append({**one, **facts, "rms_to_first": float(np.sqrt(np.mean(off**2)))})
     return found
 
 
 def variant(
     network: Network, images: Mapping[str, NDArray[np.float32]], held: Expected | None = None
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], Expected]:
     """Return a network as passes, with its bound, and what it makes of the check's images.
 
     `held`: what another schedule of the network was found to make of them.
@@ -343,7 +326,7 @@ def variant(
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
     held = held or plan.expected(mine)
     bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
-    return {
+    found = {
         "name": network.name,
         "rank": rank,
         "levels": _levels(model),
@@ -360,8 +343,8 @@ def variant(
             "bound": None if plan.is_whole else _packed(held.most_from(held.value)),
             "sha256": bits,
         },
-        "held": held,
     }
+    return found, held
 
 
 def learned_ranges(model: Model, scene: str) -> dict[str, Any] | None:

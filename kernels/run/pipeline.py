@@ -8,7 +8,7 @@
 3. The result is read back, and other images only on request [`Pipeline.picture`], [`Pipeline.image`]. Of an
    animation one picture is copied while the device draws the next one [`Pipeline.later`, `Pipeline.stream`].
 4. Features may be means over more camera rays than are followed to the end: the path kernel traces these too.
-5. A scene that moves is other numbers for the same path kernel, and compiles nothing (moving.py).
+5. A scene that moves is other numbers for the same path kernel, and compiles nothing (render_on.py).
 
 The definition is the composition of the three on the executor `numpy`. The separate way (render_on.py, then
 denoise_on.py) gives the same picture up to rounding: it encodes in float64 on the host. It refuses pictures
@@ -41,9 +41,8 @@ from ...refimpl.network.whole import INPUT_LEVELS
 from ..devices.executor import Executor
 from ..devices.kernel import Part
 from ..devices.passes import PICTURE, Passes
-from .moving import MovingPaths
-from .render_on import SAMPLES_AT_ONCE
-from .tune import choose
+from .render_on import SAMPLES_AT_ONCE, MovingPaths
+from .tune import Subject, Tuning
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ class Pipeline:
         plan = replace(plan_model(model, executor.language, profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
-        self._executor, self._profile = executor, profile
-        self._settings = settings or Settings()
+        self._executor, self._profile, self._settings = executor, profile, settings or Settings()
         self._features = tuple(dict.fromkeys((*model.features, *show)))
         check_features(self._features)
         # The job refuses sizes and numbers that mean nothing.
@@ -130,7 +128,7 @@ class Pipeline:
         )
         groups = layers_of(self._features)
         self._groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
-        self._paths = MovingPaths(executor.language, self._compiled, self._settings, moving)
+        self._paths = MovingPaths(executor, self._compiled, self._settings, moving)
         self.set_scene(scene)
         self.encode = compile_encode(
             self._features,
@@ -141,7 +139,8 @@ class Pipeline:
             model.is_whole,
             self._ray_count,
         )
-        self.denoise = compile_plan(plan.scheduled(choose(executor, plan, size, pictures)[0]))
+        schedule, _ = Tuning(executor, Subject.of(plan), size).picked(pictures)
+        self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False
         self.passes = Passes(executor, self.encode, self.denoise, size)
 
@@ -207,7 +206,8 @@ class Pipeline:
 
     def picture(self) -> NDArray[np.float32]:
         """Return the denoised picture (H, W, 3) that was drawn last, display-encoded."""
-        return self._read(PICTURE)
+        self._check_drawn()
+        return self.passes.read(PICTURE)
 
     def image(self, feature: str) -> NDArray[np.float32]:
         """Return a feature image (H, W, C) of the picture that was drawn last, encoded.
@@ -215,16 +215,12 @@ class Pipeline:
         Of a network of integers it is what they stand for, steps of 1 / 127.
         """
         self._check_shown(feature)
-        return self._meant(self._read(feature))
+        self._check_drawn()
+        return self._meant(self.passes.read(feature))
 
     def _meant(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return what a feature image stands for."""
         return image / np.float32(INPUT_LEVELS) if self._in_integers else image
-
-    def _read(self, name: str) -> NDArray[np.float32]:
-        """Copy an image to the host."""
-        self._check_drawn()
-        return self.passes.read(name)
 
     def later(self, *features: str) -> Callable[[], Drawn]:
         """Begin to copy what was drawn last, with feature images; return what waits for it.

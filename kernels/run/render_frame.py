@@ -44,11 +44,11 @@ def device_of(name: str) -> Executor:
     return devices[name]
 
 
-def shares_work(executor: str) -> bool:
-    """Return whether an executor uses all cores by itself, without processes; or refuse its name."""
-    if executor not in RENDERERS:
-        raise InputError("executor that renders", executor, "unknown", choice(executor, RENDERERS))
-    return executor in DEVICES
+def shares_work(renderer: str) -> bool:
+    """Return whether a renderer uses all cores by itself, without processes; or refuse its name."""
+    if renderer not in RENDERERS:
+        raise InputError("executor that renders", renderer, "unknown", choice(renderer, RENDERERS))
+    return renderer in DEVICES
 
 
 def render_frame(

@@ -1,7 +1,11 @@
 """Render a scene on an executor: trace, compile, follow the paths part by part, and add up.
 
-1. The scene's programs become a kernel for the executor's schedule; scenes that are known to come share one,
-   if they differ only in numbers [`Frames`].
+1. The scene's programs become a kernel for the executor's schedule [`Frames`]. Scenes of one layout are a
+   family [`_Family`], whose kernel has the numbers in which they differ as inputs
+   (compiler/scenes/scene_inputs.py): one that fits the kernel needs no other [`MovingPaths.of`]. One that
+   differs in more numbers widens the inputs, and the kernel is compiled once more; one of another layout
+   begins another family. Scenes to come that are named at first have one kernel in all. By definition a
+   kernel that is given a scene's numbers draws what the kernel of that scene draws.
 2. A kernel adds up at most [`SAMPLES_AT_ONCE`] samples in float32; parts hold about [`PATHS_AT_ONCE`] paths,
    so that progress is seen and no driver takes a kernel for hanging.
 3. Sums of parts are added in float64, squared deviations by the formula of Chan, Golub and LeVeque,
@@ -14,7 +18,7 @@ rounding, and to paths whose decision fell differently by it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -24,8 +28,8 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
 from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import compile_path
-from ...compiler.scenes.scene_inputs import SceneInputs
+from ...compiler.scenes.path_kernel import can_move, compile_path
+from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import DIRECT, SEEN, Frame
 from ...refimpl.light.render import (
@@ -38,10 +42,10 @@ from ...refimpl.light.render import (
     with_own_features,
 )
 from ...refimpl.light.scene import Scene
+from ...refimpl.light.transport import Settings
 from ..devices.executor import Executor
 from ..devices.kernel import Part
 from ..memory import keep_freed_memory
-from .moving import Moment, MovingPaths
 
 SAMPLES_AT_ONCE = 16
 """Most samples that are added up in float32: 15 roundings, a relative error below 1e-6."""
@@ -61,7 +65,7 @@ def groups_of(job: Job) -> tuple[str, ...]:
 
 
 class Frames:
-    """The kernels of frames of some scenes: one for all that differ only in numbers [moving.py]."""
+    """The kernels of frames of some scenes: one for all that differ only in numbers."""
 
     def __init__(self, scenes: Sequence[Scene]) -> None:
         self._scenes = tuple(scenes)
@@ -84,7 +88,7 @@ class Frames:
                 programs = lower_scene(scene, settings, language.forms, inputs, **more)
                 return compile_path(programs, language, profile, lanes, groups)
 
-            self._paths[key] = MovingPaths(language, compiled, settings, self._scenes)
+            self._paths[key] = MovingPaths(executor, compiled, settings, self._scenes)
         return self._paths[key].of(scene)
 
 
@@ -125,36 +129,8 @@ def render_on(
     if moment.kernel.programs.rays:
         rule = "has separate feature rays, and a render's kernel sums features over the samples"
         raise InputError("kernel", NO_VALUE, rule, "render with frames=, or without either")
-    totals = _totals(executor, moment, job, (first, last), on_progress)
+    totals = moment.totals(job, (first, last), on_progress)
     return _render(moment.kernel, totals, job.layers, render_info(scene, job))
-
-
-def sums_of(executor: Executor, moment: Moment, job: Job) -> NDArray[np.float64]:
-    """Return the sums (planes, H, W) of a scene's kernel over a job's samples, in its order of planes."""
-    return _totals(executor, moment, job, (0, job.height), None).planes
-
-
-def _totals(
-    executor: Executor,
-    moment: Moment,
-    job: Job,
-    band: tuple[int, int],
-    on_progress: Callable[[int], None] | None,
-) -> Totals:
-    """Return the sums of a scene's kernel over a job's samples, in a band of rows."""
-    kernel = moment.kernel
-    executor.build(kernel)
-    keep_freed_memory()
-    totals = Totals(0, np.zeros((len(kernel.planes), band[1] - band[0], job.width)))
-    for parts in sample_ranges(job, band):
-        sums = []
-        for part in parts:
-            sums.append(executor.trace(kernel, part, moment.numbers))
-            if on_progress is not None:
-                on_progress(part.rows * part.width * part.samples)
-        joined_sums = np.concatenate(sums, axis=1, dtype=np.float64)
-        totals = merge(kernel, totals, Totals(parts[0].samples, joined_sums))
-    return totals
 
 
 def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:
@@ -208,3 +184,98 @@ def _render(kernel: Artifact, totals: Totals, names: Sequence[str], info: dict[s
     none = np.zeros(totals.planes.shape[1:])
     deviations = np.stack([means.get(plane, none) for plane in GROUPS["deviation"]], axis=-1)
     return Render(Frame(layers, info), deviations * (totals.samples / max(totals.samples - 1, 1)))
+
+
+# ---- scenes that move -------------------------------------------------------------------------------------
+
+
+Compiler = Callable[[Scene, SceneInputs], Artifact]
+"""(scene, its numbers that are inputs) -> the kernel."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A kernel that draws a scene, what runs it, and the scene's numbers (n,) that it is given."""
+
+    executor: Executor
+    kernel: Artifact
+    numbers: NDArray[np.float32]
+
+    def totals(
+        self, job: Job, band: tuple[int, int], on_progress: Callable[[int], None] | None = None
+    ) -> Totals:
+        """Return the sums of the kernel over a job's samples, in a band of rows."""
+        self.executor.build(self.kernel)
+        keep_freed_memory()
+        totals = Totals(0, np.zeros((len(self.kernel.planes), band[1] - band[0], job.width)))
+        for parts in sample_ranges(job, band):
+            sums = []
+            for part in parts:
+                sums.append(self.executor.trace(self.kernel, part, self.numbers))
+                if on_progress is not None:
+                    on_progress(part.rows * part.width * part.samples)
+            joined_sums = np.concatenate(sums, axis=1, dtype=np.float64)
+            totals = merge(self.kernel, totals, Totals(parts[0].samples, joined_sums))
+        return totals
+
+
+@dataclass
+class _Family:
+    """Scenes of one layout: the first one with its tables, the inputs, and the kernel when it is compiled.
+
+    `moves` says whether a kernel takes the inputs, once it is known.
+    """
+
+    scene: Scene
+    tables: Tables
+    inputs: SceneInputs
+    kernel: Artifact | None = None
+    moves: bool | None = None
+
+
+@dataclass
+class MovingPaths:
+    """The kernels of scenes on a device; `compiled` makes one, `moving` are scenes to come, or inputs."""
+
+    executor: Executor
+    compiled: Compiler
+    settings: Settings
+    moving: Sequence[Scene] | SceneInputs = ()
+    families: dict[tuple[object, ...], _Family] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        none = SceneInputs(self.settings, ())
+        self._inputs = self.moving if isinstance(self.moving, SceneInputs) else none
+        if not isinstance(self.moving, SceneInputs):
+            self._find(self.moving)
+
+    def of(self, scene: Scene) -> Moment:
+        """Return a scene's kernel, compiled if there is none that it fits, and its numbers."""
+        tables = tables_of(scene, self.settings)
+        layout = layout_of(tables)
+        if layout not in self.families:
+            inputs = SceneInputs(self.settings, ()) if self.families else self._inputs
+            self.families[layout] = _Family(scene, tables, inputs)
+        family = self.families[layout]
+        if not family.inputs.fits(family.tables, tables):
+            family.inputs = family.inputs.widened([family.tables, tables])
+            family.kernel = family.moves = None
+        if family.moves is None:
+            family.moves = can_move(self.executor.language, family.scene, family.tables, family.inputs)
+        if not family.moves:
+            alone = self.compiled(scene, SceneInputs(self.settings, ()))
+            return Moment(self.executor, alone, np.zeros(0, np.float32))
+        if family.kernel is None:
+            family.kernel = self.compiled(family.scene, family.inputs)
+        return Moment(self.executor, family.kernel, family.inputs.read(tables))
+
+    def _find(self, scenes: Sequence[Scene]) -> None:
+        """Make a family for each layout of some scenes, with the numbers in which they differ as inputs."""
+        rows: dict[tuple[object, ...], list[Tables]] = {}
+        for scene in scenes:
+            tables = tables_of(scene, self.settings)
+            layout = layout_of(tables)
+            rows.setdefault(layout, []).append(tables)
+            self.families.setdefault(layout, _Family(scene, tables, self._inputs))
+        for layout, alike in rows.items():
+            self.families[layout].inputs = self._inputs.widened(alike)

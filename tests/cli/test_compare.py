@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.files import exr
-from wamnet.kernels.judge import random_words
+from wamnet.kernels.judge import compare_paths
 from wamnet.kernels.judge.compare_paths import QUANTITIES, Unexplained
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
@@ -99,7 +99,7 @@ def test_paths_as_json(wamnet) -> None:
 
 
 def test_paths_that_differ_end_with_status_1(wamnet, monkeypatch) -> None:
-    monkeypatch.setattr(random_words, "wrong_words", lambda *_: 5)
+    monkeypatch.setattr(compare_paths, "wrong_words", lambda *_: 5)
     outcome = wamnet(*PATHS, "--max-depth", 0)
     assert outcome.status == 1
     assert "random numbers: 103 of 108 paths" in outcome.out

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from second_meanings import traced
 
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.interpret import interpret
@@ -114,7 +115,7 @@ def test_a_kernel_runs_in_numpy_with_the_interpreter_s_bits(name, forms, lanes):
     programs = lower_scene(scene, Settings(max_depth=3), forms, seen=name == "glossy", rays=rays)
     groups = (*FRAME_GROUPS, "alive", *(SEEN if name == "glossy" else ()))
     made = compile_path(programs, "numpy", groups=groups)
-    expected = NumpyExecutor().trace(made, Part(*RUN.values()))
+    expected = traced(made, RUN)
     found = run_on(path_kernel(made.programs, lanes, groups), {}, RUN)
     assert np.array_equal(found["sums"], expected)
 

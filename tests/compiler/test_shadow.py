@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from second_meanings import traced
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES
@@ -81,7 +82,7 @@ def test_a_kernel_runs_in_numpy_with_the_interpreter_s_bits(name, forms, lanes):
     programs = lower_scene(scene, SETTINGS, forms, rays=FeatureRays(4, "net"), shadow_rays=2)
     groups = ("color", "normal", "direct")
     made = compile_path(programs, "numpy", groups=groups)
-    expected = NumpyExecutor().trace(made, Part(*RUN.values()))
+    expected = traced(made, RUN)
     assert np.array_equal(run_on(path_kernel(made.programs, lanes, groups), {}, RUN)["sums"], expected)
     alone = path_kernel(compile_path(programs, "numpy", groups=("direct",)).programs, lanes, ("direct",))
     assert np.array_equal(run_on(alone, {}, RUN)["sums"], expected[made.planes.index("direct_r") :][:3])

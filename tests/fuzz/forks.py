@@ -30,7 +30,7 @@ IMPORTED = (
     "wamnet.cli.main",
     *(f"wamnet.cli.{name}" for name in ("bench", "exr", "images", "machine", "movie", "webpage")),
     *(f"wamnet.compiler.{name}" for name in ("compile", "checker", "path_kernel", "variants")),
-    *(f"wamnet.kernels.{name}" for name in ("pipeline", "reduce", "measure_curve")),
+    *(f"wamnet.kernels.{name}" for name in ("pipeline", "reduce", "curve")),
     *(f"wamnet.kernels.{name}" for name in ("export.package", "conformance.run", "bench.contenders")),
     *(
         "wamnet.refimpl.network.train",

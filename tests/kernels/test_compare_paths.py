@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.scenes.lower_scene import lower_scene
-from wamnet.kernels.judge import compare_images, compare_paths, random_words
+from wamnet.kernels.judge import compare_images, compare_paths
 from wamnet.kernels.judge.compare_images import ImageReport, blocks
 from wamnet.kernels.judge.compare_paths import QUANTITIES, View, kernel_of_states
 from wamnet.refimpl import vectors
@@ -125,7 +125,7 @@ def test_random_numbers_are_the_reference_s_to_the_bit(executor):
     """All words of all blocks that a path of five bounces may use, for seeds and samples of 32 bits."""
     for view in (View(13, 7), View(5, 3, sample=2**32 - 1, seed=2**32 - 1)):
         given = compare_paths._given(view)
-        assert random_words.wrong_words(executor, given, 5, view.width, view.height) == 0
+        assert compare_paths.wrong_words(executor, given, 5, view.width, view.height) == 0
 
 
 # ---- wrong kernels -----------------------------------------------------------------------------------------
@@ -275,7 +275,7 @@ def test_other_random_words_are_counted(executor_named):
             return sums
 
     given = compare_paths._given(View(5, 4))
-    assert random_words.wrong_words(Broken(), given, 1, 5, 4) == 1
+    assert compare_paths.wrong_words(Broken(), given, 1, 5, 4) == 1
 
 
 def test_views_outside_their_rules_are_refused():

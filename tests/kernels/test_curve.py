@@ -11,8 +11,8 @@ import pytest
 
 from wamnet.compiler import variants
 from wamnet.kernels import cache
-from wamnet.kernels.run import curve, measure_curve
-from wamnet.kernels.run.curve import Curve, Limits, Point, choose
+from wamnet.kernels.run import curve
+from wamnet.kernels.run.curve import Curve, Limits, Measurement, Point, choose
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
@@ -180,12 +180,10 @@ def test_the_cache_gives_only_what_is_wanted(tmp_path, monkeypatch) -> None:
 
 
 def test_keys_tell_everything_apart() -> None:
-    keys = [curve.key_of(CURVE, "opencl", "frames", ["full"])]
-    keys += [curve.key_of(replace(CURVE, size=(64, 65)), "opencl", "frames", ["full"])]
-    keys += [
-        curve.key_of(CURVE, *rest) for rest in (("numpy", "frames", ["full"]), ("opencl", "f", ["full"]))
-    ]
-    keys += [curve.key_of(CURVE, "opencl", "frames", ["full", "rank2"])]
+    keys = [CURVE.key("opencl", "frames", ["full"])]
+    keys += [replace(CURVE, size=(64, 65)).key("opencl", "frames", ["full"])]
+    keys += [CURVE.key(*rest) for rest in (("numpy", "frames", ["full"]), ("opencl", "f", ["full"]))]
+    keys += [CURVE.key("opencl", "frames", ["full", "rank2"])]
     assert len(set(keys)) == len(keys)
 
 
@@ -202,12 +200,11 @@ def frames():
 
 
 def test_a_measurement_has_every_variant(executor_named, model) -> None:
-    names = measure_curve.names_for(model, ("full", "window3", "rank2", "window9", "without-normal"))
+    names = curve.names_for(model, ("full", "window3", "rank2", "window9", "without-normal"))
     assert names == ("full", "window3", "rank2")
     done = []
-    found = measure_curve.measure(
-        executor_named("numpy"), model, (17, 19), "ieee", frames(), names, repeats=2, on_done=done.append
-    )
+    measured = Measurement(executor_named("numpy"), model, (17, 19), "ieee", frames())
+    found = measured.curve(names, repeats=2, on_done=done.append)
     assert [p.variant for p in found.points] == list(names)
     assert (found.model, found.size) == (variants.digest_of(model), (17, 19))
     # Four equal shares of 1, which add up exactly.

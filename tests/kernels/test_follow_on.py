@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler.scenes.history_kernel import MOTION, PAST, compile_history
-from wamnet.kernels.run.follow_on import first_hits_on, follow_on
+from wamnet.kernels.run.before import first_hits_on, follow_on
 from wamnet.kernels.run.render_on import Frames
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.light import history as H
@@ -150,7 +150,7 @@ def followed(past: History, moves: Motion, first: First, color: np.ndarray, limi
 
 def by_kernel(monkeypatch, device, past, moves, first, color, limits) -> History:
     """Return the same by the kernel, of first hits and motions that no scene has."""
-    from wamnet.kernels.run import follow_on as module
+    from wamnet.kernels.run import before as module
 
     now = Scene("", Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
     monkeypatch.setattr(module, "first_hits_on", lambda *_: first)

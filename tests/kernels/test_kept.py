@@ -11,7 +11,7 @@ import pytest
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import cache, denoise_on
-from wamnet.kernels.run.kept import data_of, kernel_of
+from wamnet.kernels.run.denoise_on import data_of, kernel_of
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren

@@ -8,6 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from kit import encoded
 
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
@@ -126,5 +127,5 @@ def test_it_traces_and_encodes(language, executor_named, tmp_path):
     written = {f"image_{name}": np.zeros((height, width, 3), np.float32) for name in groups}
     size = {"width": width, "height": height, "sample_count": 2}
     run(made["items"], {"sums": sums, **written}, size, (width, height), tmp_path)
-    for name, image in c.encode(made["c"], sums, 2).items():
+    for name, image in encoded(c, made["c"], sums, 2).items():
         assert np.array_equal(image, written[f"image_{name}"])

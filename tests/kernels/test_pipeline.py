@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kit import encoded
 
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
@@ -168,14 +169,14 @@ def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, la
         sums_kernel = compile_path(programs, name, lanes=lanes, groups=layers_of(features))
         sums = executor.trace(sums_kernel, part)
         encode = compile_encode(features, SCALES, name, planes=sums_kernel.planes)
-        wanted = executor.encode(encode, sums, 2)
+        wanted = encoded(executor, encode, sums, 2)
         kernel = compile_path(
             programs, name, "ieee", lanes, layers_of(features), encoding_of(features, SCALES)
         )
-        found = executor.paint(kernel, part)
+        found = executor.call(kernel, {}, part.integers)
         errors = error_at(encode, dict(zip(sums_kernel.planes, sums, strict=True)), 2)
         for feature in features:
-            apart = np.abs(found[feature].astype(np.float64) - wanted[feature])
+            apart = np.abs(found[f"image_{feature}"].astype(np.float64) - wanted[feature])
             assert np.all(apart <= (0 if name == "c" else 2 * errors[feature]))
 
 
@@ -242,14 +243,11 @@ def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of
         assert pipeline.path.digest == plain.path.digest
 
 
-def test_what_writes_encoded_images_is_refused_elsewhere(executor_named):
+def test_what_writes_encoded_images_is_refused_elsewhere():
     programs = lower_scene(scene("empty"), SETTINGS)
     given = layers_of(("color",)), encoding_of(("color",), SCALES)
     with pytest.raises(CompileError, match="write sums, not encoded images"):
         compile_path(programs, "opengl", "ieee", 1, *given)
-    kernel = compile_path(programs, "opencl", "ieee", 1, *given)
-    with pytest.raises(InputError, match="rows of the image '0 to 3 of 4': a kernel"):
-        executor_named("opencl").paint(kernel, Part(4, 4, 0, 3, 0, 1, 0))
 
 
 # ---- what stays on the device --------------------------------------------------------------------------
@@ -338,16 +336,6 @@ def test_seed_samples_and_first_sample(executor, model_of):
 
 
 # ---- refusals ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "sums", [np.zeros((2, 4, 4), np.float32), np.zeros((3, 4, 4)), np.zeros((3, 0, 4), np.float32)]
-)
-def test_sums_that_an_encoding_does_not_read_are_refused(executor, sums):
-    """It would read beyond their end."""
-    kernel = compile_encode(("color",), SCALES, executor.name)
-    with pytest.raises(InputError, match=r"must be float32 of shape \(3, height, width\): planes color_r"):
-        executor.encode(kernel, sums, 1)
 
 
 def test_refusals(executor, model_of):

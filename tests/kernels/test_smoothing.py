@@ -9,8 +9,8 @@ import pytest
 from rough import rough_layers
 
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing, error_at
-from wamnet.kernels.devices.planes import smoothed
-from wamnet.kernels.run.denoise_on import denoise_on, filter_of, images_of, images_on
+from wamnet.kernels.devices.passes import Filter
+from wamnet.kernels.run.denoise_on import Denoiser, denoise_on, images_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, Frame
 from wamnet.refimpl.network import dataset, smoothing
@@ -58,7 +58,7 @@ def test_frames_are_within_the_bound(device, size):
     for lanes in lanes_of(device):
         kernels = compile_smoothing(SCALES, device.name, lanes=lanes)
         layers = rough_layers(*size)
-        assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
+        assert excess(kernels, Filter(device, kernels).image(layers), layers) <= 1
 
 
 @pytest.mark.product
@@ -70,7 +70,7 @@ def test_hard_numbers_are_within_the_bound(device, name, value):
     layers = rough_layers(6, 18)
     for place in (np.s_[4, 4], np.s_[1], np.s_[:, 10:]):
         layers[name][place] = value
-    found = smoothed(device, kernels, layers)
+    found = Filter(device, kernels).image(layers)
     assert np.isfinite(found).all()
     assert excess(kernels, found, layers) <= 1
 
@@ -80,7 +80,7 @@ def test_a_frame_of_misses_is_within_the_bound(device):
     layers = {name: np.zeros_like(values) for name, values in rough_layers(6, 21).items()}
     layers["color"] = rough_layers(6, 21)["color"]
     kernels = compile_smoothing(SCALES, device.name, lanes=lanes_of(device)[-1])
-    assert excess(kernels, smoothed(device, kernels, layers), layers) <= 1
+    assert excess(kernels, Filter(device, kernels).image(layers), layers) <= 1
 
 
 # ---- where it is used ---------------------------------------------------------------------------------
@@ -102,7 +102,7 @@ def test_a_device_smooths_the_features_that_are_smoothed(executor_named, kit):
     """In the model's order; others are the reference's to the bit."""
     device, frame = executor_named("opencl"), whole_frame(rough_layers(9, 20))
     model = model_of(kit, ("normal", "seen_smoothed", "color", "smoothed"))
-    found, wanted = images_on(device, model, frame), images_of(model, frame)
+    found, wanted = Denoiser(device, model).images(frame), images_of(model, frame)
     assert list(found) == list(model.features)
     kernels = compile_smoothing(SCALES, "opencl")
     for name in ("normal", "color"):
@@ -130,12 +130,12 @@ def test_the_reference_smooths_where_bits_count(executor_named, kit, monkeypatch
     """SMO-7: other executors, integers, layers of float64, and models without such features."""
     device, frame = executor_named("opencl"), whole_frame(rough_layers(4, 5))
     model = model_of(kit, ("color", "smoothed"))
-    assert filter_of(device, model, frame, "ieee") is not None
-    assert filter_of(executor_named("numpy"), model, frame, "ieee") is None
-    assert filter_of(device, model, whole_frame(rough_layers(4, 5), np.float64), "ieee") is None
-    assert filter_of(device, model_of(kit, ("color",)), frame, "ieee") is None
+    assert Denoiser(device, model).filter(frame) is not None
+    assert Denoiser(executor_named("numpy"), model).filter(frame) is None
+    assert Denoiser(device, model).filter(whole_frame(rough_layers(4, 5), np.float64)) is None
+    assert Denoiser(device, model_of(kit, ("color",))).filter(frame) is None
     monkeypatch.setattr(Model, "is_whole", True)
-    assert filter_of(device, model, frame, "ieee") is None
+    assert Denoiser(device, model).filter(frame) is None
 
 
 def test_a_frame_that_lacks_a_guide_is_refused_as_ever(executor_named, kit):

@@ -112,7 +112,7 @@ def test_executor_stage_and_neuron_are_named(executor_named, model, images, way)
     (odd,) = triage.odd_ones(found)
     assert odd.kernel.runner.way == way
     assert triage.conclusion(found) == f"{way} plain is the odd one out: 1 other within its bound"
-    small = reduced(found, model, "ieee", images, compiled)
+    small = reduced(found, model, images, compiled)
     assert small.repeats
     assert (small.box.height, small.box.width) == (1, 1)
     (stage,) = small.stages
@@ -136,7 +136,7 @@ def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, imag
     # float32 rounds the sum
     assert abs(odd.found - odd.expected - 0.01) <= odd.bound + 2.0**-24
     assert odd.ratio == odd.error / odd.bound > 1
-    small = reduced(found, model, "ieee", images, compiled)
+    small = reduced(found, model, images, compiled)
     assert small.box == Box(0, 0, 5, 7)
     text = f"{way} plain: no stage deviates by itself; look at what comes after the last one"
     assert small.stages[0].text == text
@@ -188,7 +188,7 @@ def test_a_crash_is_a_verdict(executor_named, model, images, monkeypatch, way):
         found = verdicts_of(ways, model, images)
         assert found[index].state == "FAILED: ZeroDivisionError: division by zero"
         assert [v.kernel.runner.way for v in triage.odd_ones(found)] == [way]
-        small = reduced(found, model, "ieee", images)
+        small = reduced(found, model, images)
     assert (small.box.height, small.box.width) == (1, 1)
     assert "layer 0, sums" in small.stages[0].text
 
@@ -286,4 +286,5 @@ def test_stages_are_the_network(kit, model, images):
 
 def test_no_stage_deviates_in_a_right_kernel(executor, model, images):
     runner = Inside(executor.name, executor)
-    assert first_stage(runner, "plain", model, "ieee", images) is None
+    (kernel,) = triage.kernels_of([runner], lower(model), "ieee", SHAPE, "plain")
+    assert first_stage(kernel, model, images) is None

@@ -13,7 +13,7 @@ from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import Pipeline, cache, denoise_on
 from wamnet.kernels.run import tune
-from wamnet.kernels.run.tune import Row, Table, choose
+from wamnet.kernels.run.tune import Row, Subject, Table, Tuning
 from wamnet.refimpl import frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, denoise, siren
@@ -32,7 +32,7 @@ def model(hidden=(8,), window=3):
     return denoise.Model(network, ("color", "normal"), dataset.Window(window), dataset.Normalization())
 
 
-SUBJECT = tune.Subject(model())
+SUBJECT = Subject(model())
 """What the tables are about: the usual network in profile ieee."""
 
 
@@ -41,10 +41,20 @@ def planned(executor, network=None, **how):
     return plan_model(network or model(), executor.name, **how)
 
 
+def choose(executor, plan, size, pictures=1):
+    """Return the schedule of a plan and why."""
+    return Tuning(executor, Subject.of(plan), size).picked(pictures)
+
+
+def measured(executor, plan):
+    """Return the table of a plan."""
+    return Tuning(executor, Subject.of(plan), SIZE).measured(plan, repeats=1)
+
+
 def keep(executor, table):
     """Put a table into the cache as if it had been measured."""
     found = {"device": "d", "network": "n", "size": list(SIZE), "day": "2026-01-02", "rows": table}
-    assert cache.write_json(tune._entry(executor, SUBJECT, SIZE), found)
+    assert cache.write_json(Tuning(executor, SUBJECT, SIZE).entry, found)
 
 
 def row(schedule, ms, again_s=0.1):
@@ -53,12 +63,12 @@ def row(schedule, ms, again_s=0.1):
 
 def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     executor = executor_named("opencl")
-    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
+    table = measured(executor, planned(executor))
     assert {r.schedule for r in table.rows} == {s.name for s in TARGETS["opencl"].schedules}
     assert all((r.ms is None) == bool(r.note) for r in table.rows)
     assert all(r.again_s > 0 for r in table.rows if r.ms is not None)
     assert table.network == "54-8-3, color + normal, window 3 (clamp)"
-    assert tune.remembered(executor, SUBJECT, SIZE) == table
+    assert Tuning(executor, SUBJECT, SIZE).remembered() == table
     best = min((r for r in table.rows if r.ms is not None), key=lambda r: r.ms)
     schedule, reason = choose(executor, planned(executor), SIZE, pictures=10**9)
     assert schedule == best.schedule
@@ -74,7 +84,7 @@ def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch
         wrong if artifact.manifest["schedule"]["name"] == "tile:16" else run
     )(artifact, images)
     monkeypatch.setattr(executor, "run", chosen)
-    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
+    table = measured(executor, planned(executor))
     (bad,) = [r for r in table.rows if r.schedule == "tile:16"]
     assert bad.ms is None
     assert bad.note.startswith("its result is wrong on this device: ")
@@ -84,7 +94,7 @@ def test_a_schedule_with_a_wrong_result_is_not_timed(executor_named, monkeypatch
 def test_what_does_not_hold_the_program_says_why(executor_named, monkeypatch):
     monkeypatch.setattr("wamnet.compiler.schedules.group.LARGEST_NUMBERS", 30)
     executor = executor_named("opencl")
-    table = tune.tune(executor, planned(executor, model((8, 8), 1)), SIZE, repeats=1)
+    table = measured(executor, planned(executor, model((8, 8), 1)))
     notes = {r.schedule: r.note for r in table.rows}
     assert notes["group:4"].startswith("two layers of 4 pixels are 64 numbers, of at most 30")
     assert "numbers" not in notes["group:1"]
@@ -151,7 +161,7 @@ def test_size_classes_are_powers_of_two(height, width):
 )
 def test_an_entry_that_is_no_table_is_none(executor_named, data):
     executor = executor_named("opencl")
-    cache.write_json(tune._entry(executor, SUBJECT, SIZE), data)
+    cache.write_json(Tuning(executor, SUBJECT, SIZE).entry, data)
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
 
 
@@ -162,8 +172,8 @@ def test_a_damaged_table_is_measured_anew(executor_named, caplog):
     path.write_text(path.read_text().replace("plain", "tile:4"))
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
     assert "is damaged, or no entry of wamnet: it is ignored" in caplog.text
-    table = tune.tune(executor, planned(executor), SIZE, repeats=1)
-    assert tune.remembered(executor, SUBJECT, SIZE) == table
+    table = measured(executor, planned(executor))
+    assert Tuning(executor, SUBJECT, SIZE).remembered() == table
 
 
 def test_pictures_are_made_with_the_schedule_of_the_table(executor_named):

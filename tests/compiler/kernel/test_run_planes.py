@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plane_meanings import INTERPRETED
 from rough import rough_layers
+from second_meanings import INTERPRETED
 
 from wamnet.compiler.kernel.kernel import FLOAT, Let, Store, const, load, name
 from wamnet.compiler.kernel.run import run_on

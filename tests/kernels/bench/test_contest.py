@@ -11,7 +11,7 @@ import pytest
 from wamnet.compiler.plan import sine_contract
 from wamnet.kernels.bench import contenders, contest, rates, workload
 from wamnet.kernels.bench.contenders import Contender, Opened, Tools, Variant
-from wamnet.kernels.bench.cost import Stage
+from wamnet.kernels.bench.rates import Stage
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
@@ -35,6 +35,10 @@ def small_machine(monkeypatch) -> None:
     monkeypatch.setattr(rates, "MATRIX", 32)
     monkeypatch.setattr(rates, "TRIAD_NUMBERS", 2 * rates.BLOCK_NUMBERS)
     monkeypatch.setattr(rates, "PROBE_PX", (8,))
+
+
+def kernel(*facts) -> Contender:
+    return contenders.Kernel(*facts).contender
 
 
 def fake(name: str, open_it: Callable[..., Opened], **facts) -> Contender:
@@ -62,10 +66,10 @@ def rows(data: dict) -> dict[str, dict]:
 
 def names_on(executor) -> list[Contender]:
     """Return the plain kernel of an executor, others of OpenCL, and one of a rank."""
-    found = [contenders.kernel(executor.name, "plain")]
+    found = [kernel(executor.name, "plain")]
     if executor.name == "opencl":
-        found += [contenders.kernel("opencl", name) for name in ("vector:16", "tile:4")]
-    return [*found, contenders.kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
+        found += [kernel("opencl", name) for name in ("vector:16", "tile:4")]
+    return [*found, kernel(executor.name, "plain", Variant("rank3", "cut", rank=3))]
 
 
 @pytest.mark.nightly(but="opengl-egl")
@@ -84,7 +88,7 @@ def test_kernels_are_within_their_bound(executor, model) -> None:
 
 def test_counts_are_those_of_the_network(model) -> None:
     """96 x 8 + 8 x 3 products, 8 sines, 6 channels in and 3 out."""
-    row = rows(run(model, [contenders.kernel("numpy", "plain")]))["numpy:plain"]
+    row = rows(run(model, [kernel("numpy", "plain")]))["numpy:plain"]
     assert (row["products"], row["sines"], row["bytes"]) == (96 * 8 + 24, 8, 4 * 9)
     flops = 2 * row["products"] * SIZE * SIZE / (1e-3 * row["ms"]["median"])
     # A quotient of the same numbers in another order: a few roundings of float64.
@@ -193,7 +197,7 @@ def test_turns_are_taken(model) -> None:
 @pytest.mark.parametrize("variant", contenders.VARIANTS, ids=lambda variant: variant.name)
 def test_variants_are_within_their_bound(executor, model, variant) -> None:
     """On this frame, and for all images; a sine that promises nothing has neither bound."""
-    found = rows(run(model, [contenders.kernel(executor.name, "plain", variant)]))
+    found = rows(run(model, [kernel(executor.name, "plain", variant)]))
     (row,) = found.values()
     rounding = row["rounding"]
     assert (row["profile"], row["executor"], row["schedule"]) == (variant.profile, executor.name, "plain")
@@ -238,7 +242,7 @@ def test_an_executor_that_is_missing_is_in_the_list(monkeypatch, model) -> None:
 
 
 def test_choice_by_name_and_executor() -> None:
-    everybody = [contenders.kernel(n, "plain") for n in ("numpy", "opencl")]
+    everybody = [kernel(n, "plain") for n in ("numpy", "opencl")]
     everybody.append(fake("peer", lambda t, m, s: by_reference(m)))
     names = lambda only, executors: [c.name for c in contenders.chosen(everybody, only, executors)]  # noqa: E731
     assert names([], []) == ["numpy:plain", "opencl:plain", "peer"]

@@ -9,7 +9,7 @@ import pytest
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed
-from wamnet.kernels.bench.cost import Rates, Stage, fused, predicted_seconds, sines_of
+from wamnet.kernels.bench.rates import Rates, Stage, fused, predicted_seconds, sines_of
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wamnet.kernels import measure
-from wamnet.kernels.bench import crowd, fresh, paths, training
+from wamnet.kernels.bench import fresh, paths, training
 from wamnet.refimpl.light.scene import primitives
 from wamnet.refimpl.network.train import PRESETS
 
@@ -36,11 +36,11 @@ def test_environment_is_put_back(monkeypatch, fails) -> None:
     assert variables(before) == before
 
 
-@pytest.mark.parametrize("kind", crowd.KINDS)
+@pytest.mark.parametrize("kind", paths.KINDS)
 def test_a_crowd_is_as_large_as_stated_and_the_same_again(kind) -> None:
     """Edges of quads are at right angles and as long as the size, with 8 u of rounding for three products."""
-    scene = crowd.crowd(kind, 12)
-    assert scene == crowd.crowd(kind, 12)
+    scene = paths.crowd(kind, 12)
+    assert scene == paths.crowd(kind, 12)
     assert scene.name == f"{kind} 12"
     assert primitives(scene) == 12 + len(scene.lights)
     parts = (*scene.boxes, *scene.spheres, *scene.quads)

@@ -65,7 +65,6 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
     with tools:
         for _ in range(2):
             picture = runner.display(runner.run(shown))
-        runner.close()
     joined = np.concatenate(list(shown.images.values()), axis=-1)
     windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
     (bound,) = bounds.at_inputs(analysed(lower(model)), {"window": windows}, LIBRARY_SINE).values()

@@ -8,7 +8,7 @@ import pytest
 
 from wamnet.kernels import open_executor
 from wamnet.kernels.bench import rates
-from wamnet.kernels.bench.cost import sines_of
+from wamnet.kernels.bench.rates import sines_of
 from wamnet.kernels.measure import Times
 from wamnet.kernels.run.denoise_on import products_of
 
@@ -64,6 +64,6 @@ def test_small_programs_run(monkeypatch, schedule) -> None:
     monkeypatch.setattr(rates, "PROBE_PX", (4, 8))
     monkeypatch.setattr(rates, "PROBE_S", math.inf)
     with open_executor("numpy") as executor:
-        found, size = rates.probed(executor, schedule, 0.0)
+        found, size = rates.Probe(executor, schedule).times(0.0)
     assert size == 8
     assert [len(times.seconds) for times in found.values()] == [3, 3, 3]

@@ -24,6 +24,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..models.writing import signals_wait
 from ..refimpl.errors import InputError, WamnetError
 from .common.default_command import CommandWithOthers
 from .common.request import spread
@@ -94,7 +95,9 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
     groups = {"": app}
     for path, (module, function) in COMMANDS.items():
         if first == path.partition(" ")[0]:
-            imported = import_module(f".commands.{module}", __package__)
+            # Modules in C turn an interrupt of their import into errors of their own.
+            with signals_wait():
+                imported = import_module(f".commands.{module}", __package__)
             _register(groups, path, getattr(imported, function))
         elif first is None and " " not in path:
             app.command(path, help=_help_of(_docstring(module, function))[0])(lambda: None)

@@ -19,9 +19,6 @@ from ..files.alone import alone_in
 LARGEST_SIZE = 2**13
 """Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
 
-MANY = 1000
-"""Pictures of an animation, for which a long compilation may pay."""
-
 
 def tune(
     model: Path | None = argument(
@@ -61,7 +58,8 @@ def tune(
         tuning = Tuning(runner, Subject.of(plan), square)
         known = None if force else tuning.remembered()
         found = known or tuning.measured(plan)
-        picks = {n: tuning.picked(n) for n in (1, MANY)}
+        # A long compilation may pay for an animation.
+        picks = {n: tuning.picked(n) for n in (1, 1000)}
     show(found)
     if known:
         say(f"measured on {found.day}; --force measures again")

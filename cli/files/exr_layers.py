@@ -118,7 +118,12 @@ def select(path: Path, parts: Sequence[Part], chosen: str = "") -> Selection:
         rule = rule if there else "the file has one view, without a name"
         raise InputError(f"{path}: view layer", chosen, rule, "leave it out, or name an existing one")
     layers = {name: planes for name in LAYERS if (planes := _layer(path, parts, name, groups))}
-    notes = [note for name, planes in layers.items() if (note := _note(parts, name, planes))]
+    taken = {name: [plane.name for plane in planes] for name, planes in layers.items()}
+    notes = [
+        f"{name} is taken from {_in_part(parts, layers[name][0].part, ', '.join(names))}"
+        for name, names in taken.items()
+        if len(parts) > 1 or (*names,) != CHANNELS[name]
+    ]
     others = [f"{other!r}" for other in views if other != view]
     if others and layers:
         notes.append(f"view {view!r} is read, not {', '.join(others)} (the option --view-layer of denoise)")
@@ -204,14 +209,6 @@ def _components(path: Path, name: str, alias: str, group: Group) -> Sequence[Pla
         names = ", ".join(plane.name for plane in planes)
         raise InputError(f"{path}: channels", names, f"{name} has duplicates", "leave out or rename some")
     return planes
-
-
-def _note(parts: Sequence[Part], name: str, planes: Sequence[Plane]) -> str:
-    """Return which channels became a layer, if their names are not ours."""
-    names = [plane.name for plane in planes]
-    if (*names,) == CHANNELS[name] and len(parts) == 1:
-        return ""
-    return f"{name} is taken from {_in_part(parts, planes[0].part, ', '.join(names))}"
 
 
 def _in_part(parts: Sequence[Part], index: int, what: str) -> str:

@@ -156,6 +156,8 @@ def tried(fault: Fault, known: Mapping[str, Any], tree: Path) -> dict[str, Any]:
         return {"result": "stale", **row}
     folder = "" if lines(fault, source) else fault["file"].rpartition("/")[0] + "/"
     tests = list(dict.fromkeys([*reach.get(fault["id"], []), *reach.get(folder, [])]))
+    # A file that is gone since the map would be an error of the collection: a detection.
+    tests = [test for test in tests if (tree / test.partition("::")[0]).exists()]
     order = tree.with_suffix(".tests")
     write(tree / fault["file"], made, 3600)
     for some in filter(None, (tests[:FIRST], tests[FIRST:])):

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.reading import refusing
-from .evidence import INTEGERS, NODE, Refused, read, same
+from .evidence import INTEGERS, NODE, Refused, ends_of_window, inputs_of, read, same
 from .integer_checker import check_integers
 from .sine_checker import PROMISES
 from .spectra_checker import Tables
@@ -104,16 +104,12 @@ def network_of(text: str) -> tuple[list[dict[str, Any]], tuple[Any, Any, Any]]:
         names = dict(pair.split("=") for pair in at[4].split(", "))
         layers.insert(0, {**names, "node": int(at[1]), "scale": scale, "end": end, "floor": floor})
         (at,) = arguments(at)
-    (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
-    images = re.findall(r"(?m)^  image \w+: (\d+) in \[(\S+), (\S+)\]$", text)
-    ends = [(int(n), float(low), float(high)) for n, low, high in images]
-    zero, count = taps[2] == "zero", int(taps[0]) * int(taps[1])
-    low = np.tile(np.concatenate([np.full(n, min(a, 0.0) if zero else a) for n, a, _ in ends]), count)
-    high = np.tile(np.concatenate([np.full(n, max(b, 0.0) if zero else b) for n, _, b in ends]), count)
+    (rows, columns, _), images = inputs_of(text)
+    low, high = ends_of_window(text)
     same("program: numbers in a window", at[5], str(len(low)))
-    owner = np.tile(np.repeat(np.arange(len(ends)), [n for n, _, _ in ends]), count)
-    row = np.repeat(np.arange(int(taps[0])), len(low) // int(taps[0]))
-    parts = [np.flatnonzero((owner == image) & (row == y)) for image in range(len(ends)) for y in set(row)]
+    owner = np.tile(np.repeat(np.arange(len(images)), [n for _, n, *_ in images]), rows * columns)
+    row = np.repeat(np.arange(rows), len(low) // rows)
+    parts = [np.flatnonzero((owner == i) & (row == y)) for i in range(len(images)) for y in range(rows)]
     return layers, (low, high, parts if len(parts) > 1 else None)
 
 

@@ -79,16 +79,32 @@ def check_manifest(manifest: Any, text: str, count: int) -> None:
     same("manifest: sizes are integers above -1", all(type(n) is int and n >= 0 for n in counted), True)
     names = [manifest["target"], manifest["entry_point"], schedule["name"]]
     same("manifest: target, entry point and schedule are texts", all(isinstance(n, str) for n in names), True)
-    (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
-    size = window["size"]
-    same("manifest: window", [size, size, window["border"]], [int(taps[0]), int(taps[1]), taps[2]])
-    images = re.findall(r"(?m)^  image (\w+): (\d+)( whole)? in \[(\S+), (\S+)\]$", text)
-    wanted = [[name, int(n), bool(w), float(low), float(high)] for name, n, w, low, high in images]
-    stated = [[i["name"], i["channels"], i.get("whole", False), i["low"], i["high"]] for i in given]
-    same("manifest: images", stated, wanted)
-    same("program: ranges of images", all(low <= high for *_, low, high in wanted), True)
+    taps, images = inputs_of(text)
+    same("manifest: window", (window["size"], window["size"], window["border"]), taps)
+    stated = [(i["name"], i["channels"], i.get("whole", False), i["low"], i["high"]) for i in given]
+    same("manifest: images", stated, images)
+    same("program: ranges of images", all(low <= high for *_, low, high in images), True)
     same("manifest: output", [output["name"]], re.findall(r"(?m)^  output (\w+) = %\d+$", text))
     same("manifest: numbers of weights.bin", manifest["weights"]["count"], count)
+
+
+def inputs_of(text: str) -> tuple[tuple[int, int, str], list[tuple[str, int, bool, float, float]]]:
+    """Return the window of a program's text, its rows, columns and border, and its images.
+
+    Of an image these are name, channels, whether it holds integers, and the ends of its range.
+    """
+    ((rows, columns, border),) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
+    images = re.findall(r"(?m)^  image (\w+): (\d+)( whole)? in \[(\S+), (\S+)\]$", text)
+    found = [(name, int(n), bool(whole), float(low), float(high)) for name, n, whole, low, high in images]
+    return (int(rows), int(columns), border), found
+
+
+def ends_of_window(text: str) -> tuple[Any, Any]:
+    """Return the least and the largest values (n,) of a window's numbers: at a zero border 0 is one."""
+    (rows, columns, border), images = inputs_of(text)
+    low, high = np.array([ends for _, n, _, *ends in images for _ in range(n)]).T
+    edge = 0.0 if border == "zero" else np.nan  # which is left out
+    return np.tile(np.fmin(low, edge), rows * columns), np.tile(np.fmax(high, edge), rows * columns)
 
 
 def places(name: str, place: Any, most: int) -> Any:

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from .evidence import NODE, Refused, same
+from .evidence import NODE, Refused, ends_of_window, inputs_of, same
 
 Range = tuple[Any, Any, int]
 """Least and largest values of a vector's numbers, or of one, as Python's integers: of units of 2^grain."""
@@ -151,15 +151,11 @@ OPERATIONS: Mapping[str, Callable[[Line], Range]] = {
 
 def _window(text: str) -> Range:
     """Return the range of the window, all of whose images must be of integers."""
-    (taps,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", text)
-    images = re.findall(r"(?m)^  image \w+: (\d+)( whole)? in \[(\S+), (\S+)\]$", text)
-    if not images or not all(image[1] for image in images):
+    _, images = inputs_of(text)
+    if not images or not all(whole for _, _, whole, *_ in images):
         raise Refused("program: an image is not of integers")
-    zero, count = taps[2] == "zero", int(taps[0]) * int(taps[1])
-    ends = [(int(n), int(float(a)), int(float(b))) for n, _, a, b in images]
-    low = [min(a, 0) if zero else a for n, a, _ in ends for _ in range(n)]
-    high = [max(b, 0) if zero else b for n, _, b in ends for _ in range(n)]
-    return np.array(low * count, object), np.array(high * count, object), 0
+    low, high = (np.array([int(end) for end in ends], object) for ends in ends_of_window(text))
+    return low, high, 0
 
 
 def _exact(values: Sequence[float]) -> Range:

@@ -314,15 +314,19 @@ def _is_float32(*values: Any) -> Any:
     return np.logical_and.reduce(np.broadcast_arrays(*(v.astype(np.float32) == v for v in values)))
 
 
+def _within(context: Context, operands: list[Range], ends: tuple[Any, Any], allowed: Any) -> Range:
+    """Return a range with these ends where operands are allowed, else without end."""
+    low, high = np.where(allowed, ends[0], -np.inf), np.where(allowed, ends[1], np.inf)
+    return _made(context, low, high, _all_sure(operands) & allowed)
+
+
 def _divide(context: Context, operands: list[Range]) -> Range:
     """The image and the promise, of a reciprocal too; none where the divisor may be 0, or huge."""
-    b = operands[-1]
+    b, relative = operands[-1], context.arithmetic.division
     allowed = (b.low > 0) | (b.high < 0)
-    if context.arithmetic.division is not None:
+    if relative is not None:
         allowed = allowed & (np.maximum(np.abs(b.low), np.abs(b.high)) <= LARGEST_DIVISOR)
-    low, high = _approximate(*_image(context, operands), context.arithmetic.division)
-    low, high = np.where(allowed, low, -np.inf), np.where(allowed, high, np.inf)
-    return _made(context, low, high, _all_sure(operands) & allowed)
+    return _within(context, operands, _approximate(*_image(context, operands), relative), allowed)
 
 
 def _approximate(low: Any, high: Any, relative: float | None) -> tuple[Any, Any]:
@@ -332,22 +336,18 @@ def _approximate(low: Any, high: Any, relative: float | None) -> tuple[Any, Any]
 
 def _sqrt(context: Context, operands: list[Range]) -> Range:
     """Monotone, and the promise; none where the operand may be negative."""
-    (a,) = operands
-    low, high = _approximate(*_image(context, operands), context.arithmetic.root)
-    low, high = np.where(a.low >= 0, low, -np.inf), np.where(a.low >= 0, high, np.inf)
-    return _made(context, low, high, _all_sure(operands) & (a.low >= 0))
+    ends = _approximate(*_image(context, operands), context.arithmetic.root)
+    return _within(context, operands, ends, operands[0].low >= 0)
 
 
 def _power(context: Context, operands: list[Range]) -> Range:
     """Monotone in both, so of the powers of ends, and the promise; none where x may be 0 or below."""
     x, y = operands
-    low, high = _image(context, operands)
     exponent = np.maximum(np.abs(y.low), np.abs(y.high))
     logarithm = np.maximum(np.abs(np.log2(x.low)), np.abs(np.log2(x.high)))
     # Float64's own logarithms and powers are right to a few of its units: far below 2**-20 of the promise.
-    low, high = _wider(low, high, power_error(exponent, logarithm) * (1 + OUTWARD))
-    low, high = np.where(x.low > 0, low, -np.inf), np.where(x.low > 0, high, np.inf)
-    return _made(context, low, high, _all_sure(operands) & (x.low > 0))
+    relative = power_error(exponent, logarithm) * (1 + OUTWARD)
+    return _within(context, operands, _wider(*_image(context, operands), relative), x.low > 0)
 
 
 def _exp(context: Context, operands: list[Range]) -> Range:
@@ -355,29 +355,19 @@ def _exp(context: Context, operands: list[Range]) -> Range:
     (x,) = operands
     relative = exp_error(np.maximum(np.abs(x.low), np.abs(x.high))) * (1 + OUTWARD)
     with np.errstate(over="ignore", invalid="ignore"):
-        low, high = _wider(*_image(context, operands), relative)
-    return _made(context, low, high, _all_sure(operands))
+        ends = _wider(*_image(context, operands), relative)
+    return _made(context, *ends, _all_sure(operands))
 
 
-def _sin(context: Context, operands: list[Range]) -> Range:
-    """The sine's range between both arguments, and the contract's error on its domain."""
-    return _wave(context, operands, context.arithmetic.sine)
-
-
-def _cos(context: Context, operands: list[Range]) -> Range:
-    """The cosine's."""
-    return _wave(context, operands, context.arithmetic.cosine)
-
-
-def _wave(context: Context, operands: list[Range], contract: SineContract) -> Range:
-    """Return the range of a sine or cosine, computed as a contract promises."""
-    (a,) = operands
+def _wave(context: Context, operands: list[Range]) -> Range:
+    """The range of a sine or cosine between both arguments, and the contract's error on its domain."""
+    (a,), arithmetic = operands, context.arithmetic
+    contract = arithmetic.sine if context.node.op == "sin" else arithmetic.cosine
     own = np.inf if contract.error is None else contract.error + SINE_SLACK
     domain = min(contract.domain, SLACK_DOMAIN)
     inside = (np.maximum(np.abs(a.low), np.abs(a.high)) <= domain) & np.isfinite(own)
     low, high = _image(context, operands)
-    low, high = np.where(inside, low - own, -np.inf), np.where(inside, high + own, np.inf)
-    return _made(context, low, high, _all_sure(operands) & inside)
+    return _within(context, operands, (low - own, high + own), inside)
 
 
 # ---- exact operations -------------------------------------------------------------------------------------
@@ -395,23 +385,13 @@ def _absolute(context: Context, operands: list[Range]) -> Range:
     return Range(*_whole(*_image(context, operands)), context.plain, operands[0].sure)
 
 
-def _minimum(context: Context, operands: list[Range]) -> Range:
-    """Exact; only an operand that may be the least affects the result."""
-    a, b = operands
-    sure = (a.sure & (b.sure | (a.high <= b.low))) | (b.sure & (b.high <= a.low))
-    return _chosen(context, operands, sure)
-
-
-def _maximum(context: Context, operands: list[Range]) -> Range:
-    """Exact; only an operand that may be the largest affects the result."""
-    a, b = operands
-    sure = (a.sure & (b.sure | (a.low >= b.high))) | (b.sure & (b.low >= a.high))
-    return _chosen(context, operands, sure)
-
-
-def _chosen(context: Context, operands: list[Range], sure: Any) -> Range:
-    """Return the range of the least or largest; beside NaN either operand may come out."""
-    (low, high), known = _image(context, operands), operands[0].known & operands[1].known
+def _extreme(context: Context, operands: list[Range]) -> Range:
+    """Exact; only an operand that may be the least, or largest, affects the result, and beside NaN either."""
+    (a, b), (low, high) = operands, _image(context, operands)
+    first, second = a.high <= b.low, b.high <= a.low
+    if context.node.op == "maximum":
+        first, second = a.low >= b.high, b.low >= a.high
+    sure, known = (a.sure & (b.sure | first)) | (b.sure & second), a.known & b.known
     if context.node.type.dtype == "float32":
         low, high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
     return Range(low, high, context.plain, (sure & known) | (low == high))
@@ -481,14 +461,14 @@ RULES: Mapping[str, Rule] = {
     "reciprocal": _divide,
     "negative": _negative,
     "absolute": _absolute,
-    "minimum": _minimum,
-    "maximum": _maximum,
+    "minimum": _extreme,
+    "maximum": _extreme,
     "floor": _floor,
     "sqrt": _sqrt,
     "power": _power,
     "exp": _exp,
-    "sin": _sin,
-    "cos": _cos,
+    "sin": _wave,
+    "cos": _wave,
     **dict.fromkeys(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"), _compare),
     **dict.fromkeys(("logical_and", "logical_or", "logical_not"), _logic),
     "bitwise_xor": _integers,

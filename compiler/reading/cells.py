@@ -122,15 +122,8 @@ class Cells:
         )
 
     def at(self, place: Any, width: int, turns: Turns, active: NDArray[np.bool_] | None) -> Any:
-        """Return rows and columns of an access: slices, or (width, turns); place 0 if not active."""
-        if type(place) is int:
-            if 0 <= place <= self.count - width:
-                rows: Any = slice(place, place + width)
-                if self.columns in (1, turns.count):
-                    return rows, slice(None)
-            elif active is None or active.any():
-                raise Wrong(f"{self.name} has no number {place}: it has {self.count}")
-            place = np.full((1, 1), place)
+        """Return rows and columns (width, turns) of an access; place 0 if not active."""
+        place = np.full((1, 1), place) if type(place) is int else place
         if not isinstance(place, np.ndarray) or place.shape[0] != 1:
             raise Wrong(f"{self.name} has an index that differs between lanes")
         beyond = (place < 0) | (place > self.count - width)
@@ -160,11 +153,11 @@ class Cells:
         shape = self.shape[at]
         one = width == 1
         if not self.has_sums or not (state >= SUM).any():
-            return Term(shape.copy() if one else shape[:, None].copy(), kind=self.kind)
+            return Term(shape if one else shape[:, None], kind=self.kind)
         sums = self.sums[:, at[0], at[1]]
         if not (state >= SUM).all():
             sums = np.where(state >= SUM, sums, drawn(shape))
-        sums = sums.copy() if one else sums[:, :, None].copy()
+        sums = sums if one else sums[:, :, None]
         if self.kind != "float32":
             return self._integers(at, one, sums)
         if (state == SUM).all():
@@ -179,7 +172,7 @@ class Cells:
         low, high = (np.where(good, self.span[end, at[0], at[1]], 1 - end) for end in (0, 1))
         if not one:
             shape, low, high = shape[:, None], low[:, None], high[:, None]
-        return Term(shape.copy(), sums, kind=self.kind, span=(low, high))
+        return Term(shape, sums, kind=self.kind, span=(low, high))
 
     def _settle(self, at: Any, turns: Turns, active: Any, fold: Fold) -> None:
         """Fold what each lane has written for itself."""
@@ -205,22 +198,15 @@ class Cells:
 
     def store(self, place: Any, width: int, value: Term, turns: Turns, active: Any, lanes: int) -> None:
         """Write numbers of active turns (turns,), in the lanes of a number."""
-        at = self.at(place, width, turns, active)
+        rows, columns, keep = self._kept(self.at(place, width, turns, active), turns, active)
         if turns.undoes:
             turns.save(self)
-        keep: Any = None
-        if self.columns < turns.count or active is not None:
-            rows, columns, keep = self._kept(at, turns, active)
-            at = rows[keep], columns[keep]
-        elif isinstance(at[0], np.ndarray):
-            at = at[0], np.broadcast_to(at[1], at[0].shape)
+        at = rows[keep], columns[keep]
 
         def own(values: Any, axis: int) -> Any:
             """Return the values of what is kept: the axis of lanes is one."""
             flat = values if values.ndim == axis + 2 else values.take(0, axis=axis + 1)
-            return (
-                flat if keep is None else np.broadcast_to(flat, (*flat.shape[:axis], *keep.shape))[..., keep]
-            )
+            return np.broadcast_to(flat, (*flat.shape[:axis], *keep.shape))[..., keep]
 
         self.shape[at] = 0 if value.shape is None else own(value.shape, 0)
         self.lanes[at] = lanes
@@ -297,11 +283,7 @@ class Cells:
 
     def _items(self, at: Any, turns: Turns, active: Any) -> tuple[Any, Any, Any]:
         """Return rows, columns and numbers of turns (width, turns) of an access, those of active turns."""
-        rows, columns = at
-        if isinstance(rows, slice):
-            rows = np.arange(rows.start, rows.stop)[:, None]
-            columns = 0 if self.columns == 1 else np.arange(turns.count)
-        rows = np.broadcast_to(rows, (len(rows), turns.count))
+        rows, columns = np.broadcast_to(at[0], (len(at[0]), turns.count)), at[1]
         who = turns.who
         if active is not None:
             rows, columns, who = (

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..proof.evidence import INTEGERS, NODE, places
+from ..proof.evidence import INTEGERS, NODE, inputs_of, places
 from ..proof.sine_checker import sine
 from .field import P, Words, drawn, hashed, literal
 from .integers import Ranges, Stored, stated
@@ -94,8 +94,8 @@ class Claim:
         self.first: dict[int, int] = {}
         self.found: set[int] = set()
         self.made: set[int] = set()
-        self.images = re.findall(r"(?m)^  image (\w+): (\d+) ", self.text)
-        (self.window,) = re.findall(r"(?m)^  window (\d+)x(\d+), border (\w+)$", self.text)
+        self.window, images = inputs_of(self.text)
+        self.images = [(name, channels) for name, channels, *_ in images]
         self.centre = int(manifest["window"]["centre"])
         own = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
         self.fold = Fold(own | (lanes.inside is not None), slots)  # all items of a group compute sums
@@ -145,7 +145,7 @@ class Claim:
 
     def _input(self) -> Term:
         """Return the windows (1, pixels * n) of all pixels, folded: tap by tap, all images' channels."""
-        rows, columns = (np.arange(int(size)) - self.centre for size in self.window[:2])
+        rows, columns = (np.arange(size) - self.centre for size in self.window[:2])
         every = columns + self.stride * np.arange(self.pixels)[:, None]
         across = np.unique(every)
         read = patches(self.lanes, self.fold, self.images, (across, rows), self.window[2])
@@ -229,9 +229,9 @@ class Claim:
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
-        counts = [int(channels) for _, channels in self.images]
+        counts = [channels for _, channels in self.images]
         owner = np.tile(np.repeat(np.arange(len(counts)), counts), n // sum(counts))
-        rows = int(self.window[0])
+        rows = self.window[0]
         row = np.repeat(np.arange(rows), n // rows)
         return [
             (f"image {name}, row {y}", np.flatnonzero((owner == i) & (row == y)))

@@ -14,7 +14,6 @@ checker of the certificate finds them again.
 from __future__ import annotations
 
 import base64
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -23,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..proof.evidence import INTEGERS
+from ..proof.evidence import INTEGERS, inputs_of
 from ..proof.integer_checker import check_integers
 from .field import P, Words, drawn, hashed
 from .lanes import Unread, Wrong
@@ -261,5 +260,5 @@ class Ranges:
 
     def images(self, text: str) -> dict[str, tuple[int, int]]:
         """Return the spans of the images' numbers by name, where a program's text is one of these."""
-        found = re.findall(r"(?m)^  image (\w+): \d+ whole in \[(\S+), (\S+)\]$", text if self.found else "")
-        return {name: (int(float(low)), int(float(high))) for name, low, high in found}
+        found = inputs_of(text)[1] if self.found else []
+        return {name: (int(low), int(high)) for name, _, whole, low, high in found if whole}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,33 +18,27 @@ BYTES = 2**30
 """Most memory, in addition to what the process has."""
 
 
-def limited(check: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
-    """Return the results of parallel calls of a check, each in a separate process.
+def limited(check: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the result of a check, in a separate process; raises `Unread` if it exceeds its limits.
 
-    Raises `Unread` if one exceeds its limits. Where there is no fork, as on Windows, there are none.
+    Where there is no fork, as on Windows, there are none.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
-        return [check(*arguments) for arguments in calls]
+        return check(*arguments)
     context = multiprocessing.get_context("fork")
-    running = []
-    for arguments in calls:
-        here, there = context.Pipe(duplex=False)
-        process = context.Process(target=_answer, args=(there, check, arguments))
-        process.start()
-        there.close()
-        running.append((here, process))
-    answers: list[Any] = []
-    for here, process in running:
-        try:
-            answers.append(here.recv())
-        except EOFError:
-            rule = f"a source that takes more than {SECONDS} s of computing time, or {BYTES >> 20} MB"
-            answers.append(Unread(rule))
-        process.join()
-    for answer in answers:
-        if isinstance(answer, Exception):
-            raise answer
-    return answers
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_answer, args=(there, check, arguments))
+    process.start()
+    there.close()
+    try:
+        answer = here.recv()
+    except EOFError:
+        rule = f"a source that takes more than {SECONDS} s of computing time, or {BYTES >> 20} MB"
+        answer = Unread(rule)
+    process.join()
+    if isinstance(answer, Exception):
+        raise answer
+    return answer
 
 
 def _answer(to: Any, check: Callable[..., Any], arguments: Any) -> None:

@@ -230,11 +230,11 @@ def patches(lanes: Lanes, fold: Fold, images: Any, at: Any, border: str) -> Iter
     width, height = lanes.known[1][:, None], lanes.known[3][:, None]
     column = lanes.x[:, None] + across
     for name, count in images:
-        for c in range(int(count)):
+        for c in range(count):
             lines = []
             for row in (lanes.y[:, None] + dy for dy in down):
                 pixel = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
-                known = hashed(f"image {name}", pixel * int(count) + c)
+                known = hashed(f"image {name}", pixel * count + c)
                 if border == "zero":
                     outside = (column < 0) | (column >= width) | (row < 0) | (row >= height)
                     known = np.where(outside, literal(0.0, "float32"), known)

@@ -77,13 +77,14 @@ class Trial(Values):
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
         self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
+        self.number_of = {self.masks[0].tobytes(): 0}
         self.looking: NDArray[np.bool_] | None = None
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
         self.start = self._start()
         self.spans = claim.ranges.images(claim.text)
-        self.images = {f"{IMAGE}{key}": int(n) for key, n in claim.images}
+        self.images = {f"{IMAGE}{key}": n for key, n in claim.images}
         self.outputs = claim.expected
         slots, pixels, channels = self.outputs.shape
         self.written = np.zeros((slots, pixels, channels, lanes.count), bool)
@@ -117,11 +118,10 @@ class Trial(Values):
         lanes: NDArray[np.bool_] = np.asarray(self.mask.any(axis=1))
         if (self.mask != (lanes[:, None] & self.mask.any(axis=0))).any():
             raise Unread("numbers that some lanes write, or read, in some turns")
-        for number, each in enumerate(self.masks):
-            if np.array_equal(each, lanes):
-                return number
-        self.masks.append(lanes)
-        return len(self.masks) - 1
+        number = self.number_of.setdefault(lanes.tobytes(), len(self.masks))
+        if number == len(self.masks):
+            self.masks.append(lanes)
+        return number
 
     def _only(self, mask: NDArray[np.bool_], body: Body) -> None:
         """Run statements for some lanes and turns."""

@@ -9,7 +9,7 @@ import text_faults
 from texts import kernel, parts, planned
 
 from wamnet.compiler.core import sine
-from wamnet.compiler.proof import checker
+from wamnet.compiler.proof import checker, evidence
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_facts, check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
@@ -81,8 +81,14 @@ def test_a_manifest_of_other_images_or_work_items_is_rejected(plain, of, key, va
     if key:
         first = {**(manifest[of][0] if of == "images" else manifest[of]), key: value}
         turned = [first, *manifest["images"][1:]]
-    with pytest.raises(Refused, match="its manifest"):
-        run_text(source, held, {**manifest, of: turned if of == "images" else first}, weights)
+
+    def check(other):
+        evidence.check_manifest(other, held["program"], len(weights))
+        run_text(source, held, other, weights)
+
+    check(manifest)
+    with pytest.raises(Refused, match="manifest"):
+        check({**manifest, of: turned if of == "images" else first})
 
 
 @pytest.mark.parametrize(
@@ -171,4 +177,4 @@ def test_a_source_that_never_ends_is_not_checked(plain, monkeypatch):
     loops = "".join(f"for (int {k} = 0; {k} < 3000; ++{k}) {{ " for k in "abcd") + "}" * 4
     endless = source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1)
     with pytest.raises(Unread, match="more than 1 s"):
-        limited(run_text, [(endless, *others)])
+        limited(run_text, endless, *others)

@@ -75,6 +75,11 @@ class Lanes:
         cases = truth.reshape(-1, self.items, truth.shape[1])
         return bool((cases[0] | ~cases.any(axis=0)).all())
 
+    def alike(self, truth: NDArray[np.bool_]) -> bool:
+        """Return whether a condition (lanes, turns), or (1, turns), is that of an item in its group alone."""
+        cases = truth.reshape(-1, self.items, truth.shape[1]) if len(truth) > 1 else truth
+        return bool((cases == cases[0]).all())
+
     @property
     def x(self) -> NDArray[np.int64]:
         """The column (lanes,) of each lane's first pixel."""

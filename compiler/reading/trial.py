@@ -185,6 +185,8 @@ class Trial(Values):
         value = constant(value, kind.dtype) if type(value) is int else value
         if isinstance(cells, Shared) and isinstance(value, Term):
             self._alike(array)
+            if self.mask is not None and not self.lanes.alike(self.mask):
+                raise Wrong(f"{array} is written in some groups only")
             cells.store(place, value, self.turns, self.mask)
             return
         if not isinstance(value, Term) or value.kind != cells.kind:

@@ -119,6 +119,10 @@ def test_conditions_near_borders_of_both_axes_are_refused(four, a, b):
             run_text(*changed(four, old, f"{old} && {case}"))
     with pytest.raises(Unread, match="opposite of a condition"):
         run_text(*changed(four, old, f"{old} && (left != width - {a} || top != height - {b})"))
+    line = "tile[i] = inside ? image_color[(row * width + column) * 3 + 0] : 0.0f;"
+    wrong = line.replace("+ column)", "+ max(min(column, width - 2), 0))")
+    with pytest.raises(Refused, match="in some groups only"):  # of the last column all but the first row
+        run_text(*changed(four, line, f"{wrong} if (tile_row >= 1) {{ {line} }}"))
     with pytest.raises(Refused, match="both axes"):
         run_text(*changed(four, old, f"{old} && left + top != width + height - {a + b}"))
     with pytest.raises(Refused, match="another axis"):

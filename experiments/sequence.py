@@ -30,7 +30,7 @@ from wamnet.refimpl.frame import Frame
 from wamnet_peers.peer_oidn import Kept
 
 MODEL = "minicubes"
-LAYERS = ("color", "normal", "albedo", "position", "unshadowed")
+LAYERS = ("color", "normal", "albedo", "position", "direct")
 """The layers that the model reads, and so those of the files."""
 
 RENDERED = 8
@@ -45,7 +45,8 @@ def frames(folder: Path, size: int, count: int) -> Path:
             os.link(folder / f"shot.{number % RENDERED:04d}.exr", path)
             continue
         rendered = folder / "rendered.exr"
-        what = [MODEL, "--width", size, "--height", size, "--seed", number, "--feature-spp", 16]
+        rays = ["--feature-spp", 16, "--shadow-rays", 1]
+        what = [MODEL, "--width", size, "--height", size, "--seed", number, *rays]
         _run(["render", *what, "--time", number / RENDERED, "--executor", "c", "-o", rendered])
         frame = exr.read_frame(rendered)
         exr.write_frame(path, Frame({name: frame[name] for name in LAYERS}, frame.info))

@@ -25,7 +25,7 @@ from ...compiler.variants import plan_model
 from ...models.data.scene_source import scene_source
 from ...refimpl.light.render import Job
 from ...refimpl.light.scene import Scene
-from ...refimpl.network.denoise import Model
+from ...refimpl.network.denoise import Model, learned_shadow_rays
 from ..devices.executor import Executor
 from ..devices.passes import PICTURE
 from ..measure import Entry
@@ -104,7 +104,8 @@ class Ours:
     def ways(self, stack: ExitStack) -> dict[str, Callable[[], Any]]:
         """Return what is measured, by name; pipelines are open until the stack is closed."""
         shots, scene, size = moments(self.scene), scene_source(self.scene).at(), self.size
-        job, plan = Job(size, size, feature_spp=self.rays), plan_model(self.model, self.executor.name)
+        job = Job(size, size, feature_spp=self.rays, shadow_rays=learned_shadow_rays(self.model))
+        plan = plan_model(self.model, self.executor.name)
         schedule, _ = Tuning(self.executor, Subject.of(plan), (size, size)).picked()
         denoiser = compile_plan(plan.scheduled(schedule))
 

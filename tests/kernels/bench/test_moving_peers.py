@@ -6,12 +6,16 @@ Mitsuba's LLVM variant and Blender are skipped where they are missing; the text 
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
 from packages import needed
 from statistical import assert_all_plausible, welch_p
 
+from wamnet.cli.common.inputs import load_model
+from wamnet.kernels import open_executor
 from wamnet.kernels.bench import paths, pipelines
 from wamnet.kernels.run.render_on import render_on
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
@@ -96,3 +100,12 @@ def test_what_cycles_would_show_differently_is_refused(scene) -> None:
 def test_every_peer_can_be_named() -> None:
     assert set(pipelines.PEERS) == set(table.makers)
     assert set(paths.PEERS) == set(table.renderers)
+
+
+def test_a_bundled_model_gets_the_layers_that_it_reads() -> None:
+    """Features that a renderer writes on request, where the benchmark renders and denoises apart."""
+    with ExitStack() as stack:
+        executor = stack.enter_context(open_executor("numpy"))
+        ways = pipelines.Ours(executor, load_model(Path("minicubes")), "minicubes", 8, 4).ways(stack)
+        ways["separate"]()
+    assert pipelines.MOVING in ways

@@ -146,7 +146,6 @@ class Dialect:
     transforms: bool = False
     tiles: tuple[int, ...] = (4,)
     words: str = ""
-    widens: bool = True
     wide: bool = True
     calls_vectors: bool = False
     vector_operations: Mapping[str, str] = {}

@@ -186,10 +186,8 @@ class OpenCL(Arguments):
             found.helpers = {**dict.fromkeys(("floor", "convert"), BUILTINS), "any": any_lane(lanes)}
         return found
 
-    def guard(self, kernel: Interface) -> list[str]:
-        """Return the item's place; items of a path kernel beyond the picture compute on."""
-        if kernel.role != PATH:
-            return super().guard(kernel)
+    def opening(self, kernel: Interface) -> list[str]:
+        """Return the first statements of a path kernel: rows of planes are whole items, which all compute."""
         left = "(int)row + first_row < height ? width - (int)column : 0"
         images = [
             f"    int left = {left}; /* pixels of the row from here on: whole groups are larger */",
@@ -203,10 +201,6 @@ class OpenCL(Arguments):
             "    size_t at = row * stride + column;",
             *(images if kernel.images else []),
         ]
-
-    def places_of_planes(self, kernel: Interface) -> list[str]:
-        """Return nothing: rows of planes are whole items."""
-        return []
 
     def read(self, array: Array, index: Sequence[str], lanes: int) -> str:
         """Return an element of an array that a kernel is given, or several of a row."""

@@ -42,16 +42,11 @@ class Buffers(Dialect):
         """Return the lines of a kernel that is data, up to its first statement."""
         if kernel.launches:
             return self.top(interface, parts)
-        along, down = (self.step(each) for each in kernel.step)
-        names, limits = kernel.place, ("width", "height")
-        column, row = (self.cast("int32", text) for text in self.item)
-        outside = " || ".join(f"{name} >= {limit}" for name, limit in zip(names, limits, strict=True))
         sizes = [f"    {self.index(n, f'{self.size}{n}')}" for n in interface.integers if self.size]
-        place = [self.index(names[0], f"{column}{along}"), self.index(names[1], f"{row}{down}")]
-        end = [f"    if ({outside}) {{", "        return;", "    }"]
         vectors = self.weights_as_vectors(kernel.weights)
         if kernel.group is None:
-            opening = [*sizes, *(f"    {line}" for line in place), *end, *vectors, *self.strides(interface)]
+            guard = self.guard(kernel.place, ("width", "height"), [self.step(each) for each in kernel.step])
+            opening = [*sizes, *guard, *vectors, *self.strides(interface)]
         else:
             opening = [*self.in_function(kernel), *vectors, *sizes, *self.item_place()]
         return [*self.top(interface, parts), *self.head(interface), *opening]
@@ -92,20 +87,17 @@ class Buffers(Dialect):
 
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements of a path kernel: the item's place, the guard, the place in planes."""
-        return [*self.guard(kernel), *self.places_of_planes(kernel)]
+        limits = [self.integer(kernel, name) for name in ("width", kernel.rows)]
+        return [*self.guard(kernel.place, limits), *self.places_of_planes(kernel)]
 
-    def guard(self, kernel: Interface) -> list[str]:
-        """Return the item's place, and the end of an item outside of the picture."""
-        names, limits = kernel.place, (self.integer(kernel, "width"), self.integer(kernel, kernel.rows))
-        column, row = (self.cast("int32", text) for text in self.item)
+    def guard(
+        self, names: Sequence[str], limits: Sequence[str], steps: Sequence[str] = ("", "")
+    ) -> list[str]:
+        """Return the item's place, of so many steps, and the end of an item outside of the picture."""
+        texts = [f"{self.cast('int32', text)}{step}" for text, step in zip(self.item, steps, strict=True)]
+        places = [f"    {self.index(name, text)}" for name, text in zip(names, texts, strict=True)]
         outside = " || ".join(f"{name} >= {limit}" for name, limit in zip(names, limits, strict=True))
-        return [
-            f"    {self.index(names[0], column)}",
-            f"    {self.index(names[1], row)}",
-            f"    if ({outside}) {{",
-            "        return;",
-            "    }",
-        ]
+        return [*places, f"    if ({outside}) {{", "        return;", "    }"]
 
     def integer(self, kernel: Interface, name: str) -> str:
         """Return the text of an integer that the kernel is given."""

@@ -256,7 +256,7 @@ class Renderer:
         """Return a template with operands as strongly bound as their places need."""
         binds, infix = binding(template), bool(INFIX.match(template))
         args = list(value.args)
-        if infix and self.dialect.widens:  # a language with such operators widens a single value by itself
+        if infix:  # a language with such operators widens a single value by itself
             single = [a.args[0] if a.op == "splat" and a.type.dtype != "bool" else a for a in args]
             args = single if any(a.type.lanes > 1 for a in single) else args
         texts = [self.text(a, place) for a, place in zip(args, self._places(template, value), strict=False)]

@@ -7,7 +7,7 @@ interleaved. Sizes are in a uniform block. Translators make SPIR-V, HLSL and Met
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import PORTABLE, VULKAN_EXTENSION, VULKAN_GROUP
@@ -41,9 +41,18 @@ GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil(he
 
 
 class Declared(Buffers):
-    """Languages whose buffers are declared with numbers, above a function without arguments."""
+    """Languages whose buffers are declared with numbers, above a function without arguments.
+
+    `integers_block`: the lines before, of and after the integers; `uniform`, `storage`: an array of weights
+    in a uniform block and any other; `accesses`: the words of one that is read, and of one that is written.
+    """
 
     numbered = True
+    group_size: Sequence[int | str] = GROUP
+    integers_block: tuple[str, str, str]
+    uniform: str
+    storage: str
+    accesses: tuple[str, str]
     group = (8, 8)
     largest_shared = LEAST_SHARED
     launches = (
@@ -57,9 +66,18 @@ class Declared(Buffers):
     max_output_channels = 2**16
     pixel, weight, store = C.pixel, C.weight, C.store
 
-    @abstractmethod
     def declared(self, kernel: Interface) -> list[str]:
-        """Return the declarations of the integers and of all arrays."""
+        """Return the declarations of the integers and of all arrays; naga knows none that is only written."""
+        numbers, (opened, field, closed) = kernel.numbers(), self.integers_block
+        fields = [field.format(self.typed(name)) for name in kernel.integers]
+        lines = [opened.format(*self.group_size), *fields, closed]
+        for array in kernel.by_number():
+            name, kind = self.element(array)
+            block = f"{array.name[0].upper()}{array.name[1:]}"
+            shown = {"number": numbers[array.name], "block": block, "name": name, "kind": kind}
+            form = self.uniform if array.home == BLOCK else self.storage
+            lines.append(form.format(access=self.accesses[array.access != READ], array=array, **shown))
+        return lines
 
     def element(self, array: Array) -> tuple[str, str]:
         """Return an array's name in the kernel, and the type of its elements."""
@@ -94,7 +112,14 @@ class Vulkan(Declared):
     qualifiers = GLSL.qualifiers
     table = GLSL.table
     operations = GLSL.operations
-    group_size: tuple[int | str, int | str] = GROUP
+    integers_block = (
+        "layout(local_size_x = {0}, local_size_y = {1}) in;\nlayout(std140, binding = 0) uniform Size {{",
+        "    {0};",
+        "};",
+    )
+    uniform = "layout(std140, binding = {number}) uniform {block} {{ vec4 {name}[{array.quads}]; }};"
+    storage = "layout(std430, binding = {number}) restrict {access}buffer {block} {{ {kind} {name}[]; }};"
+    accesses = ("readonly ", "")
     grouped = {"group_size": ("GROUP_WIDTH", "GROUP_HEIGHT")}
     staged = True
     launching = {"group_size": (ITEMS, 1)}
@@ -110,26 +135,6 @@ class Vulkan(Declared):
     instructions = VULKAN_GROUP
     vector_kinds = GLSL.vector_kinds
     item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
-
-    def declared(self, kernel: Interface) -> list[str]:
-        """Return the declarations of a group's size, of the integers and of all arrays."""
-        numbers = kernel.numbers()
-        return [
-            f"layout(local_size_x = {self.group_size[0]}, local_size_y = {self.group_size[1]}) in;",
-            "layout(std140, binding = 0) uniform Size {",
-            *(f"    {self.typed(name)};" for name in kernel.integers),
-            "};",
-            *(self.storage(array, numbers[array.name]) for array in kernel.by_number()),
-        ]
-
-    def storage(self, array: Array, number: int) -> str:
-        """Return the declaration of an array; naga knows none that is only written."""
-        name, kind = self.element(array)
-        block = f"{array.name[0].upper()}{array.name[1:]}"
-        if array.home == BLOCK:
-            return f"layout(std140, binding = {number}) uniform {block} {{ vec4 {name}[{array.quads}]; }};"
-        access = "readonly " if array.access == READ else ""
-        return f"layout(std430, binding = {number}) restrict {access}buffer {block} {{ {kind} {name}[]; }};"
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

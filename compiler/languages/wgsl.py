@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.instructions import WGSL_GROUP
-from ..kernel.interface import BLOCK, ITEMS, READ, UNSIGNED, Array, Interface
+from ..kernel.interface import ITEMS, UNSIGNED, Interface
 from .dialect import Dialect
 from .glsl_buffers import GROUP, Declared
 
@@ -31,6 +31,10 @@ class WGSL(Declared):
     native_sine = SineContract("sin() of WGSL, which promises 2^-11 on [-pi, pi] alone, absolutely", None)
     assumes = ASSUMES
     group_size = f"@compute @workgroup_size({GROUP[0]}, {GROUP[1]})"
+    integers_block = ("struct Size {{", "    {0},", "}\n@group(0) @binding(0) var<uniform> size: Size;")
+    uniform = "@group(0) @binding({number}) var<uniform> {name}: array<vec4<f32>, {array.quads}>;"
+    storage = "@group(0) @binding({number}) var<storage, {access}> {name}: array<{kind}>;"
+    accesses = ("read", "read_write")
     places = "@builtin(global_invocation_id) invocation: vec3<u32>"
     grouped = {
         "group_size": "@compute @workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)",
@@ -69,24 +73,9 @@ class WGSL(Declared):
         "select": "select({2}, {1}, {0})",
     }
 
-    def declared(self, kernel: Interface) -> list[str]:
-        """Return the declarations of the integers and of all arrays."""
-        numbers = kernel.numbers()
-        return [
-            "struct Size {",
-            *(f"    {name}: {'u32' if name in UNSIGNED else 'i32'}," for name in kernel.integers),
-            "}",
-            "@group(0) @binding(0) var<uniform> size: Size;",
-            *(self.storage(array, numbers[array.name]) for array in kernel.by_number()),
-        ]
-
-    def storage(self, array: Array, number: int) -> str:
-        """Return the declaration of an array."""
-        name, kind = self.element(array)
-        if array.home == BLOCK:
-            return f"@group(0) @binding({number}) var<uniform> {name}: array<vec4<f32>, {array.quads}>;"
-        access = "read" if array.access == READ else "read_write"
-        return f"@group(0) @binding({number}) var<storage, {access}> {name}: array<{kind}>;"
+    def typed(self, name: str) -> str:
+        """Return the declaration of an integer, without what ends it."""
+        return f"{name}: {'u32' if name in UNSIGNED else 'i32'}"
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

@@ -147,10 +147,8 @@ class Memory:
             return
         if self.space in ("group", "device", "result"):
             self._writes(items, place, count)
-        active = np.flatnonzero(items.mask)
-        each = np.broadcast_to(spread(place, count), (count, items.count))[:, active]
-        columns = np.broadcast_to(self.columns(items), (items.count,))[active]
-        self.data[each, columns] = value[:, active]
+        each, columns, _ = self._used(items, place, count)
+        self.data[each, columns] = value[:, items.mask]
         assert self.written is not None, "what is only read is not written"
         self.written[each, columns] = True
 

@@ -103,6 +103,10 @@ def includes(role: str, *names: str) -> list[str]:
     return [f"#ifndef {guard}", f"#define {guard}", *(f"#include <{name}.h>" for name in names), RESTRICT]
 
 
+Two = tuple[str, str]
+"""What is said of columns, and of rows."""
+
+
 class C(Arguments):
     """The dialect's table; `steps` move to the pixel of the next call, along a row and down."""
 
@@ -204,7 +208,8 @@ class C(Arguments):
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the functions: of paths one for some pixels, and one that calls it for all."""
-        return self._of_paths(kernel)
+        said = "Pixels of row first_row + `row` from column `column` on: WAMNET_PATHS, or fewer at its end."
+        return self.functions(kernel, said, kernel.place, ("column += WAMNET_PATHS", "++row"))
 
     def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
         """Return the lines of a kernel that is data, up to its first statement."""
@@ -229,27 +234,30 @@ class C(Arguments):
                 "written\n   to `result`, the whole image's array."
             )
         unused = "    (void)weights;" if interface.named("weights") else ""
-        return [*top, *self.functions(interface, said, kernel), unused, *self.strides(interface)]
-
-    def functions(self, interface: Interface, said: str, kernel: Kernel) -> list[str]:
-        """Return the function of all pixels, and the head of that of a work item's."""
         along, down = (self.step(each).removeprefix(" * ") for each in kernel.step)
         steps = (f"x += {along}" if along else "++x", f"y += {down}" if down else "++y")
-        listed, denoises = super().listed(interface), interface.role == DENOISE
-        name = f"{self.entries[interface.role].removesuffix('_pixel')}_pixel"
-        one = self.signature(name, [*listed, *(f"int {place}" for place in kernel.place)])
-        given = ", ".join([*(array.name for array in interface.arrays), *interface.integers, "x", "y"])
-        call = loops(("x", "y"), ("width", "height"), steps, f"{name}({given});")
-        every = self.signature("wamnet_image" if denoises else name.removesuffix("_pixel"), listed)
-        limit = [CLAMP.replace(C.clamp, self.clamp)] if denoises or "clamp" in operations(kernel) else []
-        return self.around(said, one, every, call, *limit)
+        clamps = interface.role == DENOISE or "clamp" in operations(kernel)
+        limit = CLAMP.replace(C.clamp, self.clamp) if clamps else ""
+        functions_of = self.functions(interface, said, kernel.place, steps, limit)
+        return [*top, *functions_of, unused, *self.strides(interface)]
 
-    def around(
-        self, said: str, one: Sequence[str], all_pixels: Sequence[str], calls: Sequence[str], *more: str
-    ) -> list[str]:
-        """Return the function of all pixels, `more` functions, and the head of the function that it calls."""
+    def listed(self, kernel: Interface) -> list[str]:
+        """Return all arguments: the integers of a path kernel are in one structure."""
+        if kernel.role != PATH:
+            return super().listed(kernel)
+        return ["const wamnet_part *part", *map(self.array_argument, kernel.arrays)]
+
+    def functions(self, kernel: Interface, said: str, item: Two, steps: Two, limit: str = "") -> list[str]:
+        """Return the function of all pixels, and the head of that of a work item's, which has its place."""
+        name, listed = f"{self.entries[kernel.role].removesuffix('_pixel')}_pixel", self.listed(kernel)
+        given = ", ".join([*(each.split()[-1].lstrip("*") for each in listed), *kernel.place])
+        ends = self.integer(kernel, "width"), self.integer(kernel, kernel.rows)
+        call = loops(kernel.place, ends, steps, f"{name}({given});")
+        all_pixels = "wamnet_image" if kernel.role == DENOISE else name.removesuffix("_pixel")
+        one = self.function(name, [*listed, *(f"int {place}" for place in item)])
         declared = [f"/* {said} */", *one[:-1], f"{one[-1]};", "", ALL_PIXELS]
-        return [*declared, *all_pixels, "{", *calls, "}", "", *more, *one, "{"]
+        every = [*self.function(all_pixels, listed), "{", *call, "}", ""]
+        return [*declared, *every, *([limit] if limit else []), *one, "{"]
 
     def launch(self, kernel: Kernel) -> str:
         """Return which function does what, and what a denoiser takes of the stack."""
@@ -286,22 +294,6 @@ class C(Arguments):
             return f"wamnet_all({kind}, {MASKS.get(values[0], values[0])})"
         return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
 
-    def _of_paths(self, kernel: Interface) -> list[str]:
-        """Return the functions of a path kernel up to the statements of a pixel."""
-        name = self.entries[PATH]
-        listed = ", ".join(["const wamnet_part *part", *map(self.array_argument, kernel.arrays)])
-        given = ", ".join(["part", *(array.name for array in kernel.arrays), "column", "row"])
-        one = f"{self.heading.format(entry=name)}({listed}, int column, int row)"
-        said = "Pixels of row first_row + `row` from column `column` on: WAMNET_PATHS, or fewer at its end."
-        ends, steps = ("part->width", "part->rows"), ("column += WAMNET_PATHS", "++row")
-        calls = loops(("column", "row"), ends, steps, f"{name}({given});")
-        return self.around(said, [one], [f"{self.heading.format(entry='wamnet_trace')}({listed})"], calls)
-
-    def signature(self, name: str, listed: Sequence[str]) -> list[str]:
-        """Return the lines of a function's head."""
-        inside = ",\n".join(f"    {each}" for each in listed)
-        return [f"{self.heading.format(entry=name)}(", f"{inside})"]
-
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the functions have the place of a pixel already."""
         return [
@@ -317,10 +309,6 @@ class C(Arguments):
             return super().written(array, index, value, lanes)
         step = 1 if array.planes else array.shape[-1]
         return f"wamnet_write(&{self.read(array, index, lanes)}, {step}, {value}, left);"
-
-
-Two = tuple[str, str]
-"""What is said of columns, and of rows."""
 
 
 def loops(places: Two, ends: Two, steps: Two, call: str) -> list[str]:

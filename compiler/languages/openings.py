@@ -185,12 +185,12 @@ class Arguments(Buffers):
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""
-        return self.function(self.entries[kernel.role], kernel)
+        return [*self.function(self.entries[kernel.role], self.listed(kernel)), "{"]
 
-    def function(self, entry: str, kernel: Interface) -> list[str]:
-        """Return the lines of a function of these arguments up to its brace."""
-        listed = ",\n".join(f"    {each}" for each in self.listed(kernel))
-        return [f"{self.heading.format(entry=entry)}(", f"{listed})", "{"]
+    def function(self, entry: str, listed: Sequence[str]) -> list[str]:
+        """Return the lines of a function's head."""
+        inside = ",\n".join(f"    {each}" for each in listed)
+        return [f"{self.heading.format(entry=entry)}(", f"{inside})"]
 
     def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch, which is a function; items beyond the grid end."""
@@ -199,7 +199,8 @@ class Arguments(Buffers):
         places = [*zip(launch.place, self.item, counts, strict=False)]
         outside = " || ".join(f"{place} >= {count}" for place, _, count in places)
         return [
-            *self.function(f"wamnet_{launch.name}", kernel.interface_of(launch)),
+            *self.function(f"wamnet_{launch.name}", self.listed(kernel.interface_of(launch))),
+            "{",
             *(f"    {self.index(place, self.cast('int32', item))}" for place, item, _ in places),
             *(f"    if ({outside}) {{", "        return;", "    }"),
         ]

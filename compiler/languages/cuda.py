@@ -88,9 +88,12 @@ class CUDA(Arguments):
         """Return the lines above the function."""
         if kernel.role != DENOISE:
             return super().top(kernel, parts)
-        vectors = parts.kernel is not None and parts.kernel.weights.lanes > 1
-        words = parts.kernel is not None and parts.kernel.weights.dtype == "int32"
-        top = [CLAMP, *([CUDA_VECTOR] if vectors else []), *([CUDA_GROUP] if words else [])]
+        weights = parts.kernel.weights
+        top = [
+            CLAMP,
+            CUDA_VECTOR if weights.lanes > 1 else "",
+            CUDA_GROUP if weights.dtype == "int32" else "",
+        ]
         return ["".join(top) + "\n".join(super().top(kernel, parts))]
 
     def vector_kind(self, dtype: str, lanes: int) -> str:

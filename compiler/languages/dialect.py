@@ -71,9 +71,9 @@ class Parts:
     the order of operations.
     """
 
-    top: str = ""
-    bounded: bool = False
-    kernel: Kernel | None = None
+    top: str
+    bounded: bool
+    kernel: Kernel
 
 
 class Dialect:

@@ -263,7 +263,6 @@ class GLSLCompute(GLSL):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a shader up to its first statement."""
-        assert parts.kernel is not None, "compute shaders are kernels as data"
         staged = bool(parts.kernel.launches)
         across, down = ("ITEMS", 1) if staged else ("GROUP_WIDTH", "GROUP_HEIGHT")
         device = [s for s in parts.kernel.body if isinstance(s, Array) and s.space == "device"]

@@ -90,9 +90,8 @@ class Declared(Buffers):
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
         above = [] if kernel.role == ENCODE else [parts.top]
-        shared = self.group_memory(parts.kernel) if parts.kernel else []
-        words = parts.kernel is not None and parts.kernel.weights.dtype == "int32"
-        return [*above, *self.declared(kernel), *shared, "", *([self.instructions] if words else [])]
+        words = [self.instructions] if parts.kernel.weights.dtype == "int32" else []
+        return [*above, *self.declared(kernel), *self.group_memory(parts.kernel), "", *words]
 
     def in_function(self, kernel: Kernel) -> list[str]:
         """Return nothing: a group's memory is declared above."""

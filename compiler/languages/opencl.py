@@ -156,18 +156,16 @@ class OpenCL(Arguments):
 
     def top(self, kernel: Interface, parts: Parts) -> list[str]:
         """Return the lines above the function."""
-        if parts.kernel is not None and parts.kernel.weights.lanes > 1:
-            named = super().top(kernel, parts)
-            if parts.kernel.weights.dtype != "int32":
-                return [BUILTINS, *named]
-            if parts.kernel.group:
-                return [BUILTINS, OPENCL_GROUP, *named]
-            # Which instruction there is depends on LANES.
-            return [BUILTINS, *named, OPENCL_TILE.replace("int16", f"int{parts.kernel.weights.lanes}")]
-        if kernel.role != PATH:
-            return super().top(kernel, parts)
-        painter = [PAINTER.format(lanes=self.lanes)] if kernel.images and self.lanes > 1 else []
-        return [f"#define LANES {self.lanes}", *super().top(kernel, parts), *painter]
+        named, weights = super().top(kernel, parts), parts.kernel.weights
+        if kernel.role == PATH:
+            painter = [PAINTER.format(lanes=self.lanes)] if kernel.images and self.lanes > 1 else []
+            return [f"#define LANES {self.lanes}", *named, *painter]
+        if weights.lanes == 1:
+            return named
+        if weights.dtype != "int32" or parts.kernel.group:
+            return [BUILTINS, *([OPENCL_GROUP] if weights.dtype == "int32" else []), *named]
+        # Which instruction there is depends on LANES.
+        return [BUILTINS, *named, OPENCL_TILE.replace("int16", f"int{weights.lanes}")]
 
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: 16 lanes have operators in place of functions."""

@@ -34,7 +34,7 @@ class Buffers(Dialect):
 
     def begin(self, kernel: Interface, parts: Parts) -> str:
         """Return the text of a kernel up to its first statement."""
-        if parts.kernel is not None and kernel.role != PATH:
+        if kernel.role != PATH:
             return "\n".join(self.of_kernel(kernel, parts, parts.kernel))
         return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
 

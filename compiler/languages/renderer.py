@@ -124,7 +124,7 @@ class Renderer:
         self.body(kernel.body)
         above = [*map(self.constant, kernel.constants), *self.tables(), *self.readers, *self.helpers()]
         top = "\n".join([*above, *functions])
-        begin = dialect.begin(kernel.interface, Parts(top, self.bounded, kernel=kernel))
+        begin = dialect.begin(kernel.interface, Parts(top, self.bounded, kernel))
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         end = ["#endif"] if dialect.staged else []
         end = end if kernel.launches else [dialect.ends[kernel.interface.role]]

@@ -13,7 +13,7 @@ The layout of the weights belongs to the schedule: kernels walk through them in 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -503,16 +503,15 @@ class Pick:
 
     schedule: Schedule
     asked: str
-    extent: tuple[int, int]
+    program: Program
     reason: str = ""
-    details: Mapping[str, Any] = field(default_factory=dict)
 
     def manifest(self) -> Mapping[str, Any]:
         """Return what a manifest says about it."""
-        columns, rows = self.extent
+        columns, rows = self.schedule.extent(self.program)
         found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": columns}
         found = {**found, "rows": rows} if rows > 1 else found
-        found |= self.details
+        found |= self.schedule.details(self.program)
         return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
 
 
@@ -529,4 +528,4 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
         raise CompileError(
             f"no schedule of this target can run the program: {reason}; compile for another target"
         )
-    return Pick(chosen, name, chosen.extent(program), first, chosen.details(program))
+    return Pick(chosen, name, program, first)

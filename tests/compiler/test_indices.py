@@ -96,4 +96,4 @@ def test_no_index_leaves_32_bits(target, schedule):
 
 
 def test_texts_say_the_limit():
-    assert "fewer than 2^31 numbers" in compile_program(lower(tiny_model()), "c", "ieee").source
+    assert "fewer than 2^31 floats an image" in compile_program(lower(tiny_model()), "c", "ieee").source

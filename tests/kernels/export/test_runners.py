@@ -5,7 +5,8 @@ A runner whose tools are missing skips its tests and says so; `make test` names 
 
 from __future__ import annotations
 
-from dataclasses import replace
+import subprocess
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.export import check, targets
+from wamnet.kernels.export import check, targets, tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
@@ -230,3 +231,49 @@ def test_every_exported_language_has_a_runner():
     assert {name for name, row in LANGUAGES.items() if not row.runs and ":" not in name} - {
         "shadertoy"
     } <= held
+
+
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+"""Any access outside an array and any undefined operation ends the program."""
+
+MAIN = """
+#include <stdio.h>
+#include "path.h"
+#include "encode.h"
+
+static float sums[{sums}], color[{color}], normal[{color}];
+
+int main(void)
+{{
+    const wamnet_part part = {{{width}, {height}, {first_row}, {rows}, 0u, 1, 7u}};
+    wamnet_trace(&part, sums);
+    wamnet_encode(sums, color, normal, {width}, {rows}, 1);
+    for (int i = 0; i < {color}; ++i) {{
+        printf("%a\\n", (double)color[i]);
+    }}
+    return 0;
+}}
+"""
+"""A program that has both headers pasted in, with arrays that are just large enough."""
+
+
+@pytest.mark.nightly
+def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
+    programs, part, sums = traced
+    encoder = compile_encode(FEATURES, Normalization(), "c")
+    (tmp_path / "path.h").write_text(compile_path(programs, "c", groups=layers_of(FEATURES)).source)
+    (tmp_path / "encode.h").write_text(encoder.source)
+    sizes = {"sums": sums.size, "color": 3 * part.width * part.rows, **asdict(part)}
+    (tmp_path / "main.c").write_text(MAIN.format(**sizes))
+    try:
+        options = ["-std=c99", "-O1", "-g", *targets.WARNINGS[1:-1], *SANITIZERS]
+        tools.run("cc", *options, "-o", "main", "main.c", "-lm", folder=tmp_path)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    found = np.array([float.fromhex(line) for line in printed.split()]).reshape(part.rows, part.width, 3)
+    bound = error_at(encoder, dict(zip(encoder.planes, sums, strict=True)), 1)["color"]
+    color = np.moveaxis(sums[:3], 0, -1).astype(np.float64)
+    held = encode_sums({"color": color}, 1.0, ("color",), Normalization())["color"]
+    # The compiler keeps the interpreter's order of operations, without contraction: the sums are its bits.
+    assert (np.abs(found - held) <= bound).all()

@@ -241,12 +241,15 @@ class Cells:
 
         at = rows[keep], columns[keep]
         where, new = own(np.broadcast_to(mask, (len(mask), turns.count))), own(shape)
-        really = where if others is None else where & ~own(np.broadcast_to(others, mask.shape))
-        whole, fresh = where.all(axis=1), self.state[at] != WIDE
+        later = np.zeros_like(where) if others is None else own(np.broadcast_to(others, mask.shape))
+        really, whole, fresh = where & ~later, where.all(axis=1), self.state[at] != WIDE
         if (fresh & ~whole).any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
         if (~whole[:, None] & where & (self.wide[at] != new)).any():
             raise Wrong(f"{self.name} has another number far from borders than near them")
+        # Two conditions on borders of two axes leave out a corner that no lane has.
+        if (~whole[:, None] & ~(really | later | self.written[at])).any():
+            raise Wrong(f"{self.name} is written by several conditions on borders")
         self.wide[at] = np.where(whole[:, None], new, self.wide[at])
         self.state[at], self.lanes[at] = WIDE, 0
         self.written[at] = really | (self.written[at] & ~whole[:, None])

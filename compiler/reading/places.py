@@ -82,7 +82,8 @@ class Place:
             large = np.abs(found.values) > lanes.most[:, None]
             if (large if mask is None else large & mask).any():
                 raise Wrong("an integer is larger than an index of an image")
-        if (np.abs(found.form) > lanes.channels).any():
+        own, extent = found.form  # of a coordinate from 0 to the extent
+        if (np.maximum(np.maximum(abs(own), abs(extent)), abs(own + extent)) > lanes.channels).any():
             raise Wrong("a coordinate is multiplied by more than the channels of an image")
         return found
 

@@ -249,6 +249,8 @@ class Trial(Values):
             raise Wrong(f"the loop over {statement.name} has a step that is not positive")
         if type(start) is type(count) is int and statement.until is None:
             turns = range(start, count, step)
+            for last in turns[-1:]:
+                self._of_indices("add", last, step)
             together = 1 < len(turns) <= LARGEST // (self.lanes.count * self.turns.count)
             key = id(statement), self.turns.count
             together = together and self.turns.count < TOGETHER and self.apart[key] < TRIES

@@ -72,6 +72,7 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
         ("i < 3; ++i) {\n        result", "i < 2; ++i) {\n        result", "without a result"),
         ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
         ("* 3 + c]", "* 2 + c]", "two numbers of channels"),
+        ("bool inside = row", "bool inside = x * 3 + width >= x * 3 + 1 && row", "more than the channels"),
     ],
 )
 def test_faults_are_named(plain, old, new, why):
@@ -180,8 +181,27 @@ def test_sums_do_not_depend_on_their_order():
     assert np.array_equal(one.value, other.value)
 
 
+def test_a_counter_that_leaves_32_bits_is_refused(plain):
+    """Behind the last turn: 2147483646 + 2."""
+    pattern = r"int i = 0; i < 3; \+\+i\) \{(\s+result\[.* \+ )i\] = (v\d+)\[i\]"
+    turn = "(i - 2147483642) / 2"
+    new = rf"int i = 2147483642; i < 2147483647; i += 2) {{\g<1>{turn}] = \g<2>[{turn}]"
+    old = re.search(pattern, plain[0])[0]
+    with pytest.raises(Refused, match="leaves 32 bits"):
+        run_text(*changed(plain, old, re.sub(pattern, new, old)))
+
+
+def test_two_conditions_on_borders_do_not_make_up_for_each_other(tile):
+    """A tile near both borders, which none of the lanes is, would be left without its numbers."""
+    (copy,) = re.findall(r"patch_color\[[^;]*= image_color\[\(row \* width \+ left\)[^;]*;", tile[0])
+    wrong = f"if (top >= 1) {{ {copy} }} if (left + PATCH_WIDTH < width) {{ {copy} }}"
+    with pytest.raises(Refused, match="patch_color is written by several conditions on borders"):
+        run_text(*changed(tile, copy, wrong))
+
+
 def test_lanes_decide_what_may_be_compared():
     lanes = lanes_for((4, 2), 1, seed=1)
+    lanes.channels = 2
     x, width, y = (Place.of(lanes, axis) for axis in (0, 1, 2))
 
     def less(a, b):

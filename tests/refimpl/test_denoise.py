@@ -75,7 +75,7 @@ def test_result_is_clipped() -> None:
 
 
 def test_missing_layer_is_named() -> None:
-    with pytest.raises(InputError, match="feature 'normal': layers of the frame 'color"):
+    with pytest.raises(InputError, match="layers of the frame 'color': layer 'normal' is missing"):
         denoise.denoise(model_of(), Frame({"color": np.zeros((2, 2, 3))}))
 
 

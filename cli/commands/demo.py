@@ -102,7 +102,7 @@ def demo(
         "--quick  Use tiny frames, as a quick check that everything works (one to two minutes).", False
     ),
 ) -> None:
-    """Render, train, compile, denoise unseen frames and write a report, in about five minutes.
+    """Render, train, compile, denoise unseen frames and write a report, in about six minutes.
 
     Then open FOLDER/report.html. After Ctrl-C, the same command resumes where it stopped.
 

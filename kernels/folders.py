@@ -17,7 +17,6 @@ import logging
 import os
 import re
 import stat
-import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
@@ -123,8 +122,7 @@ def new_temporary(name: str, programs: bool = False) -> tuple[Path, int]:
         raise ExecutorUnavailable(f"TMPDIR is {first}: {rule}; set it to a folder on another file system")
     for left in where.iterdir():
         if TEMPORARY.fullmatch(left.name):
-            with suppress(OSError):
-                _remove_left(left)
+            _remove_left(left)
     folder = Path(tempfile.mkdtemp(prefix=f"wamnet-{name}.", dir=where))
     lock = _opened(folder)
     fcntl.flock(lock, fcntl.LOCK_EX)
@@ -140,26 +138,57 @@ def discard(folder: Path, lock: int) -> None:
 
 def _remove_left(folder: Path) -> None:
     """Remove a temporary folder of this user whose process has ended."""
-    status = folder.lstat()
-    if status.st_uid != os.geteuid() or time.time() - status.st_mtime < NEW_S:
-        return
-    lock = _opened(folder)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        remove(folder)
-    finally:
-        os.close(lock)
+    with suppress(OSError):
+        status = folder.lstat()
+        if status.st_uid != os.geteuid() or time.time() - status.st_mtime < NEW_S:
+            return
+        lock = _opened(folder)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            remove(folder)
+        finally:
+            os.close(lock)
 
 
 def remove(folder: Path) -> None:
     """Remove a folder and what is in it; no link is followed.
 
-    The programs of the system have no limit of how deep folders are; shutil's recursion has one.
+    Neither the depth of a recursion, nor the length of a path, nor the number of open files limits how deep
+    folders in it are: one is open at a time, and `..` of it is the way back.
     """
-    for command in (("chmod", "-R", "u+rwx"), ("rm", "-rf")):
-        subprocess.run([*command, "--", folder], check=False, stderr=subprocess.DEVNULL)
+    here = _opened(folder)
+    try:
+        above: list[tuple[str, list[str]]] = []
+        inside = _emptied(here)
+        while inside or above:
+            if inside:
+                name = inside.pop()
+                os.chmod(name, 0o700, dir_fd=here)
+                child = _opened(name, here)
+                os.close(here)
+                here = child
+                above.append((name, inside))
+                inside = _emptied(here)
+            else:
+                parent = _opened("..", here)
+                os.close(here)
+                here = parent
+                name, inside = above.pop()
+                os.rmdir(name, dir_fd=here)
+    finally:
+        os.close(here)
+    folder.rmdir()
 
 
-def _opened(folder: Path) -> int:
+def _opened(name: str | Path, inside: int | None = None) -> int:
     """Return a folder, opened; a link to one is an error."""
-    return os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    return os.open(name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=inside)
+
+
+def _emptied(folder: int) -> list[str]:
+    """Remove all but folders from an open folder, and return the folders' names."""
+    entries = list(os.scandir(folder))
+    for entry in entries:
+        if not entry.is_dir(follow_symlinks=False):
+            os.unlink(entry.name, dir_fd=folder)
+    return [entry.name for entry in entries if entry.is_dir(follow_symlinks=False)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import subprocess
@@ -59,6 +60,15 @@ def test_whatever_is_in_a_folder_goes_and_nothing_else(tree) -> None:
         grow(inside / "tree", tree, outside)
         folders.remove(inside)
         assert [*Path(around).rglob("*")] == [outside, outside / "kept"]
+
+
+@pytest.mark.needs("programs")
+def test_folders_deeper_than_recursion_and_paths_go(tmp_path) -> None:
+    """shutil.rmtree ended in a RecursionError here, with a renderer's report lost."""
+    code = "import os\nfor _ in range(1500): os.mkdir('deep'); os.chdir('deep')"
+    with folders.temporary("test") as folder:
+        subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
+    assert not folder.exists()
 
 
 def test_a_temporary_folder_may_be_gone_at_its_end() -> None:
@@ -163,3 +173,21 @@ def test_programs_are_built_where_they_run(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(folders, "runs_programs", lambda path: False)
     with pytest.raises(ExecutorUnavailable, match=r"TMPDIR is .*noexec.*set it to a folder on another"):
         folders.new_temporary("test", programs=True)
+
+
+@pytest.mark.needs("programs")
+def test_a_file_system_without_programs_is_noticed(tmp_path) -> None:
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "noexec", "tmpfs", tmp_path], capture_output=True, check=False
+    )
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted: {done.stderr.decode(errors='replace').strip()}")
+    try:
+        assert not folders.runs_programs(tmp_path / "not" / "there")
+        (tmp_path / "run").write_text("#!/bin/sh\n")
+        (tmp_path / "run").chmod(0o755)
+        with pytest.raises(OSError, match="Permission") as raised:
+            subprocess.run([tmp_path / "run"], check=False)
+        assert raised.value.errno == errno.EACCES
+    finally:
+        subprocess.run(["umount", tmp_path], check=True)

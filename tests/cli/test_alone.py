@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from wamnet.cli.files.alone import LOCK, alone_in, signals_wait
+from wamnet.cli.files.alone import BESIDE, LOCK, alone_at, alone_in, signals_wait
 from wamnet.refimpl.errors import InputError
 
 HOLD = (
@@ -75,3 +75,29 @@ def test_signals_wait_until_the_block_has_ended() -> None:
         block()
     assert done == [1]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_locks_of_two_files_are_two(tmp_path) -> None:
+    """Names of any length have one."""
+    one, two = tmp_path / ("a" * 255), tmp_path / "b"
+    with alone_at(one, "writing"), alone_at(two, "writing"):
+        assert all(path.name.startswith(BESIDE) for path in tmp_path.iterdir())
+        with pytest.raises(InputError, match=r"output file '.*b': another process is writing there"):
+            alone_at(two, "writing").__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_while_the_lock_is_taken_leaves_no_file(tmp_path, monkeypatch) -> None:
+    """It came between the making of the file and its locking, and left the file."""
+    real = os.open
+
+    def interrupted(*arguments: object) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return real(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "open", interrupted)
+        lock = alone_in(tmp_path, "painting")
+        with pytest.raises(KeyboardInterrupt):
+            lock.__enter__()
+    assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,10 @@
 """Tests of `wamnet animate`: what the pictures show, films that can be read, resuming, refusals."""
 
+import os
 import shutil
+import struct
 import subprocess
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +15,7 @@ from wamnet.cli.commands import animate
 from wamnet.cli.common.inputs import learned_scene
 from wamnet.cli.files import images
 from wamnet.cli.files.images import LABEL_PX, read_png
+from wamnet.kernels.run.render_frame import render_frame
 from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
@@ -19,6 +23,7 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light import history
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
+from wamnet.refimpl.light.variation import Ranges, Variation, varied
 from wamnet.refimpl.network import factored, siren
 from wamnet.refimpl.network.dataset import Normalization, Window, n_inputs
 from wamnet.refimpl.network.denoise import Model, denoise, learned_feature_spp
@@ -265,3 +270,69 @@ def test_without_the_package(refused, monkeypatch) -> None:
     """The usual line, before the work."""
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     assert "install it: pip install 'wamnet[full]'" in refused("animate", "m.safetensors", "-o", "a.mp4")
+
+
+def test_a_network_that_sees_the_sun_gets_it(wamnet, tmp_path, monkeypatch, executor_named) -> None:
+    """Rendered and denoised apart, although one device could do both: its path kernel knows no sun."""
+    executor_named("opencl")
+    features, window = ("color", "sun"), Window(2)
+    network = siren.init((n_inputs(features, window), 4, 3), 1.0, 1.0, 0)
+    save_model(tmp_path / "sun.safetensors", Model(network, features, window, Normalization()))
+    monkeypatch.setattr(animate, "draw_frames", None)
+    film = ("--scene", "daylight", "--seconds", 0.1, "--fps", 10, "--size", 13)
+    by = ("--executor", "opencl", "--renderer", "opencl")
+    assert wamnet("animate", "sun.safetensors", *film, *by, "-o", "day").status == 0
+    scene = canonical("daylight")
+    whole = render_frame("opencl", scene, Job(13, 13)).frame
+    got = read_png(tmp_path / "day" / "00000.png")[LABEL_PX:-1, 13:26]
+    # As for the history above.
+    assert np.abs(got - denoise(load_model(tmp_path / "sun.safetensors"), whole)).max() <= 1.0 / 255
+    text = "features 'sun': a path kernel knows what a pixel's paths meet, not where the sun is"
+    assert text in wamnet("view", "sun.safetensors", "--scene", "daylight", "-o", "page.html").err
+
+
+def test_pictures_outside_of_the_ranges_are_told(wamnet, tmp_path) -> None:
+    """How many, and what of the first: here of time, and of all from another side."""
+    network = load_model(tmp_path / "m.safetensors")
+    learned = {"trained_on_scene": "minicubes", "trained_on_ranges": Ranges((0.0, 0.1)).to_json()}
+    save_model(tmp_path / "n.safetensors", replace(network, info=learned))
+    begin, unlike = "outside the training ranges: ", "frames differ from the training frames: "
+    outcome = wamnet("animate", "n.safetensors", *SHORT, "-o", "a")
+    assert f"a: 1 of 2 {unlike}{begin}the time is 0.2 s (learned: 0 s to 0.1 s); expect" in outcome.out
+    outcome = wamnet("animate", "n.safetensors", *SHORT, "--yaw", 5, "--light", "1=1,0,0", "-o", "b")
+    told = "the camera's yaw is 5° (learned: 0° to 0°), lamp 1 has another colour (learned: its own)"
+    assert f"b: 2 of 2 {unlike}{begin}{told}; expect errors\n" in outcome.out
+    assert "unlike" not in wamnet("animate", "m.safetensors", *SHORT, "--yaw", 5, "-o", "c").out
+    noisy = render(varied(canonical("minicubes"), Variation(yaw_deg=5.0)), Job(13, 13)).frame
+    got = read_png(tmp_path / "c/00000.png")[LABEL_PX:-1, :13]
+    # Half a level of 8 bits, and float32's rounding of sums below 256.
+    assert np.abs(got - encoding.to_display(noisy["color"])).max() <= 0.5 / 255 + 256 * 2.0**-23
+
+
+def test_what_a_killed_run_leaves_is_removed(wamnet, tmp_path) -> None:
+    """The unfinished picture and the lock; another hidden file stays, as does a link of such a name."""
+    (tmp_path / "a").mkdir()
+    for name in (".wamnet-0123456789abcdef.png", ".kept", ".lock"):
+        (tmp_path / "a" / name).write_text("")
+    link = ".wamnet-fedcba9876543210.png"
+    (tmp_path / "a" / link).symlink_to("00000.png")
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
+    found = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert found == [".kept", link, "00000.png", "00001.png"]
+
+
+def test_a_pipe_or_a_bomb_in_the_place_of_a_picture(wamnet, refused, tmp_path) -> None:
+    """A pipe was waited for; a header of 60,000 x 60,000 pixels was a traceback of Pillow's."""
+    (tmp_path / "a").mkdir()
+    os.mkfifo(tmp_path / "a/00000.png")
+    assert "is a pipe or a device, not a regular file" in refused(
+        "animate", "m.safetensors", *SHORT, "-o", "a"
+    )
+    (tmp_path / "a/00000.png").unlink()
+    Image.new("RGB", (2, 2)).save(tmp_path / "a/00000.png")
+    content = bytearray((tmp_path / "a/00000.png").read_bytes())
+    content[16:24] = struct.pack(">II", 60_000, 60_000)
+    content[29:33] = struct.pack(">I", zlib.crc32(bytes(content[12:29])))
+    (tmp_path / "a/00000.png").write_bytes(content)
+    assert wamnet("animate", "m.safetensors", *SHORT, "-o", "a").status == 0
+    assert read_png(tmp_path / "a/00000.png").shape[0] < 100

@@ -172,3 +172,17 @@ def test_a_variant_has_a_certificate_or_says_why_not(wamnet, samples, tmp_path, 
     assert (said or "") in made.out
     assert ("no certificate" in made.out) == (said is not None)
     assert wamnet("certify", "kernel").status == (2 if said else 0)
+
+
+def test_half_a_file_is_a_bad_file(refused, kernel):
+    path = kernel / "denoise.certificate.json"
+    path.write_bytes(path.read_bytes()[:200])
+    assert "is not acceptable JSON" in refused("certify", path)
+
+
+@pytest.mark.parametrize("size", [None, -1, 1.5, "8", True])
+def test_a_length_is_a_whole_number(refused, kernel, size):
+    path = kernel / "manifest.json"
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps({**manifest, "file_bytes": {**manifest["file_bytes"], "weights.bin": size}}))
+    assert "file_bytes: weights.bin " in refused("certify", kernel)

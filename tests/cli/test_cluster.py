@@ -1,8 +1,12 @@
 """Tests of sharing tasks: here and on real Dask clusters, with a worker killed, and with nobody there."""
 
+import contextlib
+import importlib
 import os
+import signal
 import socket
 import sys
+import time
 import types
 from functools import partial
 from operator import neg
@@ -108,3 +112,72 @@ def test_without_the_package(monkeypatch) -> None:
     text = r"'distributed': missing, and needed .*--workers 1.* \(install it: pip install 'wamnet\[full\]'"
     with pytest.raises(InputError, match=text), cluster.open_client(2, None):
         pass
+
+
+@pytest.mark.nightly
+def test_the_tasks_of_a_lost_worker_are_done_again() -> None:
+    """One of two workers is killed while it has tasks; every task still has its result, once."""
+    results: dict = {}
+    keep = gather(results)
+
+    def slow(task: int) -> int:
+        time.sleep(0.1)
+        return task
+
+    with cluster.open_client(2, None) as client:
+        pids = client.run(os.getpid)
+
+        def kill_first(task, result) -> None:
+            keep(task, result)
+            if len(results) == 1:
+                busy = [worker for worker, tasks in client.processing().items() if tasks]
+                os.kill(pids[busy[0]], signal.SIGKILL)
+
+        cluster.do_on_cluster(client, TASKS, slow, kill_first)
+        assert set(client.run(os.getpid).values()) != set(pids.values())
+    assert results == {task: task for task in TASKS}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_waits_until_workers_have_started(monkeypatch, number) -> None:
+    """SIGTERM meanwhile: a traceback of Dask's at the end of Python, where it closed what was half made."""
+    done = []
+
+    class Half:
+        def __init__(self, **_):
+            signal.raise_signal(number)
+            done.append("started")
+
+        def close(self):
+            done.append("closed")
+
+    def end(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, end)
+    monkeypatch.setattr("distributed.LocalCluster", Half)
+    try:
+        with pytest.raises(KeyboardInterrupt), cluster.open_client(2, None):
+            done.append("works")
+    finally:
+        signal.signal(number, before)
+    assert done == ["started", "closed"]
+
+
+def test_a_worker_that_is_being_started_keeps_no_cluster_open(monkeypatch) -> None:
+    """Dask's assertion and a traceback hid what the command had to say."""
+
+    class Open:
+        def __init__(self, **_):
+            self.status = "running"
+            opened.append(self)
+
+        def close(self):
+            raise AssertionError("Status.init")
+
+    opened: list[Open] = []
+    monkeypatch.setattr("distributed.LocalCluster", Open)
+    monkeypatch.setattr("distributed.Client", contextlib.nullcontext)
+    with pytest.raises(InputError, match="fewer"), cluster.open_client(2, None):
+        raise InputError("cluster", 2, "rule", "use fewer")
+    assert opened[0].status == importlib.import_module("distributed").Status.closed

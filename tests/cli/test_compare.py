@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.files import exr
+from wamnet.cli.files.images import write_png
 from wamnet.kernels.judge import compare_paths
 from wamnet.kernels.judge.compare_paths import QUANTITIES, Unexplained
 from wamnet.refimpl import metrics
@@ -130,3 +131,17 @@ def test_unexplained_components_in_words() -> None:
 def test_refusals_of_paths(refused, arguments, text) -> None:
     """What has no meaning is named, and nothing is left out in silence."""
     assert text in refused("compare", *arguments)
+
+
+def test_identical_and_tiny_pictures(wamnet, tmp_path) -> None:
+    """Infinity and metrics that are not defined are null in JSON, with the reason."""
+    write_png(tmp_path / "a.png", np.full((2, 3, 3), 0.5))
+    outcome = wamnet("compare", "a.png", "a.png", "--json")
+    assert outcome.status == 0
+    data = json.loads(outcome.out)
+    assert data["metrics"]["MSE"] == 0.0
+    assert data["metrics"]["PSNR"] is None
+    assert data["metrics"]["SSIM"] is None
+    assert data["notes"]["PSNR"] == "infinite: no difference"
+    assert data["notes"]["SSIM"].startswith("SSIM needs (height, width, channels) with at least 11 rows")
+    assert "infinite: no difference" in wamnet("compare", "a.png", "a.png").out

@@ -1,8 +1,12 @@
 """Tests of `wamnet dataset`: the same bytes from any number of processes, resumed, and checked."""
 
+import contextlib
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
 from hashlib import sha256
 from pathlib import Path
 
@@ -11,12 +15,12 @@ import pytest
 
 from wamnet import kernels
 from wamnet.cli.common import cluster
-from wamnet.cli.files import exr
+from wamnet.cli.files import dataset_files, exr
 from wamnet.kernels.run import render_frame
 from wamnet.models.data import draws, frame_plan
 from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.frame import SEEN, USUAL
+from wamnet.refimpl.frame import HISTORY, SEEN, USUAL
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scene import from_json, scene_digest
 from wamnet.refimpl.light.scenes import canonical
@@ -286,3 +290,64 @@ def test_another_request_overwrites_nothing(refused, wamnet) -> None:
     wamnet("dataset", *TINY, "-o", "a")
     text = "output folder 'a': holds another data set: seed 0 (now 1) (choose another with -o, or the same"
     assert text in refused("dataset", *TINY, "--seed", 1, "-o", "a")
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("executor", ["opencl", "opengl", "c"])
+def test_kernels_on_a_cluster_give_the_same_bytes(wamnet, executor_named, tmp_path, executor) -> None:
+    """A worker opens a device of its own, in a thread that is not its first one."""
+    executor_named({"opengl": "opengl-egl"}.get(executor, executor))
+    for folder, workers in (("a", 1), ("b", 2)):
+        arguments = ("--executor", executor, "--workers", workers, "-o", folder)
+        assert wamnet("dataset", *TINY, *arguments).status == 0
+    assert content(tmp_path / "a") == content(tmp_path / "b")
+
+
+def test_on_a_running_scheduler(wamnet, tmp_path) -> None:
+    """The same bytes through an address."""
+    assert wamnet("dataset", *TINY, "-o", "one").status == 0
+    with cluster.open_client(1, None) as client:
+        address = client.scheduler.address
+        assert wamnet("dataset", *TINY, "--scheduler", address, "-o", "two").status == 0
+    assert content(tmp_path / "two") == content(tmp_path / "one")
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("sent", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGKILL, 2)])
+def test_an_interrupted_process_is_gone_on_with(wamnet, tmp_path, sent, workers) -> None:
+    """The whole group is interrupted, or only the process killed; nothing that was done is redone."""
+    arguments = [str(a) for a in (*TINY[:-3], 36, "--spp", 64, "-o", "a")]
+    command = [sys.executable, "-m", "wamnet.cli", "dataset", *arguments, "--workers", str(workers)]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:
+        try:
+            journal = tmp_path / "a" / dataset_files.UNFINISHED / dataset_files.JOURNAL
+            for _ in range(600):
+                if journal.exists() and journal.read_text().count("\n") >= 2:
+                    break
+                time.sleep(0.05)
+            assert process.poll() is None
+            (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
+            _, errors = process.communicate(timeout=60)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    if sent == signal.SIGINT:
+        hint = b"wamnet: a: the same command resumes\n"
+        assert (process.returncode, errors) == (130, hint + b"wamnet: interrupted\n")
+    done = list((tmp_path / "a").rglob("0*.exr"))
+    times = {path: path.stat().st_mtime_ns for path in done}
+    assert len(done) >= 2
+    assert wamnet("dataset", *arguments).status == 0
+    assert {path: path.stat().st_mtime_ns for path in done} == times
+    assert wamnet("dataset", *arguments[:-1], "b").status == 0
+    assert content(tmp_path / "a") == content(tmp_path / "b")
+
+
+def test_noisy_pictures_have_the_history_of_those_before(wamnet, tmp_path) -> None:
+    """By the reference here; targets have none."""
+    assert wamnet("dataset", *TINY, "--before", 2, "-o", "film").status == 0
+    noisy, target = (
+        exr.read_frame(tmp_path / f"film/train/00000-{kind}.exr") for kind in ("noisy", "target")
+    )
+    assert [(name in noisy, name in target) for name in HISTORY] == [(True, False)] * len(HISTORY)
+    assert 0.5 < noisy["history_weight"].max() <= 2 / 3  # of three samples: 1 - 1/3

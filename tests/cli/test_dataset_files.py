@@ -311,3 +311,62 @@ def test_a_folder_without_a_manifest(tmp_path) -> None:
     """And the way to one."""
     with pytest.raises(InputError, match=r"has no manifest.json \(make one: wamnet dataset"):
         files.read_manifest(tmp_path)
+
+
+def test_a_picture_of_another_length_is_not_read(tmp_path, monkeypatch) -> None:
+    """DSF-8: nor is one that grows while it is read."""
+    path = tmp_path / "a.exr"
+    path.write_bytes(bytes(5))
+    assert files.sum_of(path, 5) == files.sum_of(path)
+    with path.open("r+b") as file:
+        file.truncate(2**40)
+    assert files.sum_of(path, 5) == files.Sum(2**40, "")
+    found = os.stat_result((0o100644, *[0] * 5, 5, *[0] * 3))
+    monkeypatch.setattr(files.os, "fstat", lambda _handle: found)
+    assert files.sum_of(path, 5).bytes == 2**20
+
+
+def test_layers_of_another_program_are_told_once(tmp_path, monkeypatch) -> None:
+    """`train --dataset` says so as `train -i` does; not for each picture."""
+    make(tmp_path)
+    said: list[str] = []
+    files.read_pairs(tmp_path, tell=said.append)
+    assert said == []
+    monkeypatch.setattr("wamnet.cli.files.exr._attribute_notes", lambda *_: ["color is taken from a, b, c"])
+    pairs = files.read_pairs(tmp_path, tell=said.append)
+    assert said == [f"{tmp_path}, {2 * len(pairs)} of {2 * len(pairs)} images: color is taken from a, b, c"]
+
+
+def test_other_frames_are_refused(tmp_path) -> None:
+    """The scene's digest at a time is not what this version makes of the same request."""
+    make(tmp_path)
+    text = (tmp_path / files.MANIFEST).read_text()
+    digest = json.loads(text)["frames"][0]["scene_digest"]
+    (tmp_path / files.MANIFEST).write_text(text.replace(digest, "0" * 64))
+    with pytest.raises(InputError, match=r"the frames themselves \(now others\)"):
+        make(tmp_path)
+
+
+def test_hidden_files_of_others_stay(tmp_path) -> None:
+    """Only unfinished files of this project's names are removed; no folder, and no link of such a name."""
+    (tmp_path / "a").mkdir()
+    names = [".wamnet-notes", ".wamnet-0123456789abcdef", ".wamnet-fedcba9876543210.json"]
+    (tmp_path / "a" / names[0]).write_text("mine")
+    (tmp_path / "a" / names[1]).mkdir()
+    (tmp_path / "a" / names[2]).symlink_to(tmp_path)
+    (tmp_path / "a" / ".wamnet-0123456789abcdee.json").write_text("{")
+    make(tmp_path / "a")
+    assert sorted(path.name for path in (tmp_path / "a").glob(".*")) == sorted(names)
+
+
+def test_a_folder_with_a_picture_s_name_is_refused_before_anything_is_made(tmp_path) -> None:
+    """The last step of a picture is a renaming, which a folder of that name would stop in the middle."""
+    make(tmp_path / "a")
+    path = tmp_path / "a/train/00000-noisy.exr"
+    path.unlink()
+    path.mkdir()
+    (path / "mine").write_text("kept")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=r"image '.*noisy\.exr': is a folder \(move it, or"):
+        make(tmp_path / "a")
+    assert sorted(tmp_path.rglob("*")) == before

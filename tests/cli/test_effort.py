@@ -1,12 +1,13 @@
 """Tests of what is said before large work: when, how much, in which words; small work says nothing."""
 
+import json
 from dataclasses import replace
 
 import pytest
 
 from wamnet.cli.common import effort
 from wamnet.kernels.run import before, render_frame
-from wamnet.refimpl.light.scene import Box
+from wamnet.refimpl.light.scene import Box, to_json
 from wamnet.refimpl.light.scenes import canonical
 
 
@@ -77,3 +78,13 @@ def test_many_boxes_are_grouped_in_one_look():
 )
 def test_durations_have_units_that_people_think_in(seconds, text):
     assert effort.duration(seconds) == text
+
+
+@pytest.mark.nightly
+def test_a_file_of_a_hundred_thousand_boxes_is_read_and_said(started, tmp_path):
+    """It was refused by the reader: 103 values too many."""
+    data = json.loads(to_json(canonical("minicubes", time=1.0)))
+    data["boxes"] = (data["boxes"] * 4000)[:100_000]
+    (tmp_path / "many.json").write_text(json.dumps(data))
+    line = started("render", tmp_path / "many.json", "--width", 4, "--height", 4)
+    assert line.startswith("100,003 primitives and 16 samples: by a rule of thumb about ")

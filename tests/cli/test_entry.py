@@ -95,3 +95,33 @@ def test_streams_take_any_text_and_may_be_closed(tmp_path, encoding, closed, tol
         command, env=environment, cwd=tmp_path, capture_output=True, check=False, timeout=60
     )
     assert (done.returncode, done.stderr.strip()) == (7, told)
+
+
+def test_an_interrupt_while_an_object_is_deleted_is_not_lost() -> None:
+    """Python printed it with a traceback, dropped it, and the command continued."""
+    program = (
+        "import signal, sys, time\n"
+        "from wamnet.cli import main\n"
+        "class Deleted:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "def work(*_, **__):\n"
+        "    Deleted()\n"
+        "    time.sleep(60)\n"
+        "main.application = lambda _: work\n"
+        "sys.exit(main.main([]))\n"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
+    assert done.returncode == 130
+    assert done.stderr == "wamnet: interrupted\n"
+
+
+def test_a_closed_stream_s_number_is_not_that_of_a_file(tmp_path) -> None:
+    """What a driver in C prints would get into the first file that is opened."""
+    code = (
+        "import os, sys; from wamnet.cli import entry, main\n"
+        "main.main = lambda: os.open('a', os.O_CREAT | os.O_WRONLY)\n"
+        "sys.exit(entry.run())\n"
+    )
+    command = ["sh", "-c", '"$@" 2>&- >&- <&-', "sh", sys.executable, "-c", code]
+    assert subprocess.run(command, cwd=tmp_path, check=False, timeout=60).returncode > 2

@@ -99,3 +99,20 @@ def test_a_cache_of_somebody_else_is_named_and_left_alone(place: Path, executor:
     told = command(place, executor, XDG_CACHE_HOME=str(foreign))
     assert list(foreign.iterdir()) == []
     assert executor == "numpy" or "is not used: others own it" in told
+
+
+@pytest.mark.nightly(but="c")
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_folders_that_run_no_programs(place: Path, executor: str) -> None:
+    """The message told to install a compiler, which was there."""
+    mounted = place / "mounted"
+    mounted.mkdir()
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "noexec", "tmpfs", mounted], capture_output=True, check=False
+    )
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted: {done.stderr.decode(errors='replace').strip()}")
+    try:
+        command(place, executor, TMPDIR=str(mounted), XDG_CACHE_HOME=str(mounted / "cache"))
+    finally:
+        subprocess.run(["umount", mounted], check=True)

@@ -310,3 +310,114 @@ def test_every_part_is_kept(tmp_path: Path) -> None:
     assert (left.name(), left.header["view"], set(left.channels)) == ("left", "left", set("RGB"))
     assert set(right.channels) == {*"RGB", *(f"wamnet.{name}" for name in "RGB")}
     assert (right.channels["R"].pixels == 2).all()
+
+
+def test_float64_is_rounded_to_float32(tmp_path: Path) -> None:
+    """EXR has no wider float; rounding is NumPy's, to nearest."""
+    frame = Frame({"color": np.random.default_rng(1).random((4, 5, 3))})
+    exr.write_frame(tmp_path / "a.exr", frame)
+    assert (exr.read_frame(tmp_path / "a.exr")["color"] == frame["color"].astype(np.float32)).all()
+
+
+def test_what_others_see(tmp_path: Path) -> None:
+    """The channel names of the specification, float32, lossless, text attributes."""
+    exr.write_frame(tmp_path / "a.exr", random_frame(3, 2))
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        names = sorted(file.channels())
+        header = dict(file.header())
+    assert names == sorted(name for group in exr.CHANNELS.values() for name in group)
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert header["wamnet.scene"] == "minicubes"
+
+
+def test_the_best_alias_wins(tmp_path: Path) -> None:
+    """Plain R, G, B before a layer called beauty."""
+    path = write(tmp_path / "a.exr", rgb(4, 5, 6, prefix="beauty.") | rgb(1, 2, 3))
+    assert (exr.read_frame(path)["color"] == [1, 2, 3]).all()
+
+
+@pytest.mark.parametrize(
+    ("space", "others", "noted"),
+    [
+        ("sRGB", {}, True),
+        ("ACEScg", {}, True),
+        ("Linear", {}, False),
+        ("lin_rec709", {}, False),
+        ("ACEScg", {"colorInteropID": "lin_ap1_scene"}, False),
+    ],
+)
+def test_a_color_space_of_openimageio_is_named(tmp_path: Path, space: str, others: dict, noted: bool) -> None:
+    """It is a hint of one library; where nothing else says what the colours are, it may be right."""
+    path, notes = tmp_path / "a.exr", []
+    header = {"type": OpenEXR.scanlineimage, "oiio:ColorSpace": space, **others}
+    OpenEXR.File(header, rgb(1, 2, 3)).write(str(path))
+    exr.read_frame(path, tell=notes.append)
+    assert (f"oiio:ColorSpace is {space}" in "".join(notes)) is noted
+
+
+def test_several_parts(tmp_path: Path) -> None:
+    """Layers may lie in parts of their own."""
+    parts = [
+        OpenEXR.Part({"name": "a", "type": OpenEXR.scanlineimage}, rgb(1, 2, 3)),
+        OpenEXR.Part({"name": "b", "type": OpenEXR.scanlineimage}, rgb(4, 5, 6, prefix="albedo.")),
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    frame = exr.read_frame(tmp_path / "a.exr")
+    assert (frame["color"] == [1, 2, 3]).all()
+    assert (frame["albedo"] == [4, 5, 6]).all()
+
+
+def test_two_layers_of_one_meaning(tmp_path: Path) -> None:
+    """Left and right eye: no guess."""
+    channels = rgb(1, 2, 3, prefix="left.albedo.") | rgb(1, 2, 3, prefix="right.albedo.")
+    told = r"layers 'left\.albedo, right\.albedo': each of them could be albedo \(export one of them alone"
+    with pytest.raises(InputError, match=told):
+        exr.read_frame(write(tmp_path / "a.exr", channels))
+
+
+def test_integer_pixels(tmp_path: Path) -> None:
+    """Object identifiers are not colour."""
+    path = write(tmp_path / "a.exr", {name: plane(1, np.uint32) for name in "RGB"})
+    with pytest.raises(InputError, match="pixels of color 'uint32': must be half or float"):
+        exr.read_frame(path)
+
+
+def test_ctrl_c_while_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The writer dies in the middle of the file: the old file is as it was, and nothing else is there."""
+    out = tmp_path / "a.exr"
+    exr.write_frame(out, random_frame(2, 2))
+    before = out.read_bytes()
+
+    class Interrupted:
+        ZIP_COMPRESSION = scanlineimage = None
+
+        def Part(self, *_: object) -> None:
+            pass
+
+        def File(self, *_: object) -> "Interrupted":
+            return self
+
+        def write(self, name: str) -> None:
+            Path(name).write_bytes(b"half")
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(exr, "need", lambda *_: Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        exr.write_frame(out, random_frame(3, 3))
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [before]
+
+
+@pytest.mark.parametrize(
+    ("names", "layers"), [("Y", None), ("RGBY", {"color"}), ("RGBZ", {"color", "depth"})]
+)
+def test_luminance_is_no_depth(tmp_path: Path, names: str, layers: set[str] | None) -> None:
+    """Without a layer's name, only Z is depth."""
+    import OpenEXR
+
+    channels = {name: np.ones((2, 3), np.float32) for name in names}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(tmp_path / "a.exr"))
+    if layers is None:
+        with pytest.raises(InputError, match="list of channels 'Y': no known layer"):
+            exr.read_frame(tmp_path / "a.exr")
+    else:
+        assert set(exr.read_frame(tmp_path / "a.exr").layers) == layers

@@ -1,5 +1,8 @@
 """Tests of OpenEXR files as other programs write them: parts, views, attributes, text."""
 
+import re
+import struct
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -234,3 +237,97 @@ def test_a_missing_layer_names_the_channels_that_are_left(tmp_path: Path) -> Non
     frame = exr.read_frame(source)
     with pytest.raises(InputError, match=r"color must be .*not used: Picture.B, Picture.G, Picture.R\)"):
         exr.need_layers(source, frame, ("color",), "it is tested", "export it")
+
+
+LAYER_NAMES = ("", "rgba", "beauty", "albedo", "Albedo", "normal", "N", "id", "left.", "right.")
+"""Parts, and layers in the names of channels, of the files below; a view is the last piece."""
+
+
+@st.composite
+def files(draw) -> tuple[list[RawPart], dict[float, tuple[int, str]]]:
+    """Draw a file of several parts and views, and the channel of each of its values."""
+    parts, origin, views = [], {}, draw(st.sampled_from([(), ("left", "right"), ("right", "left")]))
+    several = draw(st.integers(1, 3))
+    for index in range(several):
+        channels: dict[str | bytes, np.ndarray] = {}
+        for layer in draw(st.sets(st.sampled_from(LAYER_NAMES), min_size=1, max_size=3)):
+            prefix = layer.rstrip(".") + "." if layer else ""
+            for name in draw(st.sampled_from(["RGB", "rgb", "XYZ", "RGBr", "RG", "RGBA"])):
+                value = float(len(origin) + 1)
+                origin[value] = (index, prefix + name)
+                channels[prefix + name] = np.full((2, 3), value, np.float32)
+        own = draw(st.sampled_from(["", *views])) if several > 1 else ""
+        extra = view(own) if own else b""
+        extra += texts("multiView", *views) if views and several == 1 else b""
+        name = draw(st.sampled_from(LAYER_NAMES)).rstrip(".") if several > 1 else None
+        parts.append(RawPart(channels, extra, f"{name}.{index}" if name == "id" else name))
+    return parts, origin
+
+
+OTHERS = ("id", "left", "right")
+"""Names that stand for no layer: a part of such a name may have the colour if nothing else has."""
+
+
+WORDS = {"color": ("", "rgba", "beauty", "?"), "albedo": ("albedo",), "normal": ("normal", "n")}
+"""What the layers below are called."""
+
+
+def meaning(part: RawPart, name: str, sides: set[str]) -> tuple[str, str]:
+    """Return the view of a channel ("" for the first), and the layer by its name or its part's."""
+    pieces = name.lower().split(".")[:-1]
+    attribute_of = re.search(rb"view\0string\0....(left|right)", part.extra, re.DOTALL)
+    own = attribute_of[1].decode() if attribute_of else next((p for p in pieces if p in sides), "")
+    layer = [p for p in pieces if p != own]
+    named = [p for p in (part.name or "").lower().split(".") if p not in sides]
+    return own, (layer or ["?" if named[:1] and named[0] in OTHERS else p for p in named] or [""])[0]
+
+
+@given(files())
+def test_never_silently_another_part(tmp_path_factory: pytest.TempPathFactory, file) -> None:
+    """A layer is three channels of one place, of its own name and of the first view; or an error says why.
+
+    No second place has the layer's name: a reader that takes the last of two fails here.
+    """
+    parts, origin = file
+    path = write_raw(tmp_path_factory.mktemp("exr") / "a.exr", *parts)
+    try:
+        frame = exr.read_frame(path)
+    except InputError as error:
+        reason = str(error)
+        assert re.search(r"each of them|duplicates|twice|no known layer", reason)
+        return
+    views = [side.decode() for part in parts for side in re.findall(rb"left|right", part.extra)]
+    first, sides = next(iter(views), ""), set(views)
+    every = [(index, str(name)) for index, part in enumerate(parts) for name in part.channels]
+    for layer, pixels in frame.layers.items():
+        places = [origin[float(value)] for value in pixels[0, 0]]
+        ((index, prefix),) = {(index, name.rpartition(".")[0]) for index, name in places}
+        assert "".join(name.rpartition(".")[2].upper() for _, name in places) in ("RGB", "XYZ")
+        own, word = meaning(parts[index], places[0][1], sides)
+        assert own in ("", first), "another view"
+        assert word in WORDS[layer], "another layer"
+        same = [
+            (number, name.rpartition(".")[0])
+            for number, name in every
+            if meaning(parts[number], name, sides) in (("", word), (first, word))
+            and name[-1] in ("RGBrgb" if layer == "color" else "RGBXYZrgb")
+        ]
+        complete = [place for place, count in Counter(same).items() if count >= 3]
+        assert complete == [(index, prefix)], "another place has this name"
+
+
+@given(st.data())
+def test_a_changed_header_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data) -> None:
+    """Any bytes in the header: a frame, or an error of ours."""
+    path = tmp_path_factory.mktemp("exr") / "a.exr"
+    extra = VIEWS + chromaticities(*AP1) + attribute("owner", "string", b"\xff\xfe")
+    content = bytearray(write_raw(path, RawPart(planes(1), extra)).read_bytes())
+    end = content.index(struct.pack("<ii", 0, 36))
+    for at in data.draw(st.lists(st.integers(0, end - 1), min_size=1, max_size=3)):
+        content[at] = data.draw(st.integers(0, 255))
+    path.write_bytes(content)
+    try:
+        exr.read_frame(path, finite=False)
+    except InputError as error:
+        message = str(error)
+        assert message.isprintable()

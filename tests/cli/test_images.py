@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.cli.files import exr, images
+from wamnet.cli.files import exr, images, png_colors
 from wamnet.cli.files.images import read_image, read_png, write_png
 from wamnet.refimpl import encoding, reading
 from wamnet.refimpl.errors import InputError
@@ -169,3 +169,17 @@ def test_exr_and_png_in_both_forms(tmp_path: Path) -> None:
     image = read_image(tmp_path / "a.PNG".replace("PNG", "png"), -1.0)
     assert (image.display == encoding.from_8bit(encoding.to_8bit(encoding.to_display(linear, -1.0)))).all()
     assert (image.linear == encoding.from_display(image.display, -1.0)).all()
+
+
+@given(st.lists(st.tuples(st.sampled_from([*png_colors.ONCE, b"tEXt"]), st.binary(max_size=40)), max_size=4))
+def test_any_chunks_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, chunks) -> None:
+    """Colours in [0, 1], or an error of ours."""
+    path = tmp_path_factory.mktemp("png") / "a.png"
+    write_raw(path, *(chunk(kind, data) for kind, data in chunks))
+    try:
+        read = read_png(path, lambda text: None)
+    except InputError as error:
+        message = str(error)
+        assert message.isprintable()
+        return
+    assert ((read >= 0) & (read <= 1)).all()

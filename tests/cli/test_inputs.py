@@ -231,3 +231,18 @@ def test_a_frame_of_another_scene_is_denoised_with_a_warning(wamnet, here) -> No
     assert outcome.status == 0
     assert "noisy.exr: it shows minicubes, but the model was trained only on cornell" in outcome.out
     assert (here / "denoised.png").exists()
+
+
+def test_exposures_end_somewhere(wamnet, refused, here) -> None:
+    """At 64 stops either way."""
+    assert "--exposure 65.0: must be from -64 to 64 stops" in refused(
+        "compare", "noisy.exr", "reference.exr", "--exposure", 65
+    )
+    assert wamnet("compare", "noisy.exr", "reference.exr", "--exposure", 64).status == 0
+
+
+def test_the_longest_name_is_written(wamnet, here) -> None:
+    """255 bytes: the temporary file's name must not be longer."""
+    name = "n" * 251 + ".png"
+    assert wamnet("render", "minicubes", "--width", 2, "--height", 2, "-o", name).status == 0
+    assert (here / name).is_file()

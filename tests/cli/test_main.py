@@ -15,6 +15,7 @@ from wamnet.cli import main as module
 from wamnet.cli.common import options
 from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.kernels import EXECUTORS
+from wamnet.refimpl.errors import TrainingError
 from wamnet.refimpl.light.scenes import CANONICAL
 from wamnet.refimpl.light.transport import SAMPLERS
 from wamnet.refimpl.network.train import PRESETS
@@ -196,3 +197,76 @@ def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
 
     monkeypatch.setattr(module, "application", lambda _: fail)
     assert "out of memory (use smaller frames" in refused("render")
+
+
+def test_errors_without_four_parts_are_one_line(refused, monkeypatch) -> None:
+    """Training's errors are plain sentences, perhaps over several lines."""
+
+    def fail(*_args: object, **_options: object) -> None:
+        raise TrainingError("the loss\nis nan")
+
+    monkeypatch.setattr(module, "application", lambda _: fail)
+    assert refused("train") == "wamnet: error: the loss is nan\n"
+
+
+def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:
+    """An object whose `__init__` is cut short lacks attributes when it is deleted: of no use to anyone."""
+
+    class HalfMade:
+        def __init__(self) -> None:
+            raise KeyboardInterrupt
+
+        def __del__(self) -> None:
+            self.connection.close()
+
+    monkeypatch.setattr(module, "application", lambda _: lambda *_args, **_options: HalfMade())
+    assert wamnet("render") == (130, "", "wamnet: interrupted\n")
+
+
+def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
+    """As the system does when the memory ends."""
+    code = (
+        "import sys, os; import wamnet.kernels.run.render_pool as pool; from wamnet.cli.main import main\n"
+        "if __name__ == '__main__':\n"
+        "    pool._render_band = os._exit; pool.bands = lambda job, workers: [7, 8]\n"
+        "    submit = pool.ProcessPoolExecutor.submit\n"
+        "    pool.ProcessPoolExecutor.submit = lambda self, f, scene, job, rows: submit(self, f, rows)\n"
+        "    sys.exit(main(['render', 'minicubes', '--spp', '64', '--workers', '2', '-o', 'a.exr']))\n"
+    )
+    (tmp_path / "run.py").write_text(code)
+    command = [sys.executable, "run.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 2
+    assert done.stderr.startswith("wamnet: error: workers 2: one of these processes was ended from outside")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.nightly(but=("2-0.9", "15-1.3"))
+@pytest.mark.parametrize("seconds", [0.9, 1.3, 1.8, 4.0])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_the_workers(tmp_path, number, seconds) -> None:
+    """SIGTERM only to the parent, SIGINT to all, while the workers start and later: no process is left."""
+    arguments = ("render", "minicubes", "--spp", "100000", "--workers", "2", "-o", "a.exr")
+    code = (
+        "import sys; from wamnet.cli.main import main\n"
+        "if __name__ == '__main__':\n"
+        "    print('ready', flush=True); sys.exit(main(sys.argv[1:]))\n"
+    )
+    (tmp_path / "run.py").write_text(code)
+    work = tmp_path / "work"
+    work.mkdir()
+    command = [sys.executable, str(tmp_path / "run.py"), *arguments]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=work, stdout=pipe, stderr=pipe, start_new_session=True) as process:
+        try:
+            process.stdout.readline()
+            time.sleep(seconds)
+            (os.kill if number == signal.SIGTERM else os.killpg)(process.pid, number)
+            # The workers have these pipes too: the reading ends when the last of them has ended.
+            _, errors = process.communicate(timeout=30)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 128 + number
+    assert errors == b"wamnet: interrupted\n"
+    assert not list(work.iterdir())

@@ -1,6 +1,8 @@
 """Tests of safe writing: all or nothing, and every refusal before the work starts."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -135,3 +137,42 @@ def test_any_bytes_are_the_name_of_a_frame(
     assert sorted(place.iterdir()) == sorted([path, picture])
     with spelled(path) as spelt:
         assert Path(spelt.encode().decode()).read_bytes() == path.read_bytes()
+
+
+def test_the_new_file_lies_beside_the_old_one(tmp_path: Path) -> None:
+    """Only within one file system is replacing one step."""
+    with replacing(tmp_path / "a.png") as new:
+        assert new.parent == tmp_path
+        assert new.name != "a.png"
+
+
+def test_a_full_disk_while_exr_is_written(tmp_path: Path) -> None:
+    """OpenEXR tells it by errors of its own; here the largest size of a file is the limit."""
+    code = (
+        "import resource, sys; from pathlib import Path; import numpy as np; import OpenEXR\n"
+        "from wamnet.cli.files import exr; from wamnet.refimpl.frame import Frame\n"
+        "from wamnet.refimpl.errors import InputError\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+        "noise = np.random.default_rng(1).random((64, 64, 3)).astype(np.float32)\n"
+        "try: exr.write_frame(Path('a.exr'), Frame({'color': noise}))\n"
+        "except InputError as error: print(error)\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stderr == ""
+    assert done.stdout.startswith("output file 'a.exr': cannot be written: ")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_while_a_kernel_is_written(
+    tmp_path: Path, samples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is named."""
+    from wamnet.cli.commands.choose import Request
+    from wamnet.cli.commands.compile import OfScene, compile_model
+    from wamnet.cli.common.request import KernelRequest
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    given = {"of_scene": OfScene(), "network": KernelRequest(), "limits": Request()}
+    with pytest.raises(InputError, match=r"output folder '.*kernel': cannot be written: No space left"):
+        compile_model(str(samples / "model.safetensors"), "glsl", tmp_path / "kernel", **given)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.cli.commands import denoise
+from wamnet.cli.common import sequence
 from wamnet.cli.common.sequence import frames_of, outputs_of, overlapped
 from wamnet.cli.files import exr, images
 from wamnet.refimpl.errors import InputError, WamnetError
@@ -213,3 +214,44 @@ def test_an_interrupted_sequence_says_how_to_go_on(wamnet, here, monkeypatch):
         r": [1-4] frames? in .*; [1-4] were there already",
         wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out").out,
     )
+
+
+def test_no_more_is_in_memory_than_is_said():
+    lock, alive, most = threading.Lock(), 0, 0
+
+    def count(step):
+        nonlocal alive, most
+        with lock:
+            alive += step
+            most = max(most, alive)
+
+    overlapped(range(40), lambda _: count(1), lambda _: None, lambda *_: count(-1), lambda _: None)
+    assert alive == 0
+    assert most <= 2 * sequence.AHEAD + 2, "read ahead, worked on, waiting and being written"
+
+
+def test_what_is_said_of_several_frames_is_said_once(wamnet, here):
+    for path in sorted((here / "shot").iterdir()):
+        frame = exr.read_frame(path)
+        frame.info.pop("scene")
+        color = frame["color"].copy()
+        color[0, 0] = np.inf
+        openexr = exr.need("OpenEXR", "to write")
+        channels = {c: np.ascontiguousarray(color[:, :, i]) for i, c in enumerate("RGB")}
+        channels |= {
+            f"normal.{c}": np.ascontiguousarray(frame["normal"][:, :, i]) for i, c in enumerate("XYZ")
+        }
+        openexr.File({"type": openexr.scanlineimage}, channels).write(str(path))
+    out = wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out").out
+    assert "shot/a.0008.exr and 4 more: 1 pixels of color are not finite" in out
+    assert out.count("another program's frame") == 1
+
+
+def test_frames_of_a_sequence_may_have_several_sizes(wamnet, here):
+    frame = exr.read_frame(here / "shot/a.0009.exr")
+    exr.write_frame(
+        here / "shot/a.0009.exr", type(frame)({n: v[:7, :5] for n, v in frame.layers.items()}, frame.info)
+    )
+    assert wamnet("denoise", "m.safetensors", "shot/a.*.exr", "-o", "out").status == 0
+    assert exr.read_frame(here / "out/a.0009.exr")["color"].shape == (7, 5, 3)
+    assert exr.read_frame(here / "out/a.0010.exr")["color"].shape == (12, 13, 3)

@@ -87,3 +87,24 @@ def test_no_control_character_reaches_the_terminal(text) -> None:
     assert controls_of(out.getvalue()) == []
     assert controls_of(err.getvalue()) == []
     assert err.getvalue().count("\n") == 2
+
+
+def test_titles_of_progress_are_escaped(capsys, monkeypatch) -> None:
+    """Where the bar is shown; its own colours and movements are rich's."""
+    monkeypatch.setattr(terminal.Console, "is_terminal", True)
+    monkeypatch.setenv("COLUMNS", "200")
+    with terminal.progress("rendering \x07\u202ehome", 1) as advance:
+        advance(1)
+    assert "rendering \\x07\\u202ehome" in capsys.readouterr().err
+
+
+def test_keys_of_files_do_not_clear_the_screen(wamnet, tmp_path) -> None:
+    """Nor do names of files."""
+    (tmp_path / "s.json").write_text(
+        '{"format": "wamnet-scene", "version": 1, "x\\u001b[2J\\u202e": 1}', encoding="utf-8"
+    )
+    outcome = wamnet("render", "s.json")
+    assert outcome.status == 2
+    assert controls_of(outcome.err) == []
+    assert "x\\x1b[2J\\u202e" in outcome.err
+    assert controls_of(wamnet("render", "a\x1b[2J.json").err) == []

@@ -264,3 +264,28 @@ def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:
 
     monkeypatch.setattr("wamnet.kernels.open_executor", missing)
     assert "opencl: no such device here; take numpy" in refused("train", *pair, "--executor", "opencl")
+
+
+def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:
+    """When the interval is over, the next log line keeps a checkpoint, before the last step."""
+    kept = []
+    monkeypatch.setattr(train, "CHECKPOINT_INTERVAL_S", -1.0)
+    monkeypatch.setattr(
+        "wamnet.models.model_file.save_checkpoint", lambda _path, state: kept.append(state.step)
+    )
+    frames = [(exr.read_frame(tmp_path / "noisy.exr"), exr.read_frame(tmp_path / "reference.exr"))]
+    recipe = train.choose_recipe("best", None, {"features": ("color",), "steps": 4})
+    train.fit(train.replace(recipe, log_every=2), frames, tmp_path / "m.safetensors")
+    assert kept == [2, 4, 4]
+
+
+def test_an_earlier_run_is_not_lost(wamnet, refused, pair, tmp_path) -> None:
+    """It resumes, or is replaced, only on request."""
+    assert wamnet("train", *pair, "--steps", 2).status == 0
+    line = refused("train", *pair, "--steps", 3)
+    assert "checkpoint 'model.checkpoint.safetensors': belongs to an earlier run" in line
+    assert "--resume" in line
+    assert "--restart" in line
+    assert wamnet("train", *pair, "--steps", 3, "--restart").status == 0
+    assert load_checkpoint(tmp_path / "model.checkpoint.safetensors").step == 3
+    assert "choose one of them" in refused("train", *pair, "--resume", "--restart")

@@ -9,11 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wamnet.cli.files import exr
 from wamnet.cli.main import main
+from wamnet.compiler import artifact
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.core.ir import sha256
 from wamnet.kernels.devices.registry import WAYS
 from wamnet.kernels.judge import apart
+from wamnet.kernels.run.denoise_on import images_of
+from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
 
 TWO = ("--executor", "numpy", "--executor", "opencl", "--schedules", "plain")
@@ -199,3 +203,34 @@ def test_refusals(refused, here, arguments, text) -> None:
         == 0
     )
     assert text in refused("triage", "model.safetensors", "noisy.exr", *arguments)
+
+
+def test_pixels_that_are_no_numbers_are_kept_as_they_are_read(wamnet, here, fault, monkeypatch) -> None:
+    """A file of a frame holds finite numbers: the kept ones are encoded to the same bits."""
+    noisy = exr.read_frame(here / "noisy.exr")
+    noisy["color"][:, 2] = (np.nan, np.inf, -np.inf)
+    with monkeypatch.context() as patch:
+        patch.setattr(exr, "validate", lambda frame: None)
+        exr.write_frame(here / "bad.exr", noisy)
+    assert wamnet("triage", "model.safetensors", "bad.exr", *TWO).status == 1
+    model, kept = load_model(here / "model.safetensors"), exr.read_frame(here / "triage/frame.exr")
+    part = json.loads((here / "triage/report.json").read_text())["part"]
+    rows = slice(part["top"], part["top"] + part["height"])
+    columns = slice(part["left"], part["left"] + part["width"])
+    assert np.isnan(noisy["color"][rows, columns]).any()
+    assert set(kept.layers) == {"color", "normal"}
+    for name, image in images_of(model, noisy).items():
+        assert np.array_equal(images_of(model, kept)[name], image[rows, columns])
+
+
+def test_nothing_is_half_written(here, fault, monkeypatch, wamnet) -> None:
+    """A disk that fills up leaves no folder."""
+
+    def full(*_args: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(artifact, "write", full)
+    outcome = wamnet("triage", "model.safetensors", "noisy.exr", *TWO, "-o", "odd")
+    assert outcome.status == 2
+    assert "output folder 'odd': cannot be written: No space left on device (" in outcome.err
+    assert sorted(path.name for path in here.iterdir()) == ["model.safetensors", "noisy.exr"]

@@ -375,3 +375,22 @@ def test_slow_devices_get_small_pieces(still):
 def test_a_picture_of_it_is_in_the_documents():
     picture = Path(__file__).parents[2] / "docs" / "images" / "web-page.png"
     assert picture.stat().st_size <= 200_000
+
+
+def test_ready_is_what_has_drawn(chromium, path):
+    """On a slow device seconds pass between the check and the first picture: nothing is claimed meanwhile."""
+    script = """
+      window.heard = [];
+      addEventListener("DOMContentLoaded", () => {
+        const status = document.getElementById("status");
+        const listen = () => heard.push([status.textContent, Boolean(window.wamnet?.page.times.length)]);
+        new MutationObserver(listen).observe(status, { childList: true, characterData: true, subtree: true });
+      });
+    """
+    with chromium.tab(path, script, **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        tab.until("document.getElementById('status').textContent.startsWith('Ready')")
+        heard = tab.page.evaluate("heard")
+        assert [drawn for text, drawn in heard if text.startswith("Ready")] == [True]
+        said = [text for text, _ in heard]
+        assert said.index("Checking the network on this device.") < said.index("Drawing the first picture.")

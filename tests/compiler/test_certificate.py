@@ -527,3 +527,51 @@ def test_scalings_are_sound_and_gain(path):
             e = random.choice([-1, 1], len(error)) * (matrix @ e) + error * random.choice([-1, 1], len(error))
         worst = max(worst, abs(float(e[0])))
     assert worst <= found
+
+
+def test_any_smaller_number_of_a_rectifier_s_certificate_is_refused(tmp_path):
+    path = written(tmp_path, activation="relu")
+    for held, place in smaller_numbers(path):
+        path.write_text(json.dumps(held))
+        with pytest.raises(checker.Refused, match=": "):
+            pytest.fail(f"{place}: {checker.check(path)}")
+
+
+def test_another_floor_of_a_rectifier_is_another_program(tmp_path):
+    path = written(tmp_path, activation="relu")
+    text = path.read_text()
+    assert text.count("{value=0.0}") == 1
+    path.write_text(text.replace("{value=0.0}", "{value=-8.0}"))
+    with pytest.raises(checker.Refused, match="digest of the program"):
+        checker.check(path)
+
+
+@pytest.mark.parametrize("stated", [None, "."])
+def test_weights_above_are_not_found_unless_the_manifest_says_so(path, tmp_path, stated):
+    with pytest.raises(InputError, match=r"weights\.bin"):
+        checker.check(shared(path, tmp_path, stated))
+
+
+def test_other_weights_of_the_same_form_have_other_numbers(path, tmp_path):
+    """The numbers of another model's proof, with that model's digests left in place."""
+    other = written(tmp_path, omega_0=4.0)
+    held = {
+        **certificate_of(other),
+        **{name: certificate_of(path)[name] for name in ("layers", "outputs", "bound")},
+    }
+    other.write_text(json.dumps(held))
+    with pytest.raises(checker.Refused, match="layer 1"):
+        checker.check(other)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\x00", b"[]", b"{}", b"null", b'{"schema": 1}', b"[" * 100000])
+def test_garbage_is_no_certificate(changed, data):
+    with pytest.raises(
+        (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
+    ):
+        checker.check(changed(denoise_certificate_json=data))
+
+
+def test_native_opencl_has_a_certificate(tmp_path):
+    artifact.write(compile_program(lower(model()), "opencl", "native"), tmp_path)
+    assert checker.check(tmp_path / NAME)["sine"]["domain"] is None

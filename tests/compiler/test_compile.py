@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -269,3 +270,65 @@ def test_header_and_manifest_say_how_every_image_and_the_output_are_encoded():
     assert kernel.manifest["output"]["encoding"] in kernel.source
     assert kernel.manifest["info"]["normalization"]["position_center"] == [1.0, -2.0, 0.5]
     assert "flip" in kernel.source
+
+
+def test_a_disk_that_fills_up_leaves_all_old_files(tmp_path, monkeypatch):
+    artifacts.write(compile_program(lower(model()), "opencl"), tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    real, calls = artifacts.Path.write_bytes, []
+
+    def fills_up(self, content):
+        calls.append(content)
+        if len(calls) == 3:  # the last of three: the manifest
+            raise OSError("disk full")
+        return real(self, content)
+
+    monkeypatch.setattr(artifacts.Path, "write_bytes", fills_up)
+    with pytest.raises(OSError, match="disk full"):
+        artifacts.write(compile_program(lower(model(omega_0=2.0)), "opencl"), tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_folder_that_a_full_disk_leaves_empty_goes(tmp_path, monkeypatch):
+    """And those above it that were made; one that was there stays."""
+
+    def full(self, content):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(artifacts.Path, "write_bytes", full)
+    (tmp_path / "there").mkdir()
+    for folder in (tmp_path / "new" / "deep", tmp_path / "there"):
+        with pytest.raises(OSError, match="disk full"):
+            artifacts.write(compile_program(lower(model()), "opencl"), folder)
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+
+
+def test_failure_at_the_second_name_leaves_whole_files_and_the_old_manifest(tmp_path, monkeypatch):
+    one, two = (compile_program(lower(model(omega_0=omega)), "opencl") for omega in (3.0, 2.0))
+    artifacts.write(one, tmp_path)
+    real, calls = artifacts.Path.replace, []
+
+    def breaks(self, target):
+        calls.append(target)
+        if len(calls) == 2:
+            raise OSError("disk full")
+        return real(self, target)
+
+    monkeypatch.setattr(artifacts.Path, "replace", breaks)
+    with pytest.raises(OSError, match="disk full"):
+        artifacts.write(two, tmp_path)
+    assert (tmp_path / "denoise.cl").read_text() == two.source
+    assert (tmp_path / "weights.bin").read_bytes() == artifacts.weight_bytes(one)
+    assert (tmp_path / "manifest.json").read_text() == artifacts.manifest_text(one)
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_two_writers_at_once_leave_whole_files(tmp_path):
+    """Each of 2 x 50 writes ends well, and every file is that of one writer."""
+    kernels = [compile_program(lower(model(omega_0=omega)), "opencl") for omega in (3.0, 2.0)]
+    with ThreadPoolExecutor(2) as pool:
+        for _ in pool.map(lambda i: artifacts.write(kernels[i % 2], tmp_path), range(100)):
+            assert (tmp_path / "denoise.cl").read_text() in {kernel.source for kernel in kernels}
+    texts = {artifacts.manifest_text(kernel) for kernel in kernels}
+    assert (tmp_path / "manifest.json").read_text() in texts
+    assert len(list(tmp_path.iterdir())) == 4

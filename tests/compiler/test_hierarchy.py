@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.loops import LISTS, TREES
@@ -238,3 +240,19 @@ def test_a_shape_without_an_extent_keeps_the_list(monkeypatch):
     assert holding(scene) is None
     geometry = intersection.build(scene)
     assert hierarchy.planted(geometry, scene) is geometry
+
+
+@pytest.mark.nightly
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**16),
+    count=st.integers(1, 60),
+    kinds_of=st.lists(st.sampled_from(["sphere", "quad", "turned", "shared", "box"]), min_size=1, max_size=4),
+    room=st.booleans(),
+    visit=st.sampled_from([1.0, 20.0, 60.0]),
+)
+def test_a_tree_finds_what_the_list_finds(seed, count, kinds_of, room, visit):
+    """Bits and ids, for rays that graze, that are parallel to axes, and primitives that coincide."""
+    scene = scene_of(seed, count, kinds_of, room)
+    with np.errstate(all="ignore"):
+        check(scene, *rays(scene, seed), visit)

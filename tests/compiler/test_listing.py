@@ -113,3 +113,9 @@ def test_a_line_of_another_block_is_not_taken_for_a_node():
     program = trace(lambda x: np.sin(x) + 1.0, {"x": ir.Type()}, keep_places=False)
     source = "/* other: of no program */\nfloat t1 = 0;\n/* one: a block */\nfloat t2 = t1;"
     assert [line.part for line in lines_of(source, {"one": program})] == ["", "", "one", "one"]
+
+
+def test_places_are_asked_for_by_name():
+    """What moves in a scene was once passed as the argument that requests the places, and taken for a yes."""
+    with pytest.raises(TypeError, match="positional arguments"):
+        lower_scene(canonical("empty"), Settings(), None, None, True)  # type: ignore[misc]

@@ -178,3 +178,8 @@ def test_a_source_that_never_ends_is_not_checked(plain, monkeypatch):
     endless = source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1)
     with pytest.raises(Unread, match="more than 1 s"):
         limited(run_text, endless, *others)
+
+
+def test_a_source_that_fills_the_memory_is_not_checked():
+    with pytest.raises(Unread, match="1024 MB"):
+        limited(bytearray, [(2**31,)])

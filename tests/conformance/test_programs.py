@@ -256,3 +256,15 @@ def test_what_others_are_made_of_comes_first():
     assert first is not None
     assert first.clause == "CAM-3"
     assert first_blamed(found[3:]) is None
+
+
+def test_what_a_program_has_started_ends_with_it(verdicts, tmp_path):
+    """The grandchild holds the program's output open: the session must not wait for it."""
+    script = 'sleep 60 & while read line; do echo \'{"kinds": ["random.block"]}\'; done'
+    found = verdicts(["sh", "-c", script], ["random.block/0"])
+    assert [v.verdict for v in found] == ["garbage"]
+
+
+def test_infinity_is_met_by_infinity_alone():
+    assert judged("inf", value="inf", bound="0x0p+0").verdict == "pass"
+    assert judged(1e300, value="inf", bound="0x0p+0").verdict == "fail"

@@ -126,3 +126,18 @@ def test_links_and_large_files_are_not_read(tmp_path):
     (student / LAB.file).unlink()
     (student / LAB.file).write_text("#" * (1 << 21))
     assert "no such file" in grade(LAB, student, trusted=True).first.found
+
+
+def test_a_file_that_hides_numpy_hides_nothing(tmp_path):
+    (tmp_path / LAB.file).write_text(answer("pass"))
+    (tmp_path / "numpy.py").write_text("1 / 0")
+    (tmp_path / "wamnet.py").write_text("1 / 0")
+    assert grade(LAB, tmp_path, trusted=True).right
+
+
+def test_who_sleeps_is_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(Limits, "longest_wait_s", 2)
+    (tmp_path / LAB.file).write_text(answer("import time; time.sleep(600)"))
+    result = grade(LAB, tmp_path, trusted=True)
+    assert result.first.found == "no end within 2 s"
+    assert result.checks[-1][1].likely == "what stopped the process before it"

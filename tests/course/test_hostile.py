@@ -206,3 +206,17 @@ def test_no_process_and_no_file_outlives_the_command(option, number, tmp_path):
         time.sleep(0.1)
     assert not [number for number in started if alive(number)]
     assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_a_large_answer_does_not_fill_the_machine_s_memory(tmp_path):
+    """An answer of a megabyte is broadcast by the grader to gigabytes."""
+    packages.needed_sandbox()
+    lab = lab_named("5")
+    right = (answers.COURSE / "solutions" / lab.file).read_text()
+    bomb = "def picture(*a):\n    return np.zeros((2**20, 1, 1, 1), bool), np.zeros(3)\n"
+    for name, text in {"ada": bomb, "bob": ""}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / lab.file).write_text(f"{right}\n{text}")
+    ada, bob = (student.of(lab) for student in grade_class(tmp_path, (lab,), workers=1))
+    assert any("MemoryError" in str(wrong) for _, wrong in ada.checks)
+    assert bob.right

@@ -1,6 +1,7 @@
 """The web site: it is whole, needs no other host, and says what the spec says; wrong pages are refused."""
 
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import cells
@@ -206,3 +207,41 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, monkeypatch,
     assert main() == 2
     assert "holds something that is not a site; name another folder" in capsys.readouterr().err
     assert (tmp_path / "letter.txt").read_text() == "mine"
+
+
+class Torn(HTMLParser):
+    """The marks of figures that no paragraph, item or cell holds."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.held: list[str] = []
+        self.found: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("p", "li", "td"):
+            self.held.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self.held:
+            self.held.remove(tag)
+
+    def handle_comment(self, data: str) -> None:
+        if data.startswith(("=", "/")) and not self.held:
+            self.found.append(data.strip())
+
+
+def test_no_paragraph_is_torn_by_a_mark(site):
+    """A comment at the start of a line ends a paragraph in Markdown."""
+    assert Torn("<p>in</p>\n<!--= a --> 3 <!--/--> of").found == ["= a", "/"]
+    for path in site.rglob("*.html"):
+        assert Torn(path.read_text()).found == [], path
+
+
+def test_an_option_is_not_a_folder(monkeypatch, capsys, tmp_path):
+    """`--help` once became a folder with a site in it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["build.py", "--help"])
+    assert main() == 2
+    assert "usage: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -14,7 +14,7 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
 from wamnet.kernels.devices import c_executor
-from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
+from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror")
 """What a careful project compiles with."""
@@ -274,3 +274,52 @@ def test_a_library_is_compiled_once_for_a_compiler_and_a_processor(case, monkeyp
         assert compiled == (1 if change or len(pictures) == 1 else 0)
         assert len(calls) == (1 if compiled == 0 else 3), "the version; the trial and the library"
     assert all(np.array_equal(picture, pictures[0]) for picture in pictures)
+
+
+def test_spectra_say_to_other_compilers_what_they_take(executor_named, kit, tmp_path):
+    """FOU-9: without the vectors of GCC and clang the text is one error, before anything else goes wrong."""
+    executor_named("c")
+    program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
+    artifact = compile_program(program, "c", "ieee", "fft:8")
+    assert artifact.manifest["schedule"]["name"] == "fft:8"
+    (tmp_path / "denoise.c").write_text(artifact.source)
+    for options, status in (((), 0), (("-U__GNUC__",), 1)):
+        command = ["cc", "-E", *options, "-o", "out", "denoise.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, "export a schedule of tiles" in done.stderr) == (status, bool(status))
+
+
+@pytest.mark.parametrize("relaxed", ["-funsafe-math-optimizations", "-ffp-contract=fast -mfma", "-Ofast"])
+def test_compiler_that_relaxes_arithmetic_all_the_same_is_refused(
+    executor_named, tmp_path, monkeypatch, relaxed
+):
+    """The wrapper puts its options last; the trial's digits tell."""
+    executor_named("c")
+    wrapper = tmp_path / "cc"
+    wrapper.write_text(f'#!/bin/sh\nexec cc "$@" {relaxed}\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    with pytest.raises(ExecutorUnavailable, match="does not compute as IEEE 754 says; take options"):
+        kernels.open_executor("c")
+
+
+def test_compiler_that_does_not_know_this_processor(executor_named, kit, tmp_path, monkeypatch):
+    """A compiler that refuses -march=native builds kernels without it."""
+    executor_named("c")
+    wrapper = tmp_path / "cc"
+    wrapper.write_text('#!/bin/sh\ncase "$*" in *-march*) exit 1;; esac\nexec cc "$@"\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    with kernels.open_executor("c") as executor:
+        image = np.ones((2, 3, 1), np.float32)
+        artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
+        assert np.array_equal(executor.run(artifact, {"a": image}), image / 2)
+
+
+def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
+    monkeypatch.setattr(c_executor.CExecutor, "largest_bytes", 40)
+    artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
+    with pytest.raises(
+        InputError, match="size of the image on .* '4 x 3 with 1 channels': .* at most 40 bytes"
+    ):
+        executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from wamnet.compiler import variants
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import cache
 from wamnet.kernels.run import curve
 from wamnet.kernels.run.curve import Curve, Limits, Measurement, Point, choose
@@ -215,3 +216,22 @@ def test_a_measurement_has_every_variant(executor_named, model) -> None:
     assert full.error_max <= 1e-5 < narrow.error_max <= narrow.error_bound
     assert all(p.milliseconds > 0 and p.error_mean <= p.error_max for p in found.points)
     assert curve.from_data(json.loads(json.dumps(found.as_data())), "x") == found
+
+
+def test_every_target_s_schedules_are_tried(denoiser, model) -> None:
+    """It was a KeyError for C: `compile --target c --max-ms 9 --frames FOLDER`."""
+    found = Measurement(denoiser, model, (8, 8), "ieee", ()).promising()
+    known = {schedule.name for schedule in DENOISERS[denoiser.name].schedules}
+    assert found
+    assert known.issuperset(found)
+
+
+def test_pictures_that_are_no_numbers_have_no_quality() -> None:
+    one, other = np.full((2, 2, 3), 0.5), np.full((2, 2, 3), 0.25)
+    assert curve.quality([one], [one], [other]) == (0.0, 0.0, 0.0)
+    largest, mean, loss = curve.quality([one, other], [one, one], [other, one])
+    assert (largest, mean) == (0.25, 0.125)
+    assert loss == math.inf, "the full network's second picture is the target"
+    bad = one.copy()
+    bad[0, 0, 0] = np.nan
+    assert all(map(math.isnan, curve.quality([one, bad], [one, one], [other, other])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.devices import llvmpipe
+from wamnet.kernels.devices.kernel import black
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.network import dataset, denoise
@@ -338,3 +340,48 @@ def test_two_contexts_that_open_before_either_runs(executor_named):
             for artifact, factor in zip(artifacts, (2.0, 3.0), strict=True):
                 picture = executor.run(artifact, {"a": np.full((2, 2, 1), 0.25, np.float32)})
                 assert np.array_equal(picture, np.full((2, 2, 1), 0.25 * factor, np.float32))
+
+
+def test_a_refused_texture_gives_the_others_back(executor_named, kit, monkeypatch):
+    executor = executor_named("opengl-egl")
+    artifact = compile_program(kit.program(lambda x: x * 1.5, {"a": 1, "b": 1}), "opengl")
+    executor.build(artifact, (3, 3))
+    made = []
+    real = executor._texture
+
+    def texture(name, array):
+        if name == "b":
+            raise InputError("texture", name, "refused", "none")
+        made.append(real(name, array))
+        return made[-1]
+
+    monkeypatch.setattr(executor, "_texture", texture)
+    with pytest.raises(InputError, match="texture 'b"):
+        executor.run(artifact, {name: np.zeros((3, 3, 1), np.float32) for name in "ab"})
+    assert [type(thing.mglo).__name__ for thing in made] == ["InvalidObject"]
+
+
+def test_opengl_keeps_nothing_of_a_picture_s_size(kit):
+    """Textures and framebuffers of thirty sizes are given back; what lives is the weights."""
+    moderngl = pytest.importorskip("moderngl")
+    program = kit.denoiser(kit.network([27, 4, 3], (2.0, 2.0)), {"a": 3}, 3, "clamp")
+    artifact = compile_program(program, "opengl", "native")
+
+    def living():
+        kinds = (moderngl.Texture, moderngl.Framebuffer, moderngl.Buffer)
+        # By type: isinstance would ask other packages' lazy objects for their class.
+        things = [thing for thing in gc.get_objects() if type(thing) in kinds]
+        return sum(not isinstance(thing.mglo, moderngl.mgl.InvalidObject) for thing in things)
+
+    with open_executor("opengl") as executor:
+
+        def run(size):
+            executor.build(artifact, size)
+            executor.run(artifact, black(artifact, size))
+
+        run((5, 4))
+        before = living()
+        for number in range(30):
+            run((6 + number, 40 - number))
+        assert living() == before
+        assert before > 0

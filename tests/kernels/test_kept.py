@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from wamnet.compiler import compile as compiling
+from wamnet.compiler.scenes import smooth_kernel
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import cache, denoise_on
 from wamnet.kernels.run.denoise_on import data_of, kernel_of
@@ -118,3 +120,17 @@ def test_only_the_newest_entries_of_a_kind_stay(monkeypatch):
         assert cache.kept("test", (number,), lambda number=number: number) == number
     assert len(list(cache.folder().glob("test-*.json"))) == 3
     assert cache.kept("test", (4,), lambda: None) == 4
+
+
+running = sys.modules["wamnet.kernels.run.denoise_on"]
+
+
+def test_the_kernels_of_the_filter_are_kept_too(executor_named, monkeypatch):
+    smoothed = next(name for name, feature in dataset.FEATURES.items() if feature.guides)
+    device, features = executor_named("c"), ("color", smoothed)
+    network, seen = model(features=features), noisy(features)
+    first = denoise_on(device, network, seen, keeps=True)
+    no_compiler(monkeypatch)
+    monkeypatch.setattr(smooth_kernel, "compile_smoothing", None)
+    running._filter.cache_clear()
+    assert denoise_on(device, network, seen, keeps=True).digest == first.digest

@@ -58,3 +58,8 @@ def test_a_limit_of_stacks_that_nobody_may_raise_is_rejected(monkeypatch):
     monkeypatch.setattr(memory.resource, "setrlimit", denied)
     with pytest.raises(ExecutorUnavailable, match=r"the stack limit is 160 KiB.* 256 KiB .*ulimit -s 8192"):
         memory.widen_stacks()
+
+
+def test_other_c_libraries_are_left_alone(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
+    assert not memory.keep_freed_memory()

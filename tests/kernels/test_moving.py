@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from wamnet.compiler.kernel.interface import PATH
 from wamnet.kernels import Pipeline, render_on
 from wamnet.kernels.run.render_on import Frames
+from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
@@ -124,3 +126,56 @@ def test_frames_of_scenes_that_are_known_share_a_kernel(executor, built):
     for scene, frame in zip(shots, found, strict=True):
         wanted = render_on(executor, scene, job).frame
         assert all(np.array_equal(frame[name], wanted[name]) for name in wanted.layers)
+
+
+def test_pictures_of_a_stream_come_in_order(executor, model):
+    """Each while the next one is drawn: what is yielded is not overwritten."""
+    shots = [cubes(time) for time in TIMES]
+    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
+        found = [drawn.picture for drawn in pipeline.stream(shots, range(len(shots)))]
+        for seed, (scene, picture) in enumerate(zip(shots, found, strict=True)):
+            pipeline.set_scene(scene)
+            assert np.array_equal(picture, pipeline.run(seed))
+        assert list(pipeline.stream([], [])) == []
+        with pytest.raises(ValueError, match="shorter"):
+            list(pipeline.stream(shots, [1]))
+
+
+def test_an_image_that_is_read_later_is_of_its_own_picture(executor, model):
+    shots = [cubes(time) for time in TIMES[:2]]
+    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
+        with pytest.raises(InputError, match="pipeline: has rendered no image yet"):
+            pipeline.later()
+        pipeline.draw(1)
+        first, kept = pipeline.later("normal", "color"), pipeline.image("normal")
+        pipeline.set_scene(shots[1])
+        pipeline.draw(2)
+        assert not np.array_equal(pipeline.image("normal"), kept)
+        assert np.array_equal(first().images["normal"], kept)
+        with pytest.raises(InputError, match="feature image 'depth': is not one of color, normal"):
+            pipeline.later("depth")
+
+
+@pytest.mark.nightly
+def test_an_animation_keeps_the_memory_of_its_device(executor_named, model, monkeypatch):
+    """Fifty pictures: as many buffers are alive as after the second one."""
+    executor = executor_named("opencl")
+    module = __import__(type(executor).__module__, fromlist=["cl"])
+    real, alive = module.cl.Buffer, []
+
+    class Counted(real):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            alive.append(1)
+
+        def __del__(self):
+            alive.pop()
+
+    monkeypatch.setattr(module.cl, "Buffer", Counted)
+    shots, counts = [cubes(0.05 + 0.1 * i) for i in range(50)], []
+    with Pipeline(executor, shots[0], model, SIZE, settings=SETTINGS, moving=shots) as pipeline:
+        for _ in pipeline.stream(shots, range(50)):
+            gc.collect()
+            counts.append(len(alive))
+    assert counts[0] > 0
+    assert set(counts[1:]) == {counts[1]}

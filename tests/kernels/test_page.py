@@ -189,3 +189,13 @@ def test_too_many_moving_numbers_are_refused():
 def test_a_scene_that_changes_its_form_is_refused():
     with pytest.raises(CompileError, match="its layout differs"):
         P.moving_numbers(animation("glossy", 0.0, 0.1), SETTINGS)
+
+
+def test_shadow_rays_are_those_of_the_model_s_training(model_of):
+    """PTK-22: by the kernel of paths, as many as the facts of the training say, or one."""
+    model = replace(model_of("color", "direct"), info={"trained_on_shadow_rays": "2, 3"})
+    data = P.page_data(animation("cornell", 0.0), P.networks_of(model, rank=2), SETTINGS)
+    (path,) = data["paths"]
+    assert "direct_b" in path["planes"]
+    assert "by 3 shadow rays of each camera ray" in path["source"]
+    assert np.any(floats(data["check"]["images"]["direct"]["values"]) > 0.0)

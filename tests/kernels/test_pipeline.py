@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from kit import encoded
 
+from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
@@ -399,3 +401,49 @@ def test_a_pipeline_of_integers_shows_what_they_stand_for(executor, model_of):
         for name, image in shown.items():
             # Half a step, and the rounding of 127 x + 1/2 in float32.
             assert np.abs(image - pipeline.image(name)).max() <= 0.5 / 127 + 2.0**-16
+
+
+def test_the_definition_is_the_composition(executor_named, model_of):
+    """PPL-7: on the interpreter the picture is what its kernels give one after another, to the bit."""
+    executor, model, size = executor_named("numpy"), model_of(ALL, 4, "clamp"), (11, 23)
+    with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS) as pipeline:
+        found = pipeline.run(5, 2)
+        images = {name: pipeline.image(name) for name in model.features}
+        assert np.array_equal(found, executor.run(pipeline.denoise, images))
+
+
+@pytest.mark.nightly(but=("numpy",))
+def test_another_time_compiles_paths_alone(executor, model_of, monkeypatch):
+    """The picture of another time is that of a pipeline made for it; encoding and denoiser stay built."""
+    model, size = model_of(("color", "normal"), 3, "clamp"), (8, 12)
+    with Pipeline(executor, scene("cornell", 2.0), model, size, settings=SETTINGS) as pipeline:
+        wanted = pipeline.run(4)
+    with Pipeline(executor, scene("cornell", 1.0), model, size, settings=SETTINGS) as pipeline:
+        other = pipeline.run(4)
+        kernels = pipeline.encode, pipeline.denoise
+        pipeline.set_scene(scene("cornell", 2.0))
+        assert np.array_equal(pipeline.run(4), wanted)
+        assert kernels == (pipeline.encode, pipeline.denoise)
+    assert np.abs(other - wanted).max() > 1e-3
+
+
+def test_the_first_picture_waits_for_no_proof(executor_named, model_of):
+    """PPL-15: the bound in its header is a valid one, without a certificate's search for a small one."""
+    model, executor = model_of(("color", "normal"), 3, "clamp"), executor_named("numpy")
+    with Pipeline(executor, scene("furnace"), model, (8, 12), settings=SETTINGS) as pipeline:
+        made = pipeline.denoise
+    assert made.certificate is None
+    assert made.plan.unproven == "it was compiled to be run at once, without one"
+    proven = compile_plan(replace(made.plan, proves=True))
+    assert proven.certificate is not None
+    assert all(0 < error < 1 / 255 for error in made.manifest["bound"]["output"])
+    assert ir.digest(made.kernels[0].programs) == ir.digest(proven.kernels[0].programs)
+
+
+def test_forgotten_kernels_are_built_again(executor, model_of):
+    model = model_of(("color",), 3, "clamp")
+    with Pipeline(executor, scene("lone_light"), model, (5, 4)) as pipeline:
+        first = pipeline.run(seed=3)
+        executor.forget()
+        assert not executor._built
+        assert np.array_equal(pipeline.run(seed=3), first)

@@ -87,3 +87,21 @@ def test_a_level_needs_those_below_it():
     everything = frozenset().union(*pocl_cpu.LEVELS.values())
     assert pocl_cpu.level(everything) == "x86-64-v4"
     assert pocl_cpu.level(everything - {"fma"}) == "x86-64-v2"
+
+
+def test_memory_behind_the_record_is_left_alone(monkeypatch):
+    """The pointer is in the same piece of readable memory, but just beyond what belongs to the record."""
+    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
+    words, _kept = record(b"generic", before=80)
+    monkeypatch.setattr(pocl_cpu, "_allocated", lambda _: 8 * 80)
+    before = list(words)
+    assert not pocl_cpu.name_the_processor(ctypes.addressof(words))
+    assert list(words) == before
+    monkeypatch.setattr(pocl_cpu, "_allocated", lambda _: 8 * 81)
+    assert pocl_cpu.name_the_processor(ctypes.addressof(words))
+
+
+def test_no_record_is_searched_further_than_known(monkeypatch):
+    monkeypatch.setattr(pocl_cpu.platform, "machine", lambda: "x86_64")
+    words, _kept = record(b"generic", words=256, before=pocl_cpu.RECORD_BYTES // 8)
+    assert not pocl_cpu.name_the_processor(ctypes.addressof(words))

@@ -160,3 +160,63 @@ def test_the_fastest_that_opens_is_chosen(monkeypatch, there, trains, name, pass
     assert found == name
     assert len(reasons) == len(passed)
     assert all(reason.startswith(begin) for reason, begin in zip(reasons, passed, strict=True))
+
+
+def test_no_opencl_platform(executor_named, monkeypatch):
+    executor_named("opencl")
+    from wamnet.kernels.devices import opencl_executor
+
+    monkeypatch.setattr(opencl_executor.cl, "get_platforms", list)
+    with pytest.raises(
+        ExecutorUnavailable, match=r"no platform is installed; pip install 'wamnet\[opencl\]'"
+    ):
+        kernels.open_executor("opencl")
+
+
+def test_opencl_platform_that_fails_is_passed_over(executor_named, monkeypatch):
+    device = executor_named("opencl").device
+    from wamnet.kernels.devices import opencl_executor
+
+    class Broken:
+        def get_devices(self):
+            raise opencl_executor.cl.LogicError("clGetDeviceIDs failed")
+
+    real = opencl_executor.cl.get_platforms()
+    monkeypatch.setattr(opencl_executor.cl, "get_platforms", lambda: [Broken(), *real])
+    with kernels.open_executor("opencl") as executor:
+        assert executor.device == device
+
+
+def test_unknown_opengl_context(executor_named):
+    executor_named("opengl-egl")
+    with pytest.raises(InputError, match=r"OpenGL context 'glx': unknown \(choose one of auto, egl, osmesa"):
+        kernels.open_executor("opengl", context="glx")
+
+
+@pytest.mark.parametrize(("newest", "asked"), [(430, [430]), (330, [430, 330])])
+def test_driver_that_gives_the_required_version_is_asked_for_compute_shaders(
+    executor_named, monkeypatch, newest, asked
+):
+    executor_named("opengl-egl")
+    from wamnet.kernels.devices import opengl_executor
+
+    required = []
+
+    def create(require, **options):
+        required.append(require)
+        if require > newest:
+            raise ValueError(f"version {require} is not supported")
+        return SimpleNamespace(version_code=require)
+
+    monkeypatch.setattr(opengl_executor.moderngl, "create_context", create)
+    assert opengl_executor.CONTEXTS["egl"]().version_code == newest
+    assert required == asked
+
+
+def test_osmesa_library_that_is_missing(monkeypatch):
+    from wamnet.kernels.devices import osmesa
+
+    monkeypatch.setattr(osmesa, "LIBRARIES", ("libnowhere.so",))
+    monkeypatch.setattr(osmesa.ctypes.util, "find_library", lambda name: None)
+    with pytest.raises(OSError, match=r"no library libnowhere\.so"):
+        osmesa.OSMesaContext()

@@ -254,3 +254,18 @@ def test_pictures_of_a_size_share_what_launches_hand_on(executor_named, kit):
         held.append(list(executor._between_passes))
     assert held[0] == held[1]
     assert not set(held[1]) & set(held[2])
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
+@pytest.mark.parametrize("target", ["opencl", "c"])
+@pytest.mark.parametrize("schedule", SPECTRA)
+def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, target, schedule, border, shape):
+    """Tiles of 21 x 21 pixels, two side by side; 12 channels, of which one image has an odd number."""
+    program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, border)
+    random = np.random.default_rng(2)
+    images = {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 5), ("b", 7))}
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    assert kit.excess(executor_named(target), program, images, artifact) <= 1

@@ -22,6 +22,7 @@ from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.proof.bounds import enclose
 from wamnet.compiler.training import step
 from wamnet.compiler.training.step_kernel import compile_step
+from wamnet.kernels.devices.opencl_trainer import OpenCLTrainer
 from wamnet.kernels.run import trainer
 from wamnet.kernels.run.trainer import train_on
 from wamnet.refimpl.errors import InputError, TrainingError
@@ -410,3 +411,46 @@ def test_refusals(opencl: Any, executor_named: Any, monkeypatch: Any) -> None:
         InputError, match=r"values of all training images .*: the device takes fewer than 100"
     ):
         train_on(opencl, SMALL, PAIRS)
+
+
+def test_no_step_left_is_no_step(opencl: Any) -> None:
+    kept: list[TrainState] = []
+    state = train_on(opencl, SMALL, PAIRS, until=2)
+    again = train_on(opencl, SMALL, PAIRS, state=state, until=2, on_checkpoint=kept.append)
+    assert tensors(again) == tensors(state) == tensors(kept[0])
+
+
+def test_an_interrupt_while_steps_are_handed_out(opencl: Any, monkeypatch: Any) -> None:
+    """The state kept is that of the steps that the device was given, in the middle of a block."""
+    kept: list[TrainState] = []
+    load = OpenCLTrainer.load
+
+    def interrupting(device: Any, *arguments: Any) -> None:
+        load(device, *arguments)
+        (update, *sizes), calls = device._launches[-1], []
+
+        def interrupted(*numbers: Any) -> None:
+            calls.append(1)
+            if len(calls) == 7:
+                raise KeyboardInterrupt
+            update(*numbers)
+
+        device._launches[-1] = (interrupted, *sizes)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(OpenCLTrainer, "load", interrupting)
+        with pytest.raises(KeyboardInterrupt):
+            train_on(opencl, SMALL, PAIRS, on_checkpoint=kept.append)
+    assert [state.step for state in kept] == [6]
+    assert tensors(kept[0]) == tensors(train_on(opencl, SMALL, PAIRS, until=6))
+
+
+def test_waiting_again_changes_nothing(opencl: Any) -> None:
+    """An interrupt may come after the wait, and what follows it waits once more."""
+    data = data_of(SMALL)
+    state = train.start(SMALL, dataset.Normalization(), data.digest)
+    run = begin(opencl, SMALL, kernel_of(SMALL), state, data)
+    run.enqueue(run.draw(0, 5))
+    assert run.settle() == run.settle()
+    assert tensors(run.state(run.step)) == tensors(run.state(5))
+    assert [number for number, _ in run.state(5).history] == [0, 4]

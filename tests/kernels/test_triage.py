@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
-from wamnet.kernels.judge import triage
+from wamnet.kernels.judge import apart, triage
 from wamnet.kernels.judge.apart import Apart, Outcome, attempt
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.refimpl.errors import ExecutorUnavailable
@@ -288,3 +289,46 @@ def test_no_stage_deviates_in_a_right_kernel(executor, model, images):
     runner = Inside(executor.name, executor)
     (kernel,) = triage.kernels_of([runner], lower(model), "ieee", SHAPE, "plain")
     assert first_stage(kernel, model, images) is None
+
+
+def test_numpy_s_nan_deviates(executor_named, model, images, monkeypatch):
+    ways = runners(executor_named, "opencl")
+    picture = np.full((*SHAPE, 3), np.nan, np.float32)
+    monkeypatch.setattr(ways[0], "run", lambda artifact, images: Outcome(picture))
+    found = verdicts_of(ways, model, images)
+    assert [v.kernel.runner.way for v in triage.odd_ones(found)] == ["numpy"]
+
+
+def test_shrinking_ends():
+    """After so many runs, whatever they say; and where nothing smaller fails, the whole is kept."""
+    runs = []
+    whole = Box(0, 0, 1000, 1000)
+    shrink(whole, lambda box: runs.append(box) or len(runs) % 3 == 0, most=20)
+    assert len(runs) == 20
+    assert shrink(whole, lambda box: False) == whole
+    assert shrink(whole, lambda box: True, at=(999, 999)) == Box(999, 999, 1, 1)
+
+
+def test_a_failure_that_comes_once_is_told(executor_named, model, images):
+    """The whole picture is kept, with what it showed."""
+    (runner,) = runners(executor_named, "numpy")
+    picture = runner.run(compile_program(lower(model), "numpy"), images).image
+    answers = iter([Outcome(picture + np.float32(0.25))])
+    once = SimpleNamespace(
+        way="numpy",
+        target="numpy",
+        device="fake",
+        picked=runner.picked,
+        run=lambda artifact, images: next(answers, None) or runner.run(artifact, images),
+    )
+    found = verdicts_of([once], model, images)
+    small = reduced(found, model, images)
+    assert not small.repeats
+    assert small.box == Box(0, 0, *SHAPE)
+    assert list(small.verdicts) == found
+
+
+def test_lines_have_no_line_ends():
+    """A driver's log has many: a verdict is one line."""
+    executor = SimpleNamespace(run=lambda *_: (_ for _ in ()).throw(RuntimeError("a\n  b")))
+    assert apart.attempt(executor, None, {}).failure == "RuntimeError: a b"

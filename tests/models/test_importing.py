@@ -332,3 +332,14 @@ def test_constants_are_limited(nodes, constants, told, tmp_path):
     path = graph(tmp_path / "graph.onnx", [*nodes, ("Relu", "x", "y")], constants)
     with pytest.raises(InputError, match=told):
         import_network(path, {})
+
+
+def test_names_fit_kernels(tmp_path):
+    path = tmp_path / "graph.onnx"
+    nodes = [("Add", ["1.in", "1:in"], "y")]
+    graph(path, nodes, inputs=("1.in", "1:in"))
+    found = import_network(path, {"1:in": (-2.0, 3.0)}).model.siren.sources
+    assert [(each.name, each.low, each.high) for each in found] == [
+        ("x1_in", 0.0, 1.0),
+        ("x1_in_1", -2.0, 3.0),
+    ]

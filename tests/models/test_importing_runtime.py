@@ -357,3 +357,17 @@ def test_random_graphs(compared, tmp_path):
     assert outcomes["equal"] > 100
     assert outcomes["rejected"] > 100
     assert outcomes["not run"] < 40
+
+
+def test_sizes_of_inputs_agree(tmp_path):
+    from onnx import helper
+
+    path = tmp_path / "graph.onnx"
+    inputs = [helper.make_tensor_value_info(name, 1, [1, 2, size, 9]) for name, size in (("a", 1), ("b", 9))]
+    output = helper.make_tensor_value_info("y", 1, [None] * 4)
+    add = helper.make_node("Add", ["a", "b"], ["y"])
+    whole = helper.make_graph([add], "graph", inputs, [output])
+    model = helper.make_model(whole, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    path.write_bytes(model.SerializeToString())
+    with pytest.raises(InputError, match="input b: size of axis H 9: 1 as of the inputs before"):
+        import_network(path, {})

@@ -382,3 +382,42 @@ def test_floats_in_a_model_of_integers_are_refused(tmp_path: Path) -> None:
     path.write_bytes(model_file._encode(model_file.MODEL_FORMAT, tensors, texts))
     with pytest.raises(InputError, match="type of a tensor"):
         model_file.load_model(path)
+
+
+def test_the_library_reads_what_is_written(tmp_path: Path) -> None:
+    path, model = tmp_path / "model.safetensors", model_of()
+    model_file.save_model(path, model)
+    with safe_open(path, framework="numpy") as file:
+        texts = file.metadata()
+        assert (texts["format"], texts["version"]) == ("wamnet-model", "1")
+        assert json.loads(texts["features"]) == ["color", "depth"]
+        assert json.loads(texts["window"]) == {"size": 2, "border": "zero"}
+        assert float(texts["omega_0_first"]) == 3.3
+        assert texts["info.scene"] == model.info["scene"]
+        assert sorted(file.keys()) == ["layer0.bias", "layer0.weight", "layer1.bias", "layer1.weight"]
+        assert np.array_equal(file.get_tensor("layer1.weight"), model.siren.weights[1])
+    # The container aligns data: the header's end is a multiple of 8.
+    assert int.from_bytes(path.read_bytes()[:8], "little") % 8 == 0
+
+
+@pytest.mark.parametrize(
+    ("dtype", "count"), [("BF16", 4), ("F8_E5M2", 8), ("F8_E4M3", 8), ("BOOL", 8), ("U64", 1), ("F16", 4)]
+)
+def test_a_tensor_of_another_type_is_ignored(dtype: str, count: int, tmp_path: Path) -> None:
+    """Some types NumPy lacks: bfloat16, and numbers of 8 bits."""
+    path = tmp_path / "model.safetensors"
+    of_container(path, {**ENTRY, "dtype": dtype, "shape": [count]})
+    assert same(model_file.load_model(path), model_of())
+
+
+def test_training_through_a_file_gives_the_same_bits(tmp_path: Path) -> None:
+    path = tmp_path / "run.checkpoint"
+    train.train(
+        RECIPE, pairs(), until=10, on_checkpoint=lambda state: model_file.save_checkpoint(path, state)
+    )
+    resumed = train.train(RECIPE, pairs(), state=model_file.load_checkpoint(path))
+    whole = train.train(RECIPE, pairs())
+    for name, state in (("resumed", resumed), ("whole", whole)):
+        model_file.save_checkpoint(tmp_path / name, state)
+    assert (tmp_path / "resumed").read_bytes() == (tmp_path / "whole").read_bytes()
+    assert resumed.history == whole.history

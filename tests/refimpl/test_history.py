@@ -388,3 +388,36 @@ def test_limits_beyond_the_bound_s_reach_are_refused(name, value):
     """HIS-6."""
     with pytest.raises(InputError, match=f"^limit `{name}` .*from 1 to {H.MOST_LIMIT}"):
         H.Limits(**{name: value})
+
+
+def test_the_corners_of_a_box_are_those_of_its_pose():
+    """HIS-2: the frame maps (1, 1, 1) to center + sum of half extents along the rows of the rotation."""
+    box = POSES["box"](0.2)
+    axes, origin = H._pose(box)
+    rows = np.array(box.rotation)
+    expected = np.array(box.center) + sum(box.half_extent[i] * rows[i] for i in range(3))
+    assert np.abs(axes @ np.ones(3) + origin - expected).max() <= 8 * U["float64"]
+
+
+def test_normals_turn_with_their_primitive_and_have_any_length():
+    """HIS-4: a box that turned by 60 degrees has the normal of 60 degrees before, and half the size: half
+    of it; a wall that grew to twice its size has a normal of half the length, which is the same side."""
+    pose = Box((0.0, 0.0, -4.0), (1.0,) * 3, WHITE, _about_y(np.radians(60.0)))
+    then = replace(pose, rotation=_about_y(0.0), half_extent=(0.5,) * 3)
+    now, before = (Scene("box", CAMERA, boxes=(box,)) for box in (pose, then))
+    own = np.array([[0.0, 0.0, 1.0]])
+    first = H.First(np.zeros(1, np.int32), own, own @ np.array(pose.rotation), own)
+    row = H.row_of(H.motion(now, before, np.float64), first.number)
+    _, normal = H.point_before(row, first)
+    assert np.abs(normal - [0.0, 0.0, 0.5]).max() <= 16 * U["float64"]
+    past, moves, first = by_hand()
+    smaller = replace(moves, turn=np.broadcast_to(-0.5 * np.eye(3), (3, 3, 3)))
+    assert H.gathered(past, smaller, first, shifted(0.0, 0.0)).count.all()
+
+
+def test_pixels_without_weight_do_not_widen_the_interval():
+    """HIS-5: at a displacement of 0 only the pixel itself counts."""
+    for color in ((0.0, 4.0, 8.0, 16.0), (16.0, 8.0, 4.0, 0.0)):
+        known = H.gathered(*by_hand(color=color), shifted(0.0, 0.0))
+        assert np.array_equal(known.low, known.color)
+        assert np.array_equal(known.high, known.color)

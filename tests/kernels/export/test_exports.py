@@ -12,10 +12,12 @@ import jsonschema
 import numpy as np
 import pytest
 
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.scene_inputs import tables_of
 from wamnet.compiler.variants import parse, vary
 from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export import check, check_pair, targets, tools
-from wamnet.kernels.export.motion import FORMULAS, Motion
+from wamnet.kernels.export.motion import FORMULAS, KINDS, Motion, drawn
 from wamnet.kernels.export.package import Request, export
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
@@ -411,3 +413,31 @@ def test_halves_are_beside_the_weights_where_they_are_the_same_numbers():
     assert "denoise/weights16.bin" not in full.files
     schema = json.loads((ROOT / "spec/export.schema.json").read_text())
     jsonschema.Draft202012Validator(schema).validate(whole.manifest)
+
+
+@pytest.mark.parametrize("kind", KINDS[1:])
+def test_what_is_drawn_shows_which_numbers_move(kind):
+    """EXP-13: the formulas give the numbers of a scene that was not among those drawn, rounded once."""
+    scene, settings = canonical("minicubes", time=0.3), Settings()
+    motion = Motion((0.3,), (scene,), (kind,))
+    inputs, new = motion.inputs(settings), drawn(scene, (kind,), 99)
+    tables = {path for places in inputs.places for path, _ in places}
+    begins = {"camera": ("camera.",), "lights": ("world.lights.", "world.geometry.emission")}
+    wanted = begins.get(kind, ("world.geometry.groups.", "world.lights.corner"))
+    assert all(path.startswith(wanted) for path in tables)
+    programs = lower_scene(scene, settings, moving=inputs)
+    assert all(each["formula"] for each in motion.facts(programs)["list"])
+    assert inputs.fits(tables_of(scene, settings), tables_of(new, settings))
+    assert not np.array_equal(motion.other(settings), inputs.values(scene))
+
+
+def test_the_rays_of_features_are_stated_without_a_scene():
+    """A host that brings its own features has to know how many rays they are averaged over."""
+    made = export(Request(replace(model(), info={"trained_on_feature_spp": "16"}), "glsl"))
+    told = "The model was trained on features averaged over 16 camera rays per pixel: give it such images"
+    assert told in made.files["README.md"].decode()
+    assert "camera rays" not in export(Request(model(), "glsl")).files["README.md"].decode()
+
+
+KINDS = {"sine", "random.block", "sampling.cosine_hemisphere", "picture.denoised"}
+"""Kinds that runners are asked here; `wamnet conformance --executor wgsl` asks all."""

@@ -438,3 +438,30 @@ def test_the_program_in_python_names_a_missing_package(host):
 def test_onnx_runtime_for_node_is_right(tmp_path):
     folder = installed(written(made("onnxruntime"), tmp_path), "onnxruntime-node")
     run(folder, "node", "node.mjs")
+
+
+@pytest.mark.needs("devices")
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_program_in_cpp_is_right(compiler, tmp_path):
+    needs("make", compiler.replace("++", "") if compiler == "clang++" else compiler)
+    folder = written(made("cpp", scene=canonical("lone_light")), tmp_path)
+    run(
+        folder,
+        "make",
+        "-s",
+        "run",
+        f"CXX={compiler}",
+        "CXXFLAGS=-O2 -Wall -Wextra -Werror -Wno-unused-function",
+    )
+
+
+@pytest.mark.needs("devices")
+def test_the_program_on_opencl_says_what_is_missing(tmp_path):
+    """A sentence and a status, where there is no library."""
+    needs("make", "cc")
+    folder = written(made("opencl"), tmp_path)
+    environment = {**os.environ, "HOST_OPENCL": "libNobodyHasIt.so"}
+    options = {"env": environment, "capture_output": True, "text": True}
+    done = subprocess.run(["make", "-s", "run"], cwd=folder, check=False, **options)
+    assert done.returncode != 0
+    assert "libNobodyHasIt.so: cannot be loaded: install OpenCL's loader" in done.stderr

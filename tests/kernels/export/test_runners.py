@@ -277,3 +277,45 @@ def test_c_is_clean_under_warnings_and_sanitizers(traced, tmp_path):
     held = encode_sums({"color": color}, 1.0, ("color",), Normalization())["color"]
     # The compiler keeps the interpreter's order of operations, without contraction: the sums are its bits.
     assert (np.abs(found - held) <= bound).all()
+
+
+MOVING = """
+#include <stdio.h>
+#include "path.h"
+
+static const float rows[2][{count}] = {{{rows}}};
+static float sums[{sums}];
+
+int main(void)
+{{
+    const wamnet_part part = {{{width}, {height}, {first_row}, {rows_of_part}, 0u, 1, 7u}};
+    for (int moment = 0; moment < 2; ++moment) {{
+        wamnet_trace(&part, sums, rows[moment]);
+        for (int i = 0; i < {sums}; ++i) {{
+            printf("%a\\n", (double)sums[i]);
+        }}
+    }}
+    return 0;
+}}
+"""
+"""A program that has a scene that moves pasted in, and plays two rows of its table."""
+
+
+@pytest.mark.nightly
+def test_a_host_in_c_plays_two_moments(tmp_path):
+    """PTK-18, EXP-13: nothing is compiled, or read from outside of the arrays, between them."""
+    programs, rows, part, wanted = moments()
+    kernel = compile_path(programs, "c", groups=layers_of(FEATURES))
+    (tmp_path / "path.h").write_text(kernel.source)
+    lines = ", ".join("{" + ", ".join(float(x).hex() + "f" for x in row) + "}" for row in rows)
+    facts = {"count": len(rows[0]), "rows": lines, "sums": wanted[0].size, "rows_of_part": part.rows}
+    (tmp_path / "main.c").write_text(MOVING.format(**{**asdict(part), **facts}))
+    try:
+        options = ["-std=c99", "-O1", "-g", *targets.WARNINGS[1:-1], *SANITIZERS]
+        tools.run("cc", *options, "-o", "main", "main.c", "-lm", folder=tmp_path)
+    except ExecutorUnavailable as error:
+        pytest.skip(str(error))
+    printed = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    found = np.array([float.fromhex(line) for line in printed.split()])
+    # The compiler keeps the interpreter's order of operations, without contraction.
+    assert np.array_equal(found, np.concatenate([sums.ravel() for sums in wanted]))

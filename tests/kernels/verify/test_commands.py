@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -10,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from wamnet.kernels.orphans import printed, running
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.materials import Mirror
 from wamnet.refimpl.light.scene import Scene, Sphere, from_json
@@ -225,3 +227,12 @@ def test_a_report_holds_no_control_characters():
     page.encode()
     assert page.replace("\n", "").isprintable()
     assert page.count(r"\x1b[31m") == 3
+
+
+@pytest.mark.needs("programs")
+def test_only_the_end_of_what_a_program_prints_is_kept():
+    """A flood of prints took a gigabyte of memory in a second."""
+    program = "import os\nfor n in range(400): os.write(1, b'%d' % (n % 10) * 50_000)\nos.write(1, b'end')"
+    with running([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
+        kept = printed(process, 1000, 60.0)
+    assert kept == b"9" * 997 + b"end"

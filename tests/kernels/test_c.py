@@ -320,6 +320,6 @@ def test_picture_too_large_for_indices(executor_named, kit, monkeypatch):
     monkeypatch.setattr(c_executor.CExecutor, "largest_bytes", 40)
     artifact = compile_program(kit.program(lambda x: x * 0.5, {"a": 1}), "c")
     with pytest.raises(
-        InputError, match="size of the image on .* '4 x 3 with 1 channels': .* at most 40 bytes"
+        InputError, match=r"size of the image on .* '4 x 3 with 1 channels': .* at most 40 bytes"
     ):
         executor_named("c").run(artifact, {"a": np.zeros((3, 4, 1), np.float32)})

@@ -1563,12 +1563,22 @@ static double versine(const world *w, v3 d) {
     return 0.5 * dot(chord, chord);
 }
 
+/* ENV-1: without the sun. */
+static v3 sky_gradient(const sky *s, v3 d) {
+    v3 end = d.c[1] > 0 ? s->zenith : s->ground;
+    return add(s->horizon, scale(sub(end, s->horizon), fabs(d.c[1])));
+}
+
+/* ENV-7: over all directions. */
+static v3 sky_mean(const sky *s) {
+    return scale(add(add(s->zenith, s->ground), scale(s->horizon, 2)), 0.25);
+}
+
 /* ENV-1 */
 static v3 sky_radiance(const world *w, v3 d) {
     const sky *s = &w->from.above;
-    v3 end = d.c[1] > 0 ? s->zenith : s->ground;
-    v3 gradient = add(s->horizon, scale(sub(end, s->horizon), fabs(d.c[1])));
-    return add(gradient, scale(s->sun_irradiance, spherical_cauchy_pdf(versine(w, d), s->concentration)));
+    v3 glow = scale(s->sun_irradiance, spherical_cauchy_pdf(versine(w, d), s->concentration));
+    return add(sky_gradient(s, d), glow);
 }
 
 /* ENV-2 */
@@ -1666,36 +1676,66 @@ static v3 unshadowed(parts lights, v3 point, v3 normal, v3 reflectance) {
     return scale(mul(reflectance, found), 1 / PI);
 }
 
+static double components(v3 v) { return v.c[0] + v.c[1] + v.c[2]; }
+
 /* LTR-12: lamp k's light, without its hue. */
 static double lamp_light(const part *l, v3 point, v3 normal) {
-    v3 light = unshadowed((parts){(part *)l, 1}, point, normal, vec(PI, PI, PI));
-    return light.c[0] + light.c[1] + light.c[2];
+    return components(unshadowed((parts){(part *)l, 1}, point, normal, vec(PI, PI, PI)));
+}
+
+/* LTR-12: the way to a point of a lamp, and its light. */
+typedef struct {
+    v3 wi, radiance;
+    double distance, power;
+} way;
+
+static way to_lamp(const part *lamp, v3 origin, double u0, double u1) {
+    v3 front = unit(cross(lamp->edge_u, lamp->edge_v));
+    v3 point = quad_point(u0, u1, lamp->corner, lamp->edge_u, lamp->edge_v);
+    double size = fmax(fabs(origin.c[0]), fmax(fabs(origin.c[1]), fabs(origin.c[2])));
+    v3 offset = sub(spawned(point, front, size), origin), wi = scale(offset, 1 / length(offset));
+    v3 radiance = dot(front, wi) < 0 ? light_radiance(lamp) : BLACK;
+    return (way){wi, radiance, length(offset), components(light_radiance(lamp))};
+}
+
+/* ENV-7 */
+static way to_sky(const world *w, v3 normal, double wanted, double sun, double rest, double u1) {
+    const sky *s = &w->from.above;
+    if (wanted < sun) {
+        v3 wi = to_world(spherical_cauchy(fmin(wanted / fmax(sun, 1e-15), 1), u1, s->concentration), w->sun.sun);
+        return (way){wi, s->sun_irradiance, MISS, components(s->sun_irradiance)};
+    }
+    v3 wi = to_world(cosine_hemisphere(fmin((wanted - sun) / fmax(rest, 1e-15), 1), u1), normal);
+    return (way){wi, sky_gradient(s, wi), MISS, components(sky_mean(s))};
 }
 
 /* LTR-12 */
 static v3 direct(const world *w, const hit *h, v3 reflectance, uint32_t seed, uint32_t pixel, uint32_t sample,
                  uint32_t rays, uint32_t number) {
     parts lamps = w->from.lights;
-    double total = 0, before = 0, u = 0;
+    const sky *above = &w->from.above;
+    double light = 0, before = 0, u = 0, sun = 0, rest = 0;
     if (h->id >= w->nothing || w->surfaces[h->id].light >= 0) return BLACK;
-    for (size_t k = 0; k < lamps.count; k++) total += lamp_light(&lamps.items[k], h->point, h->normal);
+    for (size_t k = 0; k < lamps.count; k++) light += lamp_light(&lamps.items[k], h->point, h->normal);
+    if (above->given) {
+        sun = components(above->sun_irradiance) * fmax(0, dot(h->normal, w->sun.sun));
+        rest = PI * components(sky_mean(above));
+    }
     words at = net_words(seed, pixel, sample * rays + number, 0xFFFFFFFFu);
+    double wanted = uniform(at.w[0]) * (light + sun + rest), u1 = uniform(at.w[1]);
     const part *chosen = NULL;
-    for (size_t k = 0; k < lamps.count && before <= uniform(at.w[0]) * total; k++) {
+    for (size_t k = 0; k < lamps.count && before <= wanted; k++) {
         double own = lamp_light(&lamps.items[k], h->point, h->normal);
         chosen = &lamps.items[k];
-        u = fmin((uniform(at.w[0]) * total - before) / fmax(own, 1e-15), 1);
+        u = fmin((wanted - before) / fmax(own, 1e-15), 1);
         before += own;
     }
-    if (!chosen || !(total > 0)) return BLACK;
-    v3 origin = spawned(h->point, h->normal, h->t), front = unit(cross(chosen->edge_u, chosen->edge_v));
-    v3 point = quad_point(u, uniform(at.w[1]), chosen->corner, chosen->edge_u, chosen->edge_v);
-    double size = fmax(fabs(origin.c[0]), fmax(fabs(origin.c[1]), fabs(origin.c[2])));
-    v3 offset = sub(spawned(point, front, size), origin), wi = scale(offset, 1 / length(offset));
-    if (!(dot(h->normal, wi) > 0 && dot(front, wi) < 0) || occluded(w, origin, wi, length(offset))) return BLACK;
-    v3 radiance = light_radiance(chosen);
-    double sum = radiance.c[0] + radiance.c[1] + radiance.c[2];
-    return scale(mul(reflectance, radiance), total / (sum * PI * rays));
+    bool to_above = above->given && wanted >= light;
+    if (!(light + sun + rest > 0) || (!chosen && !to_above)) return BLACK;
+    v3 origin = spawned(h->point, h->normal, h->t);
+    way to = to_above ? to_sky(w, h->normal, wanted - light, sun, rest, u1) : to_lamp(chosen, origin, u, u1);
+    if (!(dot(h->normal, to.wi) > 0) || occluded(w, origin, to.wi, to.distance)) return BLACK;
+    return scale(mul(reflectance, to.radiance), (light + sun + rest) / (fmax(to.power, 1e-15) * PI * rays));
 }
 
 /* LTR-2 */

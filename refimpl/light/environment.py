@@ -21,7 +21,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from .. import vectors
 from ..frame import SUN, Frame
-from ..vectors import Directions, Floats, Radiance
+from ..vectors import Directions, Floats, Normals, Radiance, Truths
 from . import sampling
 from .scene import Scene, Sky
 
@@ -76,11 +76,15 @@ def with_sun(scene: Scene, frame: Frame) -> Frame:
 
 def radiance(sky: Environment, direction: Directions) -> Radiance:
     """Return the radiance (..., 3) that comes from unit directions (..., 3)."""
+    glow = sampling.spherical_cauchy_pdf(_versine(sky, direction), sky.concentration)
+    return gradient(sky, direction) + glow[..., np.newaxis] * sky.irradiance
+
+
+def gradient(sky: Environment, direction: Directions) -> Radiance:
+    """Return the radiance (..., 3) from unit directions (..., 3) without the sun's."""
     height = direction[..., 1]
     pole = vectors.choose(height > 0.0, sky.zenith, sky.ground)
-    gradient = sky.horizon + vectors.scale(pole - sky.horizon, np.abs(height))
-    glow = sampling.spherical_cauchy_pdf(_versine(sky, direction), sky.concentration)
-    return gradient + glow[..., np.newaxis] * sky.irradiance
+    return sky.horizon + vectors.scale(pole - sky.horizon, np.abs(height))
 
 
 def sample(sky: Environment, u_choice: Floats, u0: Floats, u1: Floats) -> Directions:
@@ -88,6 +92,19 @@ def sample(sky: Environment, u_choice: Floats, u0: Floats, u1: Floats) -> Direct
     concentration = np.where(u_choice < sky.sun_share, sky.concentration, np.zeros_like(u0))
     local = sampling.sample_spherical_cauchy(u0, u1, concentration)
     return sampling.to_world(local, np.zeros_like(local) + sky.sun)
+
+
+def power(sky: Environment) -> tuple[Floats, Floats]:
+    """Return the sun's irradiance () and the mean radiance () of the rest, both as sums of the channels."""
+    mean = (sky.zenith + sky.horizon + sky.horizon + sky.ground) / 4
+    return sky.irradiance[0] + sky.irradiance[1] + sky.irradiance[2], mean[0] + mean[1] + mean[2]
+
+
+def towards(sky: Environment, normal: Normals, sunny: Truths, u0: Floats, u1: Floats) -> Directions:
+    """Map u0, u1 (...) to unit directions (..., 3): into the sun's lobe, or by the cosine around normals."""
+    lobe = sampling.sample_spherical_cauchy(u0, u1, np.zeros_like(u0) + sky.concentration)
+    local = vectors.choose(sunny, lobe, sampling.sample_cosine_hemisphere(u0, u1))
+    return sampling.to_world(local, vectors.choose(sunny, np.zeros_like(local) + sky.sun, normal))
 
 
 def pdf(sky: Environment, direction: Directions) -> Floats:

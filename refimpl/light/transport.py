@@ -381,21 +381,62 @@ def _disk(world: World, surface: Surface, middle: Points, normal: Normals, area:
 def direct(world: World, surface: Surface, hit: Hit, counters: Counters, rays: int, number: Any) -> Radiance:
     """Return what shadow ray `number` (...) of so many `rays` adds to the layer `direct` (..., 3).
 
-    Their sum estimates `unshadowed` with each lamp's light times the share of its area that the surface sees.
-    A lamp is picked in proportion to its unshadowed light, and a point on it uniformly, by two numbers: what
-    is left of the first one, after the choice, is uniform again. The rays of all samples of a pixel are one
-    sequence of points that are spread evenly over lamps and areas (sobol.py: net_uniforms).
+    Their sum estimates `unshadowed` with each lamp's light times the share of its area that the surface sees,
+    and the same of the sun and of the rest of the sky. One of all is picked in proportion to its unshadowed
+    light, and a point of the lamp, or a direction, by two numbers: what is left of the first one, after the
+    choice, is uniform again. The rays of all samples of a pixel are one sequence of points that are spread
+    evenly over lamps and areas (sobol.py: net_uniforms).
     """
     black = np.zeros_like(surface.reflectance[..., 0])
-    if world.lights is None:
+    if world.lights is None and world.environment is None:
         return vectors.vector(black, black, black)
-    lights, dtype = world.lights, world.geometry.dtype
-    middle = lights.corner + (lights.edge_u + lights.edge_v) / 2
+    dtype = world.geometry.dtype
+    lamps = black if world.lights is None else _lamplight(world, surface)
+    total = lamps
+    if world.environment is not None:
+        total = lamps + sum(_skylight(world.environment, surface))
+    sample = counters.sample * np.uint32(rays) + number
+    block = np.full_like(sample, SHADOW_BLOCK)
+    u0, u1, _, _ = sobol.net_uniforms(counters.seed, counters.pixel, sample, block, dtype)
+    wanted = u0 * total
+    # Send the shadow ray, from the surface to the point.
+    reflects = hit.surface < world.materials.ends
+    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(reflects, hit.t, 0.0))
+    if world.environment is None:
+        way = _to_lamp(world, surface, origin, wanted, u1)
+    else:
+        way = _to_sky(world.environment, surface, wanted - lamps, u1)
+        if world.lights is not None:
+            way = _either(wanted >= lamps, way, _to_lamp(world, surface, origin, wanted, u1))
+    facing = reflects & (way.cos_surface > 0.0) & (way.cos_light > 0.0)
+    blocked = intersection.occluded(world.geometry, origin, way.wi, way.distance, facing)
+    part = total / np.maximum(way.pdf, LEAST_DENSITY) * dtype.type(1 / (np.pi * rays))
+    return vectors.scale(surface.reflectance * way.radiance, np.where(facing & ~blocked, part, 0.0))
+
+
+def _lamp_tables(lights: Lights) -> tuple[Any, ...]:
+    """Return each lamp's power, middle, normal and area."""
     power = lights.radiance[:, 0] + lights.radiance[:, 1] + lights.radiance[:, 2]
+    return power, lights.corner + (lights.edge_u + lights.edge_v) / 2, lights.normal, lights.area
+
+
+def _lamplight(world: World, surface: Surface) -> Floats:
+    """Return the irradiance (...) of a surface by all lamps, the sum of its channels."""
 
     def add(values: tuple[Any], power: Floats, *disk: Any) -> tuple[Any]:
         """Add a lamp's light (...)."""
         return (values[0] + power * _disk(world, surface, *disk),)
+
+    assert world.lights is not None
+    black = np.zeros_like(surface.reflectance[..., 0])
+    (total,) = vectors.fold_rows(add, _lamp_tables(world.lights), (black,))
+    return total
+
+
+def _to_lamp(world: World, surface: Surface, origin: Points, wanted: Floats, u1: Floats) -> Towards:
+    """Return the way to a point of the lamp with which light adds up to what is wanted; pdf: its power."""
+    lights, black = world.lights, np.zeros_like(wanted)
+    assert lights is not None
 
     def pick(values: tuple[Any, ...], index: Any, power: Floats, *disk: Any) -> tuple[Any, ...]:
         """Choose a lamp if the light before it does not exceed what is looked for."""
@@ -405,24 +446,29 @@ def direct(world: World, surface: Surface, hit: Hit, counters: Counters, rays: i
         share = np.where(here, (wanted - before) / np.maximum(own, LEAST_DENSITY), share)
         return before + own, np.where(here, index, chosen), share
 
-    tables = power, middle, lights.normal, lights.area
-    (total,) = vectors.fold_rows(add, tables, (black,))
-    sample = counters.sample * np.uint32(rays) + number
-    block = np.full_like(sample, SHADOW_BLOCK)
-    u0, u1, _, _ = sobol.net_uniforms(counters.seed, counters.pixel, sample, block, dtype)
-    wanted = u0 * total
-    first = np.zeros_like(black, dtype=np.int32)
-    ids = np.arange(len(power), dtype=np.int32)
-    _, index, share = vectors.fold_rows(pick, (ids, *tables), (black, first, black))
-    # Send the shadow ray, from the surface to the point.
-    reflects = hit.surface < world.materials.ends
-    origin = intersection.spawn_origin(surface.point, surface.normal, np.where(reflects, hit.t, 0.0))
+    tables = np.arange(len(lights.area), dtype=np.int32), *_lamp_tables(lights)
+    _, index, share = vectors.fold_rows(pick, tables, (black, np.zeros_like(black, dtype=np.int32), black))
     way = _towards_point(lights, surface.normal, origin, index, np.minimum(share, 1.0), u1)
-    facing = reflects & (way.cos_surface > 0.0) & (way.cos_light > 0.0)
-    blocked = intersection.occluded(world.geometry, origin, way.wi, way.distance, facing)
-    power = way.radiance[..., 0] + way.radiance[..., 1] + way.radiance[..., 2]
-    part = total / np.maximum(power, LEAST_DENSITY) * dtype.type(1 / (np.pi * rays))
-    return vectors.scale(surface.reflectance * way.radiance, np.where(facing & ~blocked, part, 0.0))
+    return way._replace(pdf=way.radiance[..., 0] + way.radiance[..., 1] + way.radiance[..., 2])
+
+
+def _skylight(sky: Environment, surface: Surface) -> tuple[Floats, Floats]:
+    """Return the irradiance (...) of a surface by the sun, and that by the rest as if that were uniform."""
+    sun, rest = environment.power(sky)
+    towards = vectors.dot(surface.normal, np.zeros_like(surface.normal) + sky.sun)
+    return sun * np.maximum(towards, 0.0), np.full_like(towards, np.pi * rest)
+
+
+def _to_sky(sky: Environment, surface: Surface, wanted: Floats, u1: Floats) -> Towards:
+    """Return the way to the sun or to the rest of the sky; pdf: the power of what gives its light there."""
+    sun, rest = _skylight(sky, surface)
+    sunny = wanted < sun
+    share = np.where(sunny, wanted, wanted - sun) / np.maximum(np.where(sunny, sun, rest), LEAST_DENSITY)
+    wi = environment.towards(sky, surface.normal, sunny, np.minimum(np.maximum(share, 0.0), 1.0), u1)
+    radiance = vectors.choose(sunny, sky.irradiance, environment.gradient(sky, wi))
+    cos_surface = np.maximum(vectors.dot(surface.normal, wi), 0.0)
+    pdf = np.where(sunny, *environment.power(sky))
+    return Towards(wi, cos_surface, np.ones_like(cos_surface), pdf, radiance, np.full_like(cos_surface, MISS))
 
 
 class Towards(NamedTuple):
@@ -451,6 +497,11 @@ def _towards(world: World, site: Site, origin: Points, u_pick: Floats, u0: Float
         _towards_sky(world, site, rest, u0, u1),
         _towards_light(world, site, origin, rest, u0, u1),
     )
+    return _either(is_sky, sky, light)
+
+
+def _either(is_sky: Truths, sky: Towards, light: Towards) -> Towards:
+    """Return the way to the sky or that to a light."""
     return Towards(
         vectors.choose(is_sky, sky.wi, light.wi),
         np.where(is_sky, sky.cos_surface, light.cos_surface),

@@ -15,7 +15,7 @@ from wamnet.refimpl.light import render as R
 from wamnet.refimpl.light import scenes, transport
 from wamnet.refimpl.light.camera import camera_basis, camera_ray
 from wamnet.refimpl.light.intersection import Hit, Surface, reflecting
-from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene
+from wamnet.refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky
 from wamnet.refimpl.light.transport import Settings
 
 
@@ -284,11 +284,11 @@ def test_frames_have_unshadowed_light():
 # ---- the layer direct --------------------------------------------------------------------------------------
 
 
-def shaded(*lights, quads=(), samples=1, rays=1, reflectance=0.5, dtype="float64"):
-    """Return the layers unshadowed and direct (3,) of a floor's point at the origin under some lights."""
+def shaded(*lights, quads=(), samples=1, rays=1, reflectance=0.5, dtype="float64", sky=None):
+    """Return the layers unshadowed and direct (3,) of a floor's point at the origin, under lights and sky."""
     floor = Quad((-9.0, 0.0, -9.0), (0.0, 0.0, 18.0), (18.0, 0.0, 0.0), (reflectance,) * 3)
     scene = Scene("lit", Camera((0.0, 1.0, 5.0), (0.0, 0.0, 0.0)), quads=(floor, *quads), lights=lights)
-    world = transport.build(scene, Settings(), dtype)
+    world = transport.build(replace(scene, environment=sky), Settings(), dtype)
     one = np.ones((samples, 1), dtype)
     surface = reflecting(*(one * np.array(row, dtype) for row in ((0, 0, 0), (0, 1, 0), (reflectance,) * 3)))
     hit = Hit(one[:, 0], np.zeros(samples, np.int32))
@@ -324,6 +324,40 @@ def test_lamps_of_other_hues_are_mixed_in_proportion():
     assert (unshadowed > 0.0).tolist() == [True, True, False]
 
 
+WHITE, SUNNY = (0.25, 0.5, 0.75), (3.0, 2.0, 1.0)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_light_of_an_open_sky_has_no_noise(dtype):
+    """ENV-7: a uniform sky gives reflectance times its radiance, a sun irradiance times cosine / pi."""
+    uniform = Sky(WHITE, WHITE, WHITE, (0.0, 1.0, 0.0), (0.0,) * 3, 100.0)
+    sunny = replace(uniform, sun_direction=(0.6, 0.8, 0.0), sun_irradiance=SUNNY, sun_concentration=1e4)
+    expected = 0.5 * np.array(WHITE)
+    black = (0.0,) * 3
+    alone = replace(sunny, zenith=black, horizon=black, ground=black)
+    for sky, light in ((uniform, expected), (alone, 0.4 / np.pi * np.array(SUNNY))):
+        found = shaded(samples=4, rays=3, dtype=dtype, sky=sky)[1]
+        assert np.all(np.abs(found - light) <= 32 * np.finfo(dtype).eps * light)
+    both = shaded(lamp(1.0, 2.0), samples=16, rays=4, sky=sunny)
+    light = both[0] + expected + 0.4 / np.pi * np.array(SUNNY)
+    assert np.all(np.abs(both[1] - light) <= light.sum() / 32)  # points of a net in each of three intervals
+
+
+def test_what_hides_the_sun_and_half_of_the_sky_takes_their_light():
+    """ENV-7: the sun behind a plate; a wall that hides exactly the half of a uniform sky."""
+    uniform = Sky(WHITE, WHITE, WHITE, (0.0, 1.0, 0.0), (0.0,) * 3, 100.0)
+    wall = Quad((1e-6, -1e5, -1e5), (0.0, 2e5, 0.0), (0.0, 0.0, 2e5), (0.0, 0.0, 0.0))
+    half = shaded(quads=(wall,), samples=64, rays=4, sky=uniform)[1]
+    assert np.all(np.abs(half - 0.25 * np.array(WHITE)) <= 0.01)
+    plate = Quad((-1.0, 1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0))
+    black = (0.0,) * 3
+    sun = replace(
+        uniform, zenith=black, horizon=black, ground=black, sun_irradiance=SUNNY, sun_concentration=1e6
+    )
+    assert shaded(samples=64, sky=sun)[1].all()
+    assert shaded(quads=(plate,), samples=64, sky=sun)[1].max() < 1e-4 * shaded(samples=64, sky=sun)[1].max()
+
+
 def test_the_layer_changes_no_other():
     """RND-2f: bits of colour and features, with and without their own rays; its facts are reported."""
     scene = scenes.canonical("cornell")
@@ -337,11 +371,9 @@ def test_the_layer_changes_no_other():
         first = replace(first, settings=replace(first.settings, max_depth=0), color=True)
         light = found["direct"].sum() - R.render(scene, first).frame["color"].sum()  # less what is emitted
         assert 0.0 < light < found["unshadowed"].sum()
-    for name in ("furnace", "daylight"):  # without lamps, and with a sky: what the first hits emit
-        dark = R.render(scenes.canonical(name), R.Job(8, 8, shadow_rays=1)).frame["direct"]
-        assert np.array_equal(
-            dark, R.render(scenes.canonical(name), R.Job(8, 8, settings=Settings(0))).frame["color"]
-        )
-        assert dark.any()
+    emitted = R.render(scenes.canonical("furnace"), R.Job(8, 8, settings=Settings(0))).frame["color"]
+    found = R.render(scenes.canonical("furnace"), R.Job(8, 8, shadow_rays=1)).frame["direct"]
+    assert np.array_equal(found, emitted)  # without lamps and sky: what the first hits emit
+    assert emitted.any()
     with pytest.raises(InputError, match="shadow_rays 65: must be an integer from 0 to 64"):
         R.Job(4, 4, shadow_rays=65)

@@ -71,6 +71,7 @@ LAYERS: Mapping[str, Layer] = {
         Layer("history_weight", 1, "share of the pictures before in the history, in [0, 1); 0: it is new"),
         Layer("sun", 3, "unit direction in world space towards the sun of the sky: the same in all pixels"),
         Layer("direct", 3, "emission of the first hit, and unshadowed with its shadows, by few shadow rays"),
+        Layer("seen_direct", 3, "the same of what is seen, times the throughput of the way there"),
     )
 }
 """Every layer that a frame may have; a new one is one line here."""
@@ -95,10 +96,18 @@ SUN = "sun"
 DIRECT = "direct"
 """The layer of the lamps' light with shadows (light/transport.py: direct), which a frame has on request."""
 
-REMEDIES = {DIRECT: "render it: --shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it"}
+SEEN_DIRECT = "seen_direct"
+"""The same of what is seen past mirrors and glass, which a frame has that has both."""
+
+LIT = (DIRECT, SEEN_DIRECT)
+"""The layers of direct light with shadows."""
+
+REMEDIES = dict.fromkeys(
+    LIT, "render it: --shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it"
+)
 """What helps where a frame lacks a layer, if it is not as usual."""
 
-USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN, DIRECT))
+USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN, DIRECT, SEEN_DIRECT))
 """The layers that any rendered frame has."""
 
 

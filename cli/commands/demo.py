@@ -35,7 +35,7 @@ from ...models.data.scene_source import scene_source
 from ...models.model_file import load_checkpoint
 from ...refimpl.encoding import from_display, normal_to_display, to_display
 from ...refimpl.errors import InputError
-from ...refimpl.frame import DIRECT, Frame
+from ...refimpl.frame import LIT, Frame
 from ...refimpl.light.render import Job
 from ...refimpl.light.shading import build, ever_follows
 from ...refimpl.network.denoise import Model
@@ -135,7 +135,8 @@ def of_scene(plan: Plan, name: str) -> Plan:
     source = scene_source(name)
     shown = source.at()
     matte = plan.preset if shown.lights else "best"
-    preset = "sky" if shown.environment else "mirrors" if ever_follows(build(shown, float)) else matte
+    mirrors = "mirrors-shadows" if ever_follows(build(shown, float)) else matte
+    preset = "sky-shadows" if shown.environment else mirrors
     views = VIEWS if source.still is not None else {}
     return replace(plan, scene=name, scene_sha256=source.sha256, preset=preset, **views)
 
@@ -235,7 +236,7 @@ def render_frames(plan: Plan, output: Path) -> None:
         pitch_deg=plan.pitch_deg,
         distance=plan.distance,
         seen=sees(features),
-        shadow_rays=int(DIRECT in features),
+        shadow_rays=int(not set(LIT).isdisjoint(features)),
         frames=plan.train_frames,
         test_frames=plan.test_frames,
         size_px=plan.size_px,

@@ -90,7 +90,7 @@ FloatType = Literal["float32", "float64"]
 Sampler = Literal["pcg4d", "sobol"]
 """Sources of random numbers by name; equal to the registry in refimpl."""
 
-Preset = Literal["best", "mirrors", "shadows", "paper", "short", "sky"]
+Preset = Literal["best", "mirrors", "mirrors-shadows", "shadows", "paper", "short", "sky", "sky-shadows"]
 """Training protocols by name; equal to the registry in refimpl."""
 
 

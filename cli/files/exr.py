@@ -47,7 +47,7 @@ ORIGIN = "origin"
 EXR_BYTES = 12
 """Memory that a pixel of a channel takes until it is in a frame: as read, as float32, in its layer."""
 
-COLORS = ("color", "albedo", "unshadowed", "direct", "seen_albedo", "seen_emission", "history")
+COLORS = ("color", "albedo", "unshadowed", "direct", "seen_direct", "seen_albedo", "seen_emission", "history")
 """Layers whose channels are mixtures of the file's primaries."""
 
 OIIO_SPACE = "oiio:ColorSpace"

@@ -17,11 +17,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...refimpl.errors import InputError
-from ...refimpl.frame import DIRECT, HISTORY, LAYERS, SEEN, SUN
+from ...refimpl.frame import DIRECT, HISTORY, LAYERS, SEEN, SEEN_DIRECT, SUN
 from .exr_header import Part
 
 _LETTERS = {
-    **dict.fromkeys(("albedo", "unshadowed", "seen_albedo", "seen_emission", "history", "direct"), "RGB"),
+    **dict.fromkeys(
+        ("albedo", "unshadowed", "seen_albedo", "seen_emission", "history", "direct", "seen_direct"), "RGB"
+    ),
     **dict.fromkeys(("normal", "position", "direction", "seen_normal", "seen_position", "sun"), "XYZ"),
     "depth": "Z",
     "seen_depth": "Z",
@@ -43,7 +45,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "p"),
     "direction": ("direction", "raydirection"),
     "unshadowed": ("unshadowed",),
-    **{name: (name,) for name in (*SEEN, *HISTORY, SUN, DIRECT)},
+    **{name: (name,) for name in (*SEEN, *HISTORY, SUN, DIRECT, SEEN_DIRECT)},
 }
 """Names of each layer on reading, lower case, best first: as in Blender, pbrt, Mitsuba, Arnold and here.
 

@@ -62,7 +62,7 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from .lower_scene import ALIVE, LAYERS, LIT, SEEN, SURFACE, WAY, PathPrograms
+from .lower_scene import ALIVE, LAYERS, LIT, SEEN, SEEN_LIT, SURFACE, WAY, PathPrograms
 from .lower_scene import PATH as STATE
 from .values import RGB, Values, floats, kinds, names
 
@@ -72,7 +72,7 @@ END = {
 }
 """Planes of the path's state after its last arrival, by group: for comparing paths."""
 
-SUMMED: Values = {**floats("color", "deviation", ends=RGB), **LAYERS, **SEEN, **LIT}
+SUMMED: Values = {**floats("color", "deviation", ends=RGB), **LAYERS, **SEEN, **LIT, **SEEN_LIT}
 """What samples add up to: colour, the squared differences from its mean, and the layers of `look`, `see` and
 `shadow`."""
 
@@ -120,7 +120,11 @@ def path_kernel(
 def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
     """Return the programs that groups of planes need: some only for their own, which must be there then."""
     parts = dict(programs.parts)
-    for part, own, how in (("see", SEEN, "seen=True"), ("shadow", LIT, "shadow_rays=N")):
+    for part, own, how in (
+        ("see", {**SEEN, **SEEN_LIT}, "seen=True"),
+        ("shadow", LIT, "shadow_rays=N"),
+        ("past", SEEN_LIT, "seen=True and shadow_rays=N"),
+    ):
         wanted = [group for group in groups if group in own]
         if wanted and part not in parts:
             raise CompileError(f"planes {wanted[0]!r} need the program {part!r}: lower the scene with {how}")
@@ -336,7 +340,9 @@ class _Builder:
             body.append(If(when, found))
         if "see" in self.programs.parts:
             when = any_lane(going) if self.followed else first
-            body.append(If(when, self.block("see", "what is seen past mirrors and glass", summed=True)))
+            lit = self._shadows("past", "light on what is seen, if nothing is in between")
+            seen = self.block("see", "what is seen past mirrors and glass", summed=True)
+            body.append(If(when, (*lit, *seen)))
         body.append(Break(apply("equal", BOUNCE, MAX_DEPTH)))
         body += self.block("scatter", "the path goes on", masked=radiance)
         left = any_lane(alive & going if self.short and self.followed else alive)
@@ -351,12 +357,16 @@ class _Builder:
         program = self.programs.parts.get("shadow")
         if program:  # the radiance so far is what the first surface emits
             found += tuple(self._added(f"direct_{c}", self.of(f"radiance_{c}")) for c in "rgb")
-        # Without lights no shadow ray is traced.
-        if program and any(program.nodes[index].op != "constant" for _, index in program.outputs):
-            number = Let("shadow_number", self.all(apply("convert", name("shadow"), value="uint32")))
-            body = (number, *self.block("shadow", "a lamp's light, if nothing is in between", summed=True))
-            found += (For("shadow", const(self.programs.shadow_rays), body),)
-        return found
+        return found + self._shadows("shadow", "a lamp's light, if nothing is in between")
+
+    def _shadows(self, part: str, comment: str) -> tuple[Statement, ...]:
+        """Return the loop over shadow rays, if there is light."""
+        program = self.programs.parts.get(part)
+        if program is None or all(program.nodes[index].op == "constant" for _, index in program.outputs):
+            return ()
+        number = Let("shadow_number", self.all(apply("convert", name("shadow"), value="uint32")))
+        body = (number, *self.block(part, comment, summed=True))
+        return (For("shadow", const(self.programs.shadow_rays), body),)
 
     def _rays(self) -> list[Statement]:
         """Return the loop over the features' own rays; the path of the first sample has been one of them."""

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError, InputError
-from ...refimpl.frame import HISTORY, SEEN, SUN
+from ...refimpl.frame import HISTORY, SEEN, SEEN_DIRECT, SUN
 from ...refimpl.light.render import FEATURE_SAMPLER, spread, spread_rays
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.dataset import (
@@ -77,7 +77,7 @@ def layers_of(features: Sequence[str]) -> tuple[str, ...]:
 def sees(features: Sequence[str]) -> bool:
     """Tell whether some of the features are of what is seen past mirrors and glass."""
     check_features(features)
-    return any(layer in SEEN for name in features for layer in FEATURES[name].layers)
+    return any(layer in (*SEEN, SEEN_DIRECT) for name in features for layer in FEATURES[name].layers)
 
 
 def feature_rays(model: Model) -> int:

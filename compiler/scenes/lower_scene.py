@@ -75,6 +75,9 @@ SEEN: Values = {
 LIT: Values = floats(frame.DIRECT, ends=RGB)
 """The feature layer of shadow rays, as refimpl/light/transport.py: direct."""
 
+SEEN_LIT: Values = floats(frame.SEEN_DIRECT, ends=RGB)
+"""The same past mirrors and glass, as refimpl/light/render.py: trace."""
+
 WAY: Values = {"way_going": (NUMBER, TRUTH), **floats("way_length")}
 """State of the way to what is seen, as refimpl/light/following.py: Way."""
 
@@ -160,11 +163,16 @@ def lower_scene(
     if shadow_rays:
         number = {"shadow_number": (NUMBER, COUNTER)}
         rows["shadow"] = partial(_shadow, world_of, shadow_rays), {**SURFACE, **COUNTERS, **number}, LIT
+    past = {**SEEN, **(SEEN_LIT if shadow_rays else {})}
     if seen and most:
         state = {"beta": PATH["beta"], **toward, **DEPTH, **ALIVE, **WAY}
-        rows["see"] = partial(_see, world_of, most), {**SURFACE, **state}, {**SEEN, **WAY}
+        rows["see"] = partial(_see, world_of, most), {**SURFACE, **state}, {**past, **WAY}
     elif seen:
-        rows["see"] = partial(_first_seen, world_of), {**SURFACE, **toward}, SEEN
+        rows["see"] = partial(_first_seen, world_of), {**SURFACE, **toward}, past
+    if seen and shadow_rays:
+        state = {"beta": PATH["beta"], **DEPTH, **ALIVE, "way_going": WAY["way_going"]} if most else {}
+        inputs = {**SURFACE, **COUNTERS, "shadow_number": (NUMBER, COUNTER), **state}
+        rows["past"] = partial(_past, world_of, most, shadow_rays), inputs, SEEN_LIT
     if rays:
         rows["ray"] = partial(start, rays.sampler), ray, begun
     options = {"most_unrolled": None if statements else 1, "keep_places": keep_places}
@@ -273,6 +281,17 @@ def _shadow(world_of: WorldOf, rays: int, given: Given) -> Given:
     return {frame.DIRECT: transport.direct(*at, rays, given["shadow_number"])}
 
 
+def _past(world_of: WorldOf, most: int, rays: int, given: Given) -> Given:
+    """Return what a shadow ray adds to the layer `seen_direct`: at the end of the way to what is seen."""
+    world, (surface, hit) = world_of(given), _surface(given)
+    light = transport.direct(world, surface, hit, _counters(given), rays, given["shadow_number"])
+    if most:
+        further = following.followed(world, surface, hit, given["depth"], most)
+        ends = given["way_going"] & given["alive"] & ~further
+        light = intersection.choose_or_zero(ends, given["beta"] * light)
+    return {frame.SEEN_DIRECT: light}
+
+
 def _emitting(world: World, given: Given) -> tuple[Surface, Hit]:
     """Return surface and hit, with the emission: it is looked up again, as `arrive` hands on only its sum."""
     surface, hit = _surface(given)
@@ -284,7 +303,8 @@ def _first_seen(world_of: WorldOf, given: Given) -> Given:
     """Return the layers of what is seen where nothing is followed: those of the first surface."""
     layers = render.first_hit_layers(world_of(given), *_surface(given), given["point"])
     found = {name: layers[of] for name, of in frame.FIRST_HIT.items()}
-    return {**found, "seen_emission": _emitting(world_of(given), given)[0].emission}
+    emission = _emitting(world_of(given), given)[0].emission
+    return {**found, "seen_emission": emission, frame.SEEN_DIRECT: emission}
 
 
 def _see(world_of: WorldOf, most: int, given: Given) -> Given:
@@ -293,4 +313,5 @@ def _see(world_of: WorldOf, most: int, given: Given) -> Given:
     path = Path(*[None] * 5)._replace(beta=given["beta"])  # type: ignore[arg-type]
     world = world_of(given)
     way, layers = following.see(world, way, path, *_emitting(world, given), given["depth"], most)
+    layers[frame.SEEN_DIRECT] = layers["seen_emission"]
     return {**layers, "way_going": way.going, "way_length": way.length}

@@ -111,7 +111,7 @@ def compile_path(
         "programs": {part: ir.digest(program) for part, program in passed.items()},
         **({"numbers": numbers_of(programs)} if programs.inputs else {}),
         **({"feature_rays": asdict(programs.rays)} if programs.rays else {}),
-        **({"shadow_rays": programs.shadow_rays} if "shadow" in programs.parts else {}),
+        **({"shadow_rays": programs.shadow_rays} if {"shadow", "past"} & set(programs.parts) else {}),
     }
     return assemble(
         "path tracer",
@@ -166,8 +166,9 @@ def _notes(programs: PathPrograms, encoded: bool) -> Iterator[str]:
     """Yield what else there is to say of the numbers, by the programs that they come from."""
     if "see" in programs.parts and not encoded:
         yield "seen_*: the same of what is seen past mirrors and glass; albedo times the tints on the way"
-    if "shadow" in programs.parts:
-        yield f"direct_*: emission and direct light, by {programs.shadow_rays} shadow rays of each camera ray"
+    if {"shadow", "past"} & set(programs.parts):
+        shadows = f"by {programs.shadow_rays} shadow rays of each camera ray"
+        yield f"direct_*, seen_direct_*: emission and direct light, {shadows}"
     if programs.rays:
         rays = f"{programs.rays.count} camera rays of the source {programs.rays.sampler}"
         yield f"features are of {rays}, whatever the number of samples: of one launch"

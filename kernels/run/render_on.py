@@ -31,12 +31,13 @@ from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import can_move, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
 from ...refimpl.errors import NO_VALUE, InputError
-from ...refimpl.frame import DIRECT, SEEN, Frame
+from ...refimpl.frame import LIT, SEEN, Frame
 from ...refimpl.light.render import (
     Job,
     Render,
     checked_rows,
     feature_job,
+    feature_settings,
     joined,
     render_info,
     with_own_features,
@@ -61,7 +62,7 @@ KEPT_SCENES = 8
 def groups_of(job: Job) -> tuple[str, ...]:
     """Return the groups of planes that a job's kernel adds up: its layers, and what its variance is of."""
     wanted = {*job.layers, "deviation"} if job.color else {*job.layers}
-    return tuple(group for group in (*FRAME_GROUPS, *SEEN, DIRECT) if group in wanted)
+    return tuple(group for group in (*FRAME_GROUPS, *SEEN, *LIT) if group in wanted)
 
 
 class Frames:
@@ -119,12 +120,17 @@ def render_on(
     if feature_job(job) is not None:
         options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
         return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
-    if job.seen and job.color and len(planes(groups_of(job))) > executor.language.dialect.max_planes:
-        # The same paths twice, for layers that no kernel of this device writes at once.
-        again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
-        color = again(replace(job, seen=False, shadow_rays=0), on_progress=on_progress)
-        return joined(scene, job, color, again(replace(job, color=False)))
     first, last = checked_rows(job, rows)
+    if job.seen and len(planes(groups_of(job))) > executor.language.dialect.max_planes:
+        # The same paths twice, for layers that no kernel of this device writes at once.
+        settings = job.settings if job.color else feature_settings(job.settings, False)
+        plain = replace(job, seen=False, settings=settings)
+        again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
+        hits, past = again(plain, on_progress=on_progress), replace(job, color=False)
+        names = [name for name in job.layers if name not in plain.layers]
+        moment = (frames or frames_of(scene)).of(executor, scene, past, profile, names)
+        seen = _render(moment.kernel, moment.totals(past, (first, last)), names, {})
+        return joined(scene, job, hits, seen)
     moment = moment or (frames or frames_of(scene)).of(executor, scene, job, profile)
     if moment.kernel.programs.rays:
         rule = "has separate feature rays, and a render's kernel sums features over the samples"

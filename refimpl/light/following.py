@@ -59,8 +59,7 @@ def see(
     depth (...) counts the scatterings so far, as uint32; most is that of [`most_followed`].
     """
     found = hit.surface < world.geometry.nothing
-    shown = vectors.largest(surface.reflectance) > 0.0
-    further = found & shown & shading.follows(world.materials, hit) & (depth < np.uint32(most))
+    further = followed(world, surface, hit, depth, most)
     length = way.length + np.where(found, hit.t, 0.0)
     ends = way.going & ~further
     layers = {
@@ -71,3 +70,10 @@ def see(
         "seen_emission": intersection.choose_or_zero(ends, path.beta * surface.emission),
     }
     return Way(way.going & further, length), layers
+
+
+def followed(world: World, surface: Surface, hit: Hit, depth: Any, most: int) -> Truths:
+    """Tell (...) whether a path that is still followed is followed past a surface, too."""
+    found, shown = hit.surface < world.geometry.nothing, vectors.largest(surface.reflectance) > 0.0
+    further: Truths = found & shown & shading.follows(world.materials, hit) & (depth < np.uint32(most))
+    return further

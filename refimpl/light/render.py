@@ -27,7 +27,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from .. import rng, vectors
 from ..errors import InputError, choice
-from ..frame import DIRECT, LAYERS, SEEN, USUAL, Frame
+from ..frame import DIRECT, LAYERS, LIT, SEEN, SEEN_DIRECT, USUAL, Frame
 from ..vectors import Directions, Ids
 from . import following, intersection, transport
 from .camera import CameraBasis, camera_basis, camera_ray
@@ -101,7 +101,8 @@ class Job:
     @property
     def layers(self) -> tuple[str, ...]:
         """Return the names of the frame's layers, in their order."""
-        names = (*USUAL, *(SEEN if self.seen else ()), *((DIRECT,) if self.shadow_rays else ()))
+        lit = LIT[: 1 + self.seen] if self.shadow_rays else ()
+        names = (*USUAL, *(SEEN if self.seen else ()), *lit)
         return names if self.color else tuple(name for name in names if name != "color")
 
     def facts(self) -> dict[str, Any]:
@@ -221,8 +222,9 @@ def with_own_features(scene: Scene, job: Job, render_part: Callable[[Job], Rende
 
 
 def joined(scene: Scene, job: Job, color: Render, features: Render) -> Render:
-    """Return one render of a job: the colour of the one, all other layers of the other."""
-    found = {**features.frame.layers, "color": color.frame["color"]}
+    """Return one render of a job: the colour of the one, all other layers of the other that it has."""
+    own = {name: layer for name, layer in features.frame.layers.items() if name != "color"}
+    found = {**color.frame.layers, **own}
     layers = {name: found[name] for name in job.layers}
     return Render(Frame(layers, render_info(scene, job)), color.color_variance)
 
@@ -275,13 +277,19 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
         path, surface, hit = transport.arrive(world, path)
         if depth == 0:
             layers = first_hit_layers(world, surface, hit, direction)
-            layers |= {n: np.zeros((len(x), LAYERS[n].channels), dtype) for n in SEEN if n in job.layers}
+            past = (*SEEN, SEEN_DIRECT)
+            layers |= {n: np.zeros((len(x), LAYERS[n].channels), dtype) for n in past if n in job.layers}
             layers[DIRECT] = path.radiance  # what the first hit emits
-            for number in map(np.uint32, range(job.shadow_rays)):
-                part = transport.direct(world, surface, hit, counters, job.shadow_rays, number)
-                layers[DIRECT] = layers[DIRECT] + part
+        rays = job.shadow_rays if depth == 0 or (job.seen and way.going.any()) else 0
+        lit = [transport.direct(world, surface, hit, counters, rays, np.uint32(n)) for n in range(rays)]
+        if depth == 0:
+            layers[DIRECT] = sum(lit, layers[DIRECT])
         if job.seen:
+            going = way.going
             way, seen = following.see(world, way, path, surface, hit, rng.counter(depth), most)
+            if lit:
+                tint = intersection.choose_or_zero(going & ~way.going, path.beta)
+                seen[SEEN_DIRECT] = sum((tint * part for part in lit), seen["seen_emission"])
             for name, values in seen.items():
                 layers[name][lanes] += values.reshape(len(lanes), -1)
         if depth == job.settings.max_depth or not (job.color or way.going.any()):
@@ -293,10 +301,10 @@ def trace(world: World, basis: CameraBasis, job: Job, x: Any, y: Any, sample: in
         ended = np.flatnonzero(~alive)
         color[lanes[ended]] = path.radiance[ended]
         if len(ended) > 0:
-            going = np.flatnonzero(alive)
-            lanes, counters = lanes[going], counters._replace(pixel=counters.pixel[going])
-            path = Path(*(_select(part, going) for part in path))
-            way = following.Way(*(_select(part, going) for part in way))
+            left = np.flatnonzero(alive)
+            lanes, counters = lanes[left], counters._replace(pixel=counters.pixel[left])
+            path = Path(*(_select(part, left) for part in path))
+            way = following.Way(*(_select(part, left) for part in way))
         if len(lanes) == 0:
             break
     color[lanes] = path.radiance

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
-from ..frame import DIRECT, FIRST_HIT, LAYERS, SUN, Frame, check_finite
+from ..frame import DIRECT, FIRST_HIT, LAYERS, SEEN_DIRECT, SUN, Frame, check_finite
 from ..reading import parse_json, to_dataclass
 from ..rng import counter, random_block
 from ..vectors import vector
@@ -235,6 +235,10 @@ FEATURES: Mapping[str, Feature] = {
         {
             SUN: (encode_signed, "unit direction in world space towards the sun"),
             DIRECT: (encode_color, "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA),
+            SEEN_DIRECT: (
+                encode_color,
+                PAST + "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA,
+            ),
         }
     ),
 }

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..errors import InputError
-from ..frame import DIRECT, Frame
+from ..frame import LIT, Frame
 from . import dataset
 from .activation import activation_named
 from .dataset import Normalization, Window
@@ -124,7 +124,8 @@ def learned_feature_spp(model: Model) -> int:
 
 def learned_shadow_rays(model: Model) -> int:
     """Return the shadow rays of a camera ray that a model has learned from; 0 if no feature has any."""
-    return max(1, _most(model, "shadow_rays")) if DIRECT in model.features else 0
+    lit = not set(LIT).isdisjoint(model.features)
+    return max(1, _most(model, "shadow_rays")) if lit else 0
 
 
 def _most(model: Model, fact: str) -> int:

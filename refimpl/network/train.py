@@ -149,13 +149,21 @@ SKY = replace(MIRRORS, features=(*MIRRORS.features, "sun"), window=Window(7, "cl
 """The same for scenes under a sky whose sun moves: what it lights through glass, only its place tells; chosen
 by `experiments/quality.py --sets daylight`."""
 
+MIRROR_SHADOWS = replace(MIRRORS, features=(*MIRRORS.features, "seen_direct"))
+"""For soft shadows in such scenes, past mirrors and glass too; chosen by `experiments/shadows.py`."""
+
+SKY_SHADOWS = replace(SKY, features=(*SKY.features, "seen_direct"))
+"""The same under a sky."""
+
 PRESETS: Mapping[str, Recipe] = {
     "best": BEST,
     "mirrors": MIRRORS,
+    "mirrors-shadows": MIRROR_SHADOWS,
     "paper": PAPER,
     "shadows": SHADOWS,
     "short": SHORT,
     "sky": SKY,
+    "sky-shadows": SKY_SHADOWS,
 }
 """Recipes by name; change single choices with `dataclasses.replace`."""
 

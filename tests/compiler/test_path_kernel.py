@@ -17,7 +17,7 @@ from wamnet.compiler.kernel.interface import SCENE_NUMBERS
 from wamnet.compiler.kernel.run import run_on
 from wamnet.compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, path_kernel, planes
 from wamnet.compiler.scenes.encode_kernel import SAMPLES, encoding_of
-from wamnet.compiler.scenes.lower_scene import LIT, SEEN, FeatureRays, lower_scene
+from wamnet.compiler.scenes.lower_scene import LIT, SEEN, SEEN_LIT, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.targets import LANGUAGES
@@ -36,7 +36,7 @@ TRACED = [target.name for target in LANGUAGES.values() if target.paths]
 ENCODING = encoding_of(("color",), Normalization(exposure_stops=-1.0))
 """Encoded colour."""
 
-ALL_GROUPS = tuple(group for group in GROUPS if group not in {*SEEN, *LIT})
+ALL_GROUPS = tuple(group for group in GROUPS if group not in {*SEEN, *LIT, *SEEN_LIT})
 """Groups of planes that any programs have."""
 
 

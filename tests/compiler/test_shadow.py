@@ -51,7 +51,7 @@ def test_the_program_has_the_reference_s_bits(name, forms):
         for i, c in enumerate("rgb"):
             assert np.array_equal(np.broadcast_to(found[f"direct_{c}"], len(x)), wanted[:, i])
         lit += int(wanted.any(axis=-1).sum())
-    assert (lit > 0) == bool(scene.lights)
+    assert (lit > 0) == bool(scene.lights or scene.environment)
 
 
 @pytest.mark.parametrize("target", ["opencl", "opengl", "c", "wgsl"])

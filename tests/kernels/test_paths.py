@@ -43,7 +43,8 @@ def test_image_is_the_reference_s(executor, name):
     that falls on the other side of a decision changes its pixel wholly. Curved mirrors and glass multiply
     errors, by up to 2 t / r a bounce, but what they show is smooth except at edges.
     """
-    job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4), shadow_rays=2)
+    seen = name in ("daylight", "glossy")
+    job = R.Job(WIDTH, HEIGHT, 2, SEED, Settings(max_depth=4), seen=seen, shadow_rays=2)
     expected, found = R.render(scene(name), job), render_on(executor, scene(name), job)
     frame.validate(found.frame)
     assert found.frame.info == expected.frame.info

@@ -127,7 +127,7 @@ def test_feature_ranges_channels_and_order() -> None:
     scales = Normalization(depth_scale=1.5, position_scale=1.5)
     image = dataset.feature_image(frame, tuple(FEATURES), scales)
     assert image.dtype == np.float32
-    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 51)
+    assert image.shape == (5, 4, dataset.channels_of(tuple(FEATURES))) == (5, 4, 54)
     first = 0
     for feature in FEATURES.values():
         assert feature.channels == LAYERS[feature.layer].channels

@@ -266,6 +266,14 @@ def test_mirrors_is_best_with_other_inputs_and_sizes() -> None:
     assert changed == kept
 
 
+def test_soft_shadows_are_one_more_feature() -> None:
+    """TRN-9e."""
+    for name in ("mirrors", "sky"):
+        plain, lit = PRESETS[name], PRESETS[f"{name}-shadows"]
+        assert replace(lit, features=lit.features[:-1]) == plain
+        assert lit.features[-1] == "seen_direct"
+
+
 def test_sky_is_mirrors_with_the_sun() -> None:
     """TRN-9b: 24 channels of 7 x 7 pixels."""
     mirrors, sky = PRESETS["mirrors"], PRESETS["sky"]

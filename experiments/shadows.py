@@ -6,7 +6,8 @@
    features of each row [`ROWS`]: camera rays, shadow rays of each, paths per pixel.
 2. A network is trained for each row and seed by the preset `best`, whose input is the layer `unshadowed`
    where there are no shadow rays, and `direct` in its place where there are [`Bench.images`]. `direct` has
-   visible lights too: a row without shadow rays, with `seen_emission`, has the gain of these alone.
+   visible lights too: a row without shadow rays, with `seen_emission`, has the gain of these alone. In
+   sets of mirrors and glass the preset is `mirrors` or `sky`, or that with -shadows [`Bench.recipe`].
 3. Open Image Denoise gets the same frames. With the same direct light, its colour is `direct` in place of
    what the path itself has found of that: of the path that ends after one scattering [`Bench.relit`]. Since
    `direct` approximates lights by disks, which a network learns and it cannot, another row has no such bias.
@@ -14,7 +15,7 @@
    too [`lab/scores.py`]. Milliseconds are those of a pipeline's frame, paths, features and network, 512 x 512
    pixels, rows in turn [`milliseconds`]. A picture shows a test frame by the rows in `SHOWN`.
 5. With `--models` nothing is trained: their rows have the rays that they were trained on, and fewer of them
-   [`rows_of_models`]. `--frames` is then the number of frames of their training.
+   [`rows_of_models`]. `--frames` is then the number of frames of their training. `--rows` leaves rows out.
 
 Prints a Markdown table.
 """
@@ -32,7 +33,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.command import begin
-from lab.frames import Shot, frames, noisy, one_scattering, reference, relit
+from lab.frames import Shot, frames, noisy, one_scattering, past_mirrors, reference, relit
 from lab.scores import mean_scores, score_lit
 from lab.sets import SETS, Counts
 from lab.tables import markdown
@@ -51,7 +52,7 @@ from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
-from wamnet.refimpl.network.train import BEST
+from wamnet.refimpl.network.train import BEST, PRESETS, Recipe
 from wamnet_peers.peer_oidn import filtered, prefiltered
 
 TIMED_PX = 512
@@ -139,7 +140,14 @@ class Bench:
     @cached_property
     def rows(self) -> Mapping[str, Row]:
         """The rows by name."""
-        return {**rows_of_models(self.options.models), **THEIRS} if self.options.models else ROWS
+        rows = {**rows_of_models(self.options.models), **THEIRS} if self.options.models else ROWS
+        mirrors = SETS[self.options.set].seen  # whose direct light is not what the layer says
+        shown = {
+            name: row
+            for name, row in rows.items()
+            if not (mirrors and row.oidn and row.shadow_rays) or row.usual
+        }
+        return {name: row for name, row in shown.items() if self.options.rows in name}
 
     def frames(self, shots: Sequence[Shot]) -> list[Frame]:
         """Return frames, rendered where they are not there."""
@@ -160,11 +168,20 @@ class Bench:
         targets = self.frames([replace(shot, shadow_rays=shadow_rays) for shot in clean])
         return list(zip(self.frames(self.shots(split, row, seed)), targets, strict=True))
 
+    def recipe(self, row: Row, seed: int) -> Recipe:
+        """Return the recipe of a row: that of a set's preset, with direct light if it has shadow rays."""
+        preset, layers = BEST, row.layers
+        if SETS[self.options.set].seen:
+            name = "sky" if canonical(SETS[self.options.set].scene).environment else "mirrors"
+            preset = PRESETS[f"{name}-shadows" if row.shadow_rays else name]
+            layers = preset.features
+        return replace(preset, features=layers, steps=self.options.steps, seed=seed)
+
     def model(self, row: Row, seed: int) -> Model:
         """Return the network of a row."""
         if row.file:
             return wamnet.load(row.file)
-        recipe = replace(BEST, features=row.layers, steps=self.options.steps, seed=seed)
+        recipe = self.recipe(row, seed)
         pairs = self.pairs(TRAIN, row, seed)
         return trained(recipe, pairs, self.options.cache / "models", self.options.executor)[0]
 
@@ -175,6 +192,8 @@ class Bench:
         if not row.oidn:
             return denoised(self.model(row, seed), noisy, self.options.executor)
         relit = self.relit(noisy, row, seed) if row.shadow_rays else noisy
+        if SETS[self.options.set].seen:
+            relit = list(map(past_mirrors, relit))
         found = [filtered(frame, prefiltered(frame), clean=True) for frame in relit]
         return [to_display(image) for image in found]
 
@@ -232,6 +251,7 @@ def options_of(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--set", default="minicubes", metavar="SET", help=", ".join(SETS))
     parser.add_argument("--models", nargs="+", default=[], help="bundled models, or files, in place of rows")
+    parser.add_argument("--rows", default="", metavar="WORDS", help="rows whose name has these words")
     parser.add_argument("--frames", type=int, default=24, help="frames to train on")
     parser.add_argument("--tests", type=int, default=4)
     parser.add_argument("--size", type=int, default=128)
@@ -263,7 +283,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     panels.append(("reference", to_display(references[0]["color"])))
     write_panels(bench.options.cache / "shadows.png", panels, "experiments/shadows.py")
     # What is seen past mirrors and glass has no further camera rays in a pipeline: no time of that row.
-    timed = {n: bench.model(row, 0) for n, row in bench.rows.items() if not (row.oidn or row.emission)}
+    seen = SETS[bench.options.set].seen
+    rows = {} if seen else {n: row for n, row in bench.rows.items() if not (row.oidn or row.emission)}
+    timed = {name: bench.model(row, 0) for name, row in rows.items()}
     with open_executor(bench.options.executor) as executor:
         times = milliseconds(executor, canonical(SETS[bench.options.set].scene), bench.rows, timed)
     heads = ["features", *(head for head, _ in COLUMNS.values()), "PSNR, range of seeds", "ms"]
@@ -273,7 +295,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def shown(name: str, found: Sequence[dict[str, float]], times: Mapping[str, float]) -> list[str]:
     """Return the line of a row: means over its seeds, the range of their PSNR, milliseconds if timed."""
     means, each = mean_scores(found), [scores["psnr"] for scores in found]
-    line = [f"{means[key]:.{digits}f}" for key, (_, digits) in COLUMNS.items()]
+    line = [f"{means[key]:.{digits}f}" if key in means else "" for key, (_, digits) in COLUMNS.items()]
     milliseconds = f"{times[name]:.0f}" if name in times else ""
     return [name, *line, f"{min(each):.2f} to {max(each):.2f}", milliseconds]
 

@@ -53,23 +53,26 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "conformance": ("conformance", "conformance"),
     "demo": ("demo", "demo"),
     "bench": ("bench", "bench"),
-    "bench render": ("measure", "render"),
-    "bench train": ("measure", "train"),
-    "bench pipeline": ("measure", "pipeline"),
     "bench exports": ("measure", "exports"),
-    "bench primitives": ("measure", "primitives"),
 }
 """Each command's module in `commands`, and function; one of a group follows the group."""
 
 INTERRUPTED, TERMINATED = 130, 143
 """Exit statuses after Ctrl-C and SIGTERM, as shells report them: 128 + the signal."""
 
-DISTRIBUTIONS: Mapping[str, str] = {"verify-renderer": "wamnet-verify", "course": "wamnet-course"}
+DISTRIBUTIONS: Mapping[str, str] = {
+    "verify-renderer": "wamnet-verify",
+    "course": "wamnet-course",
+    "bench render": "wamnet-peers",
+    "bench train": "wamnet-peers",
+    "bench pipeline": "wamnet-peers",
+    "bench primitives": "wamnet-peers",
+}
 """Distribution of each command that joins through an entry point of the group `ENTRY_POINTS`."""
 
 ENTRY_POINTS = "wamnet.commands"
-"""Group of entry points: a name is a command's, its value a module with a table `COMMANDS`: the function
-of each command, and of those in its group."""
+"""Group of entry points: a name is a command's or its group's, the value a module with a table `COMMANDS`:
+the function of each command, and of those in its group."""
 
 GROUPS: Mapping[str, Mapping[str, Any]] = {
     "course": {},
@@ -101,8 +104,8 @@ def application(arguments: Sequence[str] = ()) -> typer.Typer:
             _register(groups, path, getattr(imported, function))
         elif first is None and " " not in path:
             app.command(path, help=_help_of(_docstring(module, function))[0])(lambda: None)
-    if first is None or first in DISTRIBUTIONS:
-        _join(groups, first)
+    if first is None or any(first == path.partition(" ")[0] for path in DISTRIBUTIONS):
+        _join(groups, first, " ".join(arguments[:2]))
     return app
 
 
@@ -114,16 +117,21 @@ def _docstring(module: str, function: str) -> str:
     return ast.get_docstring(next(named)) or ""
 
 
-def _join(groups: dict[str, typer.Typer], name: str | None) -> None:
-    """Add the command of this name, or without one all installed commands of other distributions."""
+def _join(groups: dict[str, typer.Typer], name: str | None, line: str) -> None:
+    """Add the commands of this name that other distributions have, or without one all but those in a group.
+
+    `line` is the command line's first two words.
+    """
     installed = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
-    if name and name not in installed:
-        remedy = f"install it: pip install {DISTRIBUTIONS[name]}"
-        raise InputError("command", name, f"distribution {DISTRIBUTIONS[name]} is not installed", remedy)
-    for entry in (installed[name],) if name else installed.values():
-        module = entry.load()
-        for path, function in module.COMMANDS.items():
-            _register(groups, path, getattr(module, function))
+    path = name if name in DISTRIBUTIONS else line
+    if path in DISTRIBUTIONS and name not in installed:
+        remedy = f"install it: pip install {DISTRIBUTIONS[path]}"
+        raise InputError("command", path, f"distribution {DISTRIBUTIONS[path]} is not installed", remedy)
+    for entry in installed.values():
+        if entry.name == name or (name is None and entry.name not in COMMANDS):
+            module = entry.load()
+            for each, function in module.COMMANDS.items():
+                _register(groups, each, getattr(module, function))
 
 
 def _register(groups: dict[str, typer.Typer], path: str, function: Callable[..., None]) -> None:

@@ -1,12 +1,14 @@
-"""What peers have in common: their errors, and the stages of a network that runs layer by layer."""
+"""What peers share: errors, the stages of a network that runs layer by layer, and makers of pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import Any, Protocol
 
 from wamnet.kernels.bench.rates import FLOAT_BYTES, Stage
 from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.network.activation import SINE
 from wamnet.refimpl.network.dataset import channels_of
 from wamnet.refimpl.network.denoise import Model
@@ -43,3 +45,21 @@ def layered(model: Model, fuses: bool) -> tuple[Stage, ...]:
             stages.append(elementwise)
         read = neurons
     return tuple(stages)
+
+
+Ways = Mapping[str, Callable[[], Any]]
+"""What is measured, by name; a float that is returned is the seconds."""
+
+
+class Maker(Protocol):
+    """What makes pictures of a scene that moves."""
+
+    @property
+    def about(self) -> str:
+        """Return in words what it is, with versions."""
+
+    def ways(self, shots: Sequence[Scene]) -> Ways:
+        """Return what is measured, by name; pictures show the scenes one after another."""
+
+    def close(self) -> None:
+        """Give back what it holds."""

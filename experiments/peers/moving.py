@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.paths import VARIANT
-from wamnet.kernels.bench.pipelines import Ways
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.light.transport import Settings
 
 from . import peer_mitsuba
+from .common import Ways
+from .peer_mitsuba import VARIANT
 from .peer_oidn import Kept
 
 DENOISED = ("fast", "high")

@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.pipelines import Ways
 from wamnet.models.blender.session import LineProcess
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scene import Scene, to_json
 from wamnet.refimpl.light.transport import Settings
 
 from . import peer_mitsuba
+from .common import Ways
 from .moving import DENOISED
 
 MEMORY = Path("/dev/shm")

@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 
-from wamnet.kernels.bench.paths import VARIANT
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.materials import Material
 from wamnet.refimpl.light.scene import Box, Light, Quad, Room, Scene, Sphere
@@ -34,6 +33,9 @@ from wamnet_verify.parts import room_walls
 
 from . import mitsuba_looks as looks
 from .mitsuba_looks import rgb
+
+VARIANT = "llvm_ad_rgb"
+"""The variant that is measured: compiled, on vectors and all cores."""
 
 LEAST_LLVM = 17
 """First version of LLVM that compiles Dr.Jit's code for AVX-512: 16 ends the process, for it knows no maximum

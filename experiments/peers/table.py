@@ -1,4 +1,4 @@
-"""The peers that `wamnet bench` measures: the names of the protocol in kernels/bench/peers.py.
+"""The peers that `wamnet bench` measures: the denoisers beside its own, renderers, and makers of pictures.
 
 Each peer has a separate file `peer_*.py`; a new one is a file and a line here.
 """
@@ -6,11 +6,11 @@ Each peer has a separate file `peer_*.py`; a new one is a file and a line here.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from wamnet.kernels.bench.contenders import Contender
-from wamnet.kernels.bench.peers import Renderer
-from wamnet.kernels.bench.pipelines import Maker
 from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.light.transport import Settings
 
 from . import (
     peer_halide,
@@ -21,6 +21,7 @@ from . import (
     peer_tinygrad,
     peer_torch,
 )
+from .common import Maker
 from .moving import MitsubaOidn
 from .peer_cycles import Cycles
 
@@ -32,6 +33,8 @@ contenders: tuple[Contender, ...] = (
     *peer_halide.CONTENDERS,
     *peer_oidn.CONTENDERS,
 )
+Renderer = Callable[[Scene, int, int, Settings], Callable[[int, int], Any]]
+"""From a scene, width, height and settings to what renders it, by the number of samples and a seed."""
+
 renderers: Mapping[str, Renderer] = {"mitsuba": peer_mitsuba.renderer}
 makers: Mapping[str, Callable[[Scene, int], Maker]] = {"mitsuba": MitsubaOidn, "cycles": Cycles}
-trainer = peer_torch.trainer

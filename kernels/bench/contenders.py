@@ -6,7 +6,7 @@
 2. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`Kernel`].
 3. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
-4. Peers come from another distribution, where it is installed [peers.py].
+4. Peers come from another distribution, where it is installed [`peers`].
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from typing import Any
 
@@ -38,7 +39,6 @@ from ..devices.executor import Executor
 from ..devices.kernel import Images
 from ..devices.registry import open_executor
 from ..run.denoise_on import bound_of
-from . import peers
 from .rates import Stage, fused, sines_of
 from .workload import Given
 
@@ -205,6 +205,9 @@ CACHES = {
 }
 """What the drivers of an executor keep of what they have compiled."""
 
+GROUP = "wamnet.peers"
+"""Group of entry points, whose values are modules with `contenders`."""
+
 QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
 
@@ -273,7 +276,12 @@ def of_machine(
         varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
         for form in [*varied, *([] if quick else [INTEGERS])] if name != "numpy" else []:
             found += [Kernel(name, each, form).contender for each in _schedules(target, suits, form)]
-    return [*found, *(peer for peer in peers.contenders() if not quick or peer.name in QUICK)]
+    return [*found, *(peer for peer in peers() if not quick or peer.name in QUICK)]
+
+
+def peers() -> list[Contender]:
+    """Return the denoisers of other distributions, where such are installed."""
+    return [each for entry in entry_points(group=GROUP) for each in entry.load().contenders]
 
 
 def _schedules(language: Language, suits: str, form: Variant) -> list[str]:

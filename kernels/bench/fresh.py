@@ -1,10 +1,7 @@
 """What the first run of all costs, in a process of its own whose caches of compiled code are empty folders.
 
-1. A denoiser: a contender opens and makes a small frame; a second process does the same with the same
-   folders, and tells whether caches on disk save compiling [`first_runs`].
-2. A scene: a process compiles a pipeline and reads its first picture [`first_picture`].
-
-Each measures from the moment when packages are imported, and for a denoiser the device is open.
+A contender opens and makes a small frame; a second process does the same with the same folders, and tells
+whether caches on disk save compiling [`first_runs`]. Packages are imported and the device is open by then.
 """
 
 from __future__ import annotations
@@ -15,13 +12,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...models.data.scene_source import scene_source
 from ...refimpl.network.denoise import Model
-from ..cache import FOLDER_VARIABLE
-from ..devices.registry import open_executor
 from ..measure import environment
 from ..orphans import Worker, WorkerEnded
-from ..run.pipeline import Pipeline
 from .contenders import Tools, chosen, of_machine
 from .workload import given, noise
 
@@ -41,16 +34,7 @@ def first_runs(name: str, model: Model, size: int) -> tuple[float | None, float 
     `size`: the width of the benchmark's pictures, by which names are given. None: it fails.
     """
     with empty_caches():
-        return _in_process(_denoiser, name, model, size), _in_process(_denoiser, name, model, size)
-
-
-def first_picture(name: str, model: Model, scene: str, size: int) -> float | None:
-    """Return the seconds to the first picture (size, size) of a scene, on the executor of this name.
-
-    None where that fails.
-    """
-    with empty_caches((*CACHES, FOLDER_VARIABLE)):
-        return _in_process(_pipeline, name, model, scene, size)
+        return in_process(_denoiser, name, model, size), in_process(_denoiser, name, model, size)
 
 
 @contextmanager
@@ -68,7 +52,7 @@ def empty_caches(names: Sequence[str] = CACHES) -> Iterator[None]:
             yield
 
 
-def _in_process(work: Callable[..., float], *arguments: object) -> float | None:
+def in_process(work: Callable[..., float], *arguments: object) -> float | None:
     """Return the seconds that a function returns in a process of its own; None where it fails."""
     worker = Worker()
     try:
@@ -87,12 +71,4 @@ def _denoiser(name: str, model: Model, size: int) -> float:
         contender.prepare(tools)
         start = time.perf_counter()
         contender.open(tools, model, FRAME_PX).run(frame)
-        return time.perf_counter() - start
-
-
-def _pipeline(name: str, model: Model, scene: str, size: int) -> float:
-    """Return the seconds in which a pipeline is compiled and its first picture read."""
-    start, shown = time.perf_counter(), scene_source(scene).at()
-    with open_executor(name) as device, Pipeline(device, shown, model, (size, size)) as pipeline:
-        pipeline.run()
         return time.perf_counter() - start

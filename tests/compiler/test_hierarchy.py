@@ -16,12 +16,12 @@ from wamnet.compiler.scenes import hierarchy
 from wamnet.compiler.scenes.hierarchy import Walked, holding, plant, walked
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.kernels.bench.paths import crowd
 from wamnet.refimpl.light import intersection
 from wamnet.refimpl.light.scene import IDENTITY, Box, Camera, Light, Quad, Room, Scene, Sphere
 from wamnet.refimpl.light.shapes import kinds
 from wamnet.refimpl.light.shapes.shape import MISS
 from wamnet.refimpl.light.transport import Settings
+from wamnet_peers.paths import crowd
 
 GREY = (0.5, 0.5, 0.5)
 CAMERA = Camera((0.0, 0.0, 0.95), (0.0, 0.0, 0.0))

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from wamnet.kernels.bench.pipelines import moments
 from wamnet.kernels.bench.workload import paper_model
 from wamnet.kernels.run.pipeline import Pipeline
+from wamnet_peers.pipelines import moments
 
 pytestmark = pytest.mark.apart
 """What other tests have freed, and allocators still hold, would count as growth when it is used again."""

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from wamnet.kernels import measure
-from wamnet.kernels.bench import fresh, paths, training
+from wamnet.kernels.bench import fresh
 from wamnet.refimpl.light.scene import primitives
 from wamnet.refimpl.network.train import PRESETS
+from wamnet_peers import paths, training
 
 
 def variables(names):

@@ -16,13 +16,12 @@ from statistical import assert_all_plausible, welch_p
 
 from wamnet.cli.common.inputs import load_model
 from wamnet.kernels import open_executor
-from wamnet.kernels.bench import paths, pipelines
 from wamnet.kernels.run.render_on import render_on
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.transport import Settings
-from wamnet_peers import moving, peer_cycles, table
+from wamnet_peers import moving, peer_cycles, pipelines
 
 pytestmark = [pytest.mark.nightly, pytest.mark.apart, pytest.mark.needs("packages")]
 
@@ -94,12 +93,6 @@ def test_a_process_that_ends_is_told(monkeypatch) -> None:
 def test_what_cycles_would_show_differently_is_refused(scene) -> None:
     with pytest.raises(InputError, match=f"scene.* '{scene.name}': (only matte|no sky)"):
         peer_cycles.check(scene, Settings())
-
-
-@pytest.mark.nightly
-def test_every_peer_can_be_named() -> None:
-    assert set(pipelines.PEERS) == set(table.makers)
-    assert set(paths.PEERS) == set(table.renderers)
 
 
 def test_a_bundled_model_gets_the_layers_that_it_reads() -> None:

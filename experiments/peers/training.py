@@ -19,12 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from ...refimpl.frame import Frame
-from ...refimpl.network import dataset, train
-from ...refimpl.network.train import Recipe
-from ..devices.registry import open_executor
-from ..measure import Entry, Round
-from . import peers, workload
+from wamnet.kernels.bench import workload
+from wamnet.kernels.devices.registry import open_executor
+from wamnet.kernels.measure import Entry, Round
+from wamnet.kernels.run.trainer import begin
+from wamnet.refimpl.frame import Frame
+from wamnet.refimpl.network import dataset, train
+from wamnet.refimpl.network.train import Recipe
+
+from . import peer_torch
 
 SGEMM_SIZE = 2048
 """Rows and columns of the two matrices whose product is the measure: large enough for BLAS's full rate."""
@@ -104,8 +107,6 @@ def _numpy(recipe: Recipe, pairs: Sequence[Pair]) -> Steps:
 
 def _opencl(recipe: Recipe, pairs: Sequence[Pair]) -> Steps:
     """Return the compiled trainer's steps, without the data's way to the device."""
-    from ..run.trainer import begin
-
     data, state, _ = _begun(recipe, pairs)
     long = replace(recipe, steps=10**9)
     run = begin(open_executor("opencl"), long, data, replace(state, recipe=long))
@@ -117,9 +118,9 @@ def _torch(recipe: Recipe, pairs: Sequence[Pair]) -> Steps:
     data, state, pool = _begun(recipe, pairs)
     if pool is not None:
         picks, gathered = partial(train.draw_picks, recipe), dataset.examples_at(data, *pool)
-        return peers.table().trainer(recipe, state.siren, picks, gathered)
+        return peer_torch.trainer(recipe, state.siren, picks, gathered)
     drawn = lambda step: dataset.examples_at(data, *train.draw_batch(recipe, step, data, None))  # noqa: E731
-    return peers.table().trainer(recipe, state.siren, drawn)
+    return peer_torch.trainer(recipe, state.siren, drawn)
 
 
 TRAINERS: Mapping[str, Callable[[Recipe, Sequence[Pair]], Steps]] = {

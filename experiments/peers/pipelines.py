@@ -4,9 +4,9 @@
    inputs of one kernel [`moments`]. Its parts are each ended by waiting for the device [`_parts`].
 2. Beside it are the same pipeline of one moment, and the separate way by kernels of the same executor: trace
    all layers, read them back, encode in float64, upload, denoise, read back [`Ours.ways`].
-3. Other makers of whole pictures show the same moments: a renderer and a denoiser [`Maker`].
+3. Other makers of whole pictures show the same moments: a renderer and a denoiser [common.py: `Maker`].
 4. A scene that is new in another way has a kernel of its own, which is compiled before its first picture
-   [`Ours.first_pictures`]; a process that finds empty caches compiles everything [fresh.py].
+   [`Ours.first_pictures`]; a process that finds empty caches compiles everything [`first_picture`].
 
 The network has random weights: speed does not depend on them.
 """
@@ -15,24 +15,29 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
-from ...compiler.compile import compile_plan
-from ...compiler.variants import plan_model
-from ...models.data.scene_source import scene_source
-from ...refimpl.light.render import Job
-from ...refimpl.light.scene import Scene
-from ...refimpl.network.denoise import Model, learned_shadow_rays
-from ..devices.executor import Executor
-from ..devices.passes import PICTURE
-from ..measure import Entry
-from ..run.denoise_on import images_of
-from ..run.pipeline import Pipeline
-from ..run.render_on import render_on
-from ..run.tune import Subject, Tuning
+from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.variants import plan_model
+from wamnet.kernels.bench.fresh import CACHES, empty_caches, in_process
+from wamnet.kernels.cache import FOLDER_VARIABLE
+from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.devices.passes import PICTURE
+from wamnet.kernels.devices.registry import open_executor
+from wamnet.kernels.measure import Entry
+from wamnet.kernels.run.denoise_on import images_of
+from wamnet.kernels.run.pipeline import Pipeline
+from wamnet.kernels.run.render_on import render_on
+from wamnet.kernels.run.tune import Subject, Tuning
+from wamnet.models.data.scene_source import scene_source
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import Scene
+from wamnet.refimpl.network.denoise import Model, learned_shadow_rays
+
+from .common import Ways
 
 MOMENTS = 48
 """Pictures of a scene that moves before its first moment is shown again."""
@@ -48,26 +53,6 @@ PAUSE_S = 0.1
 
 MOVING = "one pipeline, moving"
 """What others are compared with."""
-
-PEERS = ("mitsuba", "cycles")
-"""Other makers of whole pictures [`peers.Table.makers`]."""
-
-Ways = Mapping[str, Callable[[], Any]]
-"""What is measured, by name; a float that is returned is the seconds."""
-
-
-class Maker(Protocol):
-    """What makes pictures of a scene that moves."""
-
-    @property
-    def about(self) -> str:
-        """Return in words what it is, with versions."""
-
-    def ways(self, shots: Sequence[Scene]) -> Ways:
-        """Return what is measured, by name; pictures show the scenes one after another."""
-
-    def close(self) -> None:
-        """Give back what it holds."""
 
 
 def moments(name: str) -> list[Scene]:
@@ -156,3 +141,20 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
         "of it: denoising": waited(passes.denoise),
         "of it: reading back": lambda: passes.read(PICTURE),
     }
+
+
+def first_picture(name: str, model: Model, scene: str, size: int) -> float | None:
+    """Return the seconds to the first picture (size, size) of a scene, on the executor of this name.
+
+    None where that fails.
+    """
+    with empty_caches((*CACHES, FOLDER_VARIABLE)):
+        return in_process(_first_picture, name, model, scene, size)
+
+
+def _first_picture(name: str, model: Model, scene: str, size: int) -> float:
+    """Return the seconds in which a pipeline is compiled and its first picture read."""
+    start, shown = time.perf_counter(), scene_source(scene).at()
+    with open_executor(name) as device, Pipeline(device, shown, model, (size, size)) as pipeline:
+        pipeline.run()
+        return time.perf_counter() - start

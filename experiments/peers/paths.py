@@ -24,34 +24,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...compiler.artifact import Artifact
-from ...compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
-from ...compiler.scenes.lower_scene import lower_scene
-from ...compiler.scenes.path_kernel import compile_path
-from ...models.data.scene_source import scene_source
-from ...refimpl import rng
-from ...refimpl.light.render import Job
-from ...refimpl.light.scene import Box, Camera, Light, Matrix, Quad, Room, Scene, Sphere, Vector, primitives
-from ...refimpl.light.transport import Settings
-from ..devices.executor import Executor
-from ..devices.kernel import Part
-from ..devices.registry import open_executor
-from ..measure import Entry, Round
-from ..run.render_on import render_on
-from ..run.render_pool import render_parallel
-from . import peers
+from wamnet.compiler.artifact import Artifact
+from wamnet.compiler.core.loops import LISTS, STATEMENTS, TREES, Forms
+from wamnet.compiler.scenes.lower_scene import lower_scene
+from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.kernels.devices.executor import Executor
+from wamnet.kernels.devices.kernel import Part
+from wamnet.kernels.devices.registry import open_executor
+from wamnet.kernels.measure import Entry, Round
+from wamnet.kernels.run.render_on import render_on
+from wamnet.kernels.run.render_pool import render_parallel
+from wamnet.models.data.scene_source import scene_source
+from wamnet.refimpl import rng
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.scene import (
+    Box,
+    Camera,
+    Light,
+    Matrix,
+    Quad,
+    Room,
+    Scene,
+    Sphere,
+    Vector,
+    primitives,
+)
+from wamnet.refimpl.light.transport import Settings
 
-PEERS = ("mitsuba",)
-"""Renderers that are peers."""
+from . import table
+from .peer_mitsuba import VARIANT
 
-BUILT = ("opencl", "opengl", "c", *PEERS)
+BUILT = ("opencl", "opengl", "c", *table.renderers)
 """What forms are measured of: executors whose kernels a driver or a compiler builds, and peers."""
 
 BY = ("numpy", *BUILT)
 """What can render."""
-
-VARIANT = "llvm_ad_rgb"
-"""Mitsuba's variant: compiled, on vectors and all cores."""
 
 Frames = Callable[[int], Any]
 """Makes the frame of a seed."""
@@ -78,7 +85,7 @@ def renderers(name: str, job: Job, by: Sequence[str], workers: Sequence[int]) ->
             for count in workers:
                 text = f"numpy, {count} process{'es' if count > 1 else ''}"
                 ways[text] = partial(_reference, scene, job, count)
-        elif kind in PEERS:
+        elif kind in table.renderers:
             ways[f"{kind}, {VARIANT}"] = partial(_peer, kind, scene, job)
         else:
             ways[kind] = partial(_kernel, kind, scene, job)
@@ -114,7 +121,7 @@ def _kernel(name: str, scene: Scene, job: Job) -> Frames:
 
 def _peer(kind: str, scene: Scene, job: Job) -> Frames:
     """Return how another renderer makes frames."""
-    render = peers.table().renderers[kind](scene, job.width, job.height, job.settings)
+    render = table.renderers[kind](scene, job.width, job.height, job.settings)
     return lambda seed: render(job.spp, seed)
 
 
@@ -155,7 +162,7 @@ def form_of_peer(name: str, scene: Scene, part: Part) -> Entry:
     """Return a peer's own form of a scene, as [`forms`] does; its fact `source` is empty."""
     shape = (scene, part.width, part.rows, Settings())
     follow = lambda render: render(part.samples, 0)  # noqa: E731
-    return _form(VARIANT, lambda: peers.table().renderers[name](*shape), follow, follow)
+    return _form(VARIANT, lambda: table.renderers[name](*shape), follow, follow)
 
 
 def _form(

@@ -1,0 +1,317 @@
+"""Commands that compare parts of wamnet with other programs: each measures one, and prints a Markdown table.
+
+A record is made of the rows (experiments/publish.py); progress is on standard error.
+"""
+
+import statistics
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack, nullcontext
+from functools import partial
+from importlib import metadata
+from typing import Annotated
+
+from wamnet.cli.commands.measure import SceneShown, head, names_of, row
+from wamnet.cli.common.options import SCENES, option, parse_names, usage
+from wamnet.cli.common.terminal import progress, say
+from wamnet.cli.reports import machine
+from wamnet.kernels import EXECUTORS, open_executor
+from wamnet.kernels.bench.fresh import empty_caches
+from wamnet.kernels.bench.workload import check_size, paper_model
+from wamnet.kernels.devices.kernel import Part
+from wamnet.kernels.measure import Entry, environment, measure, take_turns
+from wamnet.models.data.scene_source import scene_source
+from wamnet.refimpl.errors import ExecutorUnavailable, InputError
+from wamnet.refimpl.light.render import Job
+from wamnet.refimpl.light.transport import Settings
+from wamnet.refimpl.network.dataset import FEATURES
+from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.train import PRESETS
+
+from . import paths, pipelines, table, training
+
+COMMANDS = {f"bench {name}": name for name in ("render", "train", "pipeline", "primitives")}
+"""Function of each command, which `wamnet` registers."""
+
+MOST = 1 << 20
+"""Largest count that an option takes: a typing error is refused before anything is measured."""
+
+NUMPY = f"NumPy {metadata.version('numpy')}"
+"""NumPy's version, with its name."""
+
+Repeats = Annotated[int, usage("Number of interleaved rounds.")]
+Square = Annotated[int, usage("Width and height in pixels.")]
+
+
+def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
+    """Return the integers of a text like `256,512`, or refuse it."""
+    try:
+        counts = tuple(int(part) for part in parse_names(text))
+    except ValueError:
+        counts = ()
+    if not counts or not all(1 <= count <= MOST for count in counts):
+        rule = f"must be integers from 1 to {MOST}, with commas"
+        raise InputError(option, text, rule, f"for example {option} {example}")
+    return counts
+
+
+def check_counts(sizes: Iterable[int] = (), **counts: tuple[int, int]) -> None:
+    """Refuse sizes of which no picture is made, and numbers of things that make none: (value, example)."""
+    for size in sizes:
+        check_size(size)
+    for name, (value, example) in counts.items():
+        if not 1 <= value <= MOST:
+            option = f"--{name}"
+            raise InputError(option, value, f"must be from 1 to {MOST}", f"for example {option} {example}")
+
+
+def say_facts(*others: str) -> None:
+    """Print what is said of the machine, then what else was given."""
+    say(", ".join([*(f"{name} {value}" for name, value in machine.describe().items()), *others]))
+
+
+def extent(values: Sequence[float], digits: int) -> str:
+    """Return the least and the greatest value, as a table shows them."""
+    return f"{min(values):.{digits}f} - {max(values):.{digits}f}"
+
+
+Spp = Annotated[int, usage("Samples per pixel.")]
+
+
+def render(
+    scenes: str = option(f"NAME,...  Canonical scenes ({SCENES}) or scene files.", "minicubes,cornell"),
+    by: str = option(
+        "--by --executors NAME,...  Renderers to measure: numpy, opencl, opengl, c, mitsuba.", "numpy"
+    ),
+    workers: str | None = option("N,...  Processes for the NumPy reference. [default: 1, and one per core]"),
+    size: Square = 512,
+    spp: Spp = 2,
+    depth: int = option("Maximum path length, including the camera ray.", 6),
+    repeats: Repeats = 5,
+) -> None:
+    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3.
+
+    Each renders its first frame with empty compiler caches, then all are interleaved. The table has the
+    median and the range, samples (paths) per second, and the ratio to the last row's. A second table
+    compares each mean colour with that of the first renderer, in standard errors. [bold]pip install
+    mitsuba[/] adds Mitsuba, which also needs libLLVM.
+
+    Examples:
+    wamnet bench render --size 512 --spp 2 --repeats 5
+    wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16
+    """
+    kinds, shown = names_of("--by", by, paths.BY), parse_names(scenes) or [scenes]
+    usual = f"1,{machine.cores()}"
+    processes = counts_of("--workers", usual if workers is None else workers, "1,2")
+    check_counts([size], spp=(spp, 2), depth=(depth, 6), repeats=(repeats, 5))
+    job = Job(size, size, spp, settings=Settings(max_depth=depth - 1))
+    tables = [paths.renderers(name, job, kinds, processes) for name in shown]
+    entries = [entry for found in tables for entry in found]
+    with progress("measuring", len(entries) * (repeats + 1), "renders") as advance, empty_caches():
+        measure(entries, repeats, done=partial(advance, 1.0))
+    say_facts(NUMPY, f"{size}x{size}, {spp} spp, {depth} edges")
+    for found in tables:
+        last, last_s = found[-1].by, found[-1].times.median
+        head("scene", "backend", "first frame, s", "s, median", "s, range", "samples/s", f"times {last}")
+        for each in found:
+            median = each.times.median
+            row(
+                *(each.name, each.by, f"{each.first_s:.2f}", f"{median:.2f}", extent(each.seconds, 2)),
+                *(f"{size**2 * spp / median:,.0f}", f"{last_s / median:.2f}"),
+            )
+        if repeats > 1:
+            _say_agreement(found)
+
+
+def _say_agreement(entries: Sequence[Entry]) -> None:
+    """Print how far the mean colours are from the first one's."""
+    first, *others = entries
+    say("")
+    for each in others:
+        mean, its_mean = (statistics.fmean(entry.facts["means"]) for entry in (each, first))
+        found = paths.distance(each, first)
+        errors = "no spread" if found is None else f"{found:+.1f} errors"
+        say(f"{each.by}: mean colour {mean:.6f}, {first.by}'s {its_mean:.6f}: {errors}")
+
+
+def primitives(
+    executors: str = option(
+        "NAME,...  Path tracers to measure: opencl, opengl, c, mitsuba.", "opencl,opengl"
+    ),
+    kinds: str = option("NAME,...  Kinds of primitives: shared, turned, spheres, quads, mixture.", "mixture"),
+    counts: str = option("N,...  Number of primitives.", "10,30,100,300"),
+    size: Square = 128,
+    spp: Spp = 4,
+    repeats: Repeats = 5,
+) -> None:
+    """Measure scenes of many primitives in all forms: unrolled statements, tables with a loop, a tree.
+
+    The table has the lines and size of the source, the seconds to trace and emit it, the seconds until
+    the driver has built it and traced a first row of paths (without disk caches), and million samples
+    per second: median and range of the interleaved rounds. A star marks the form that the compiler
+    chooses; a tree is measured only if it is expected to pay off.
+
+    Examples:
+    wamnet bench primitives
+    wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000
+    """
+    given = names_of("--executors", executors, paths.BUILT)
+    scenes, numbers = names_of("--kinds", kinds, paths.KINDS), counts_of("--counts", counts, "30,100")
+    check_counts([size], spp=(spp, 4), repeats=(repeats, 5))
+    say_facts(NUMPY, f"{size}x{size}, {spp} spp")
+    head("backend", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
+    part = Part(size, size, 0, size, 0, spp, 0)
+    with environment(paths.NO_CACHES):
+        for name in given:
+            with nullcontext() if name in table.renderers else open_executor(name) as executor:
+                for scene in (paths.crowd(kind, count) for kind in scenes for count in numbers):
+                    if executor is None:
+                        entries = [paths.form_of_peer(name, scene, part)]
+                    else:
+                        entries = paths.forms(executor, scene, part)
+                    take_turns(entries, repeats)
+                    for entry in entries:
+                        _show(name, scene.name, entry, size * size * spp)
+
+
+def _show(by: str, scene: str, entry: Entry, samples: int) -> None:
+    """Print the row of a form."""
+    facts, rates = entry.facts, [samples / seconds / 1e6 for seconds in entry.seconds]
+    source, star = facts["source"], "*" if facts["chosen"] else ""
+    row(
+        *(by, scene, f"{entry.name}{star}", f"{source.count(chr(10)):,}"),
+        *(f"{len(source.encode()) / 1000:,.0f}", f"{facts['trace_s']:.2f}", f"{facts['build_s']:.2f}"),
+        *(f"{statistics.median(rates):.2f}", extent(rates, 2)),
+    )
+
+
+def train(
+    presets: str = option("NAME,...  Training presets: best, mirrors, paper, short, sky.", "paper,short"),
+    trainers: str | None = option(
+        "NAME,...  Trainers to measure: numpy, opencl, torch. [default: all that are installed]"
+    ),
+    size: Square = 256,
+    frames: int = option("Number of noise frames to train on.", 4),
+    seconds: float = option("S  Approximate time per measurement, in seconds.", 1.0),
+    repeats: Repeats = 5,
+) -> None:
+    """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch.
+
+    The trainers are interleaved with a product of two large matrices, on noise frames, minibatch sampling
+    included and compilation excluded. The table has the median and the range, GFLOP/s of the matrix
+    products, their share of the large product's rate, and the time that all steps would take. [bold]pip
+    install torch[/] adds PyTorch.
+
+    Examples:
+    wamnet bench train --presets paper,short --repeats 5
+    wamnet bench train --trainers numpy,opencl,torch --presets paper
+    """
+    names = names_of("--presets", presets, PRESETS)
+    given = training.trainers() if trainers is None else names_of("--trainers", trainers, training.TRAINERS)
+    check_counts([size], frames=(frames, 4), repeats=(repeats, 5))
+    if not 0.0 < seconds <= 600.0:
+        rule = "must be above 0 and at most 600"
+        raise InputError("--seconds", seconds, rule, "for example --seconds 1")
+    packages = [f"{name} {value}" for name, value in machine.versions().items()]
+    say_facts(*packages, f"{frames} frames of {size}x{size}")
+    pairs = training.noise(frames, size)
+    for recipe, preset in ((PRESETS[name], name) for name in names):
+        entries, product = training.entries(recipe, pairs, given, seconds), training.sgemm()
+        with progress(f"measuring {preset}", (len(given) + 1) * (repeats + 1), "rounds") as advance:
+            measure([product, *entries], repeats, warm=0, done=partial(advance, 1.0))
+        work, most = training.operations(recipe), product.facts["operations"] / min(product.seconds)
+        say("")
+        say(f"preset `{preset}`: {work / 1e9:.3f} GFLOP per step; sgemm {most / 1e9:.0f} GFLOP/s")
+        head("backend", "ms per step", "range", "GFLOP/s", "of sgemm", f"{recipe.steps:,} steps")
+        for entry in entries:
+            median = entry.times.median
+            row(
+                *(entry.name, f"{1e3 * median:.2f}", extent([1e3 * time for time in entry.seconds], 2)),
+                *(f"{work / median / 1e9:.0f}", f"{work / median / most:.0%}"),
+                f"{median * recipe.steps:,.0f} s",
+            )
+
+
+def pipeline(
+    scene: SceneShown = "minicubes",
+    executors: str = option("NAME,...  Backends to measure: numpy, opencl, opengl, c.", "opencl,opengl"),
+    sizes: str = option("N,...  Image sizes (width and height), in pixels.", "256,512"),
+    features: str = option("NAME,...  Input features of the network.", "color,normal"),
+    hidden: str = option("N,...  Width of each hidden layer, in neurons.", "32,32,32,32"),
+    window: int = option("Width and height of the window, in pixels.", 12),
+    feature_rays: int = option("N  Camera rays per pixel for the features; 0 uses the paths themselves.", 0),
+    repeats: Repeats = 5,
+    peers: str = option("NAME,...  Other renderers to include: mitsuba, cycles. [default: none]", ""),
+) -> None:
+    """Measure full frames of an animated scene: one path per pixel, and denoising.
+
+    [bold]ours, moving[/] is one pipeline on a device in which every frame has a different time; the table
+    has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
+    [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
+    own (package bpy). All are interleaved. The first frame includes compiling its path kernel; with empty
+    caches, in a separate process, all kernels. The network has random weights.
+
+    Examples:
+    wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
+    wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
+    wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32
+    """
+    scene_source(scene)
+    given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
+    others = names_of("--peers", peers, table.makers) if peers else ()
+    check_counts(widths, window=(window, 12), repeats=(repeats, 5))
+    seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
+    model = paper_model(seen, window, layers, depth_scale=20.0, position_scale=10.0)
+    rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""
+    network = f"network {'-'.join(map(str, model.siren.widths))}"
+    say_facts(NUMPY, f"{scene}, 1 spp{rays}, {Settings().max_depth + 1} edges", network)
+    head("backend", "size", "method", "ms, median", "ms, range", "images/s", f"times {given[0]}, moving")
+    notes: dict[str, None] = {}
+    for size in widths:
+        found = _entries(given, others, model, scene, size, repeats, notes, feature_rays)
+        ours = next(each.times.median for each in found if each.name == pipelines.MOVING)
+        for each in found:
+            ms, median = [1e3 * second for second in each.seconds], each.times.median
+            # Neither a part of a frame nor a first one has a rate.
+            full = not each.name.startswith(("of it", "first"))
+            rates = (f"{1.0 / median:.2f}", f"{median / ours:.2f}") if full else ("", "")
+            row(each.by, f"{size}x{size}", each.name, f"{1e3 * median:.1f}", extent(ms, 1), *rates)
+    for line in ("", *notes) if notes else ():
+        say(line)
+
+
+def _entries(
+    given: Sequence[str],
+    others: Sequence[str],
+    model: Model,
+    scene: str,
+    size: int,
+    repeats: int,
+    notes: dict[str, None],
+    rays: int,
+) -> list[Entry]:
+    """Return all rows of a size: what takes turns, then first pictures; note what others are, or lack."""
+    with ExitStack() as stack, ExitStack() as pipes:
+        found: list[Entry] = []
+        opened = [stack.enter_context(open_executor(name)) for name in given]
+        ours = [pipelines.Ours(each, model, scene, size, rays) for each in opened]
+        for each in ours:
+            found += pipelines.entries(each.executor.name, each.ways(pipes))
+        shots = pipelines.moments(scene)
+        for name in others:
+            try:
+                maker = table.makers[name](shots[0], size)
+            except (ExecutorUnavailable, InputError) as error:
+                notes[f"No row: {error}"] = None
+                continue
+            stack.callback(maker.close)
+            notes[f"{name}: {maker.about}"] = None
+            found += pipelines.entries(name, maker.ways(shots))
+        measure(found, repeats, pause_s=pipelines.PAUSE_S)
+        pipes.close()
+        for each in ours:
+            seconds = each.first_pictures()
+            found.append(Entry("first picture of a new scene", by=each.executor.name, seconds=seconds))
+    for name in given:
+        if (cold := pipelines.first_picture(name, model, scene, size)) is not None:
+            found.append(Entry("first picture, empty caches", by=name, seconds=[cold]))
+    return found

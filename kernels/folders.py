@@ -3,7 +3,7 @@
 1. What is in a cache may become code of this user's processes: a folder that others own or may write is not
    used, nor one in such a folder [`is_private`]. Without a home there is no cache [`cache_base`]. Drivers and
    packages do not check theirs: they get a temporary folder where these are not private [`protect_caches`].
-2. A temporary folder is removed with all that is in it, however deep [`temporary`], [`remove`]. One for
+2. A temporary folder is removed with all that is in it, however deep [`discard`], [`remove`]. One for
    programs is on a file system that runs them [`runs_programs`].
 3. A process that is killed leaves its temporary folders behind, and the next one removes them: a folder is
    locked as long as its process lives [`new_temporary`].
@@ -19,8 +19,7 @@ import re
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -100,16 +99,6 @@ def runs_programs(folder: Path) -> bool:
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     return os.access(folder, os.W_OK | os.X_OK) and not os.statvfs(folder).f_flag & os.ST_NOEXEC
-
-
-@contextmanager
-def temporary(name: str, programs: bool = False) -> Iterator[Path]:
-    """Yield a new folder, and remove it when the block ends; `programs`: what is built there has to run."""
-    folder, lock = new_temporary(name, programs)
-    try:
-        yield folder
-    finally:
-        discard(folder, lock)
 
 
 def new_temporary(name: str, programs: bool = False) -> tuple[Path, int]:

@@ -1,8 +1,7 @@
-"""Workers and programs that end with the process that started them, however that ended.
+"""Workers that end with the process that started them, however that ended.
 
 A parent that is killed by SIGKILL can end nobody, and a worker that waits for work would wait for ever. The
-system closes what the parent held open: a thread of the worker waits for that [`end_with_parent`], or a shell
-beside a program of others, which ends the program and all that it has started [`running`].
+system closes what the parent held open: a thread of the worker waits for that [`end_with_parent`].
 
 A [`Worker`] calls functions in a process of its own: that it ends, or never answers, is an answer too.
 """
@@ -12,18 +11,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import subprocess
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from multiprocessing.connection import wait
 from typing import Any
-
-WATCH = ("/bin/sh", "-c", 'read -r line; kill -s KILL -- "-$0"')
-"""What ends a group of processes, whose number follows, at the end of its own input."""
-
-LATE_S = 0.2
-"""Seconds in which the last words of a program that has ended are read."""
 
 
 def end_with_parent() -> None:
@@ -90,50 +81,3 @@ def _serve(pipe: Any) -> None:
             pipe.send(function(*arguments))
         except Exception:  # noqa: BLE001 - the caller sees how the process ended
             os._exit(1)
-
-
-@contextmanager
-def running(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a program in a session of its own; with the block, or this process, all of its group ends."""
-    process = subprocess.Popen(command, start_new_session=True, **options)
-    quiet, watch = subprocess.DEVNULL, None
-    try:
-        watch = subprocess.Popen(
-            [*WATCH, str(process.pid)],
-            stdin=subprocess.PIPE,
-            stdout=quiet,
-            stderr=quiet,
-            start_new_session=True,
-            cwd="/",
-        )
-        yield process
-    finally:
-        # The group's number is its own as long as its first process has not been waited for.
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        if watch is not None:
-            watch.kill()
-            watch.communicate()
-
-
-def printed(process: subprocess.Popen[bytes], most: int, limit_s: float) -> bytes:
-    """Return the end of what a program prints until it ends; TimeoutExpired if that takes too long.
-
-    What it has started may print on, and is not waited for.
-    """
-    tail = bytearray()
-    assert process.stdout is not None
-    stream = process.stdout
-
-    def read() -> None:
-        with stream:
-            while part := os.read(stream.fileno(), 1 << 16):
-                tail.extend(part)
-                del tail[:-most]
-
-    thread = threading.Thread(target=read, daemon=True)
-    thread.start()
-    process.wait(limit_s)
-    thread.join(LATE_S)
-    return bytes(tail)

@@ -8,10 +8,7 @@
    8.17.22, evaluated by Lentz's method (Thompson and Barnett, "Coulomb and Bessel functions of complex
    arguments and order", Journal of Computational Physics 64, 1986).
 3. With m comparisons each is tested at Sidak's level, so that the chance of a false alarm over all of them
-   is the stated significance [`sidak`]. Where one wants to know which of them fail, Holm's steps do the
-   same, whatever the comparisons have in common [`holm`]: "A Simple Sequentially Rejective Multiple Test
-   Procedure", Scandinavian Journal of Statistics 6(2), 1979.
-4. Student's distribution the other way round gives intervals [`student_quantile`].
+   is the stated significance [`sidak`].
 
 The method for pictures: Jung, Hanika and Dachsbacher, "Detecting Bias in Monte Carlo Renderers using Welch's
 t-test", JCGT 9(2), 2020.
@@ -20,7 +17,6 @@ t-test", JCGT 9(2), 2020.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,9 +27,6 @@ Array = NDArray[np.float64]
 FRACTION_STEPS = 4000
 """Most steps of the continued fraction: it needs about the root of the degrees of freedom, below 2**23."""
 
-HALVINGS = 60
-"""Halvings of an interval of t: to the last bit of float64."""
-
 LEAST_TERM = 1e-300
 """Stands in for a zero in Lentz's method."""
 
@@ -41,33 +34,6 @@ LEAST_TERM = 1e-300
 def sidak(significance: float, comparisons: int) -> float:
     """Return the level of each of several comparisons that together have the given significance."""
     return float(-np.expm1(np.log1p(-significance) / comparisons))
-
-
-def holm(p_values: Array, significance: float) -> NDArray[np.bool_]:
-    """Tell (m,) which of m hypotheses fall: from the least p on, while p <= significance / (those left).
-
-    The chance that any true one falls is at most the significance. NaN falls: nobody may take it for a pass.
-    """
-    p = np.where(np.isnan(p_values), 0.0, p_values)
-    order = np.argsort(p, kind="stable")
-    left = len(p) - np.arange(len(p))
-    falls = np.logical_and.accumulate(p[order] * left <= significance)
-    found = np.zeros(len(p), bool)
-    found[order] = falls
-    return found
-
-
-@lru_cache(1024)
-def student_quantile(tail: float, freedom: float) -> float:
-    """Return the t that Student's distribution exceeds with probability `tail` < 1/2, by bisection."""
-    low, high = 0.0, 1.0
-    degrees = np.array(float(freedom))
-    while student_p(np.array(high), degrees) / 2 > tail:
-        high *= 2.0
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if student_p(np.array(middle), degrees) / 2 > tail else (low, middle)
-    return high
 
 
 def welch_p(mean_a: Any, variance_a: Any, count_a: int, mean_b: Any, variance_b: Any, count_b: int) -> Array:

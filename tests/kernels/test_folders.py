@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from wamnet.kernels import folders
 from wamnet.refimpl.errors import ExecutorUnavailable
+from wamnet_verify.programs import temporary
 
 NAMES = st.one_of(
     st.text(st.characters(exclude_characters="/\0", exclude_categories=("Cs",)), min_size=1, max_size=9).map(
@@ -66,13 +67,13 @@ def test_whatever_is_in_a_folder_goes_and_nothing_else(tree) -> None:
 def test_folders_deeper_than_recursion_and_paths_go(tmp_path) -> None:
     """shutil.rmtree ended in a RecursionError here, with a renderer's report lost."""
     code = "import os\nfor _ in range(1500): os.mkdir('deep'); os.chdir('deep')"
-    with folders.temporary("test") as folder:
+    with temporary("test") as folder:
         subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
     assert not folder.exists()
 
 
 def test_a_temporary_folder_may_be_gone_at_its_end() -> None:
-    with folders.temporary("test") as folder:
+    with temporary("test") as folder:
         folder.rmdir()
     assert not folder.exists()
 
@@ -91,11 +92,11 @@ def test_folders_of_killed_processes_go_and_those_of_running_ones_stay(tmp_path,
         left = Path(process.stdout.readline().strip())
         for path in (left, other):
             os.utime(path, (time.time() - 60,) * 2)
-        with folders.temporary("test"):
+        with temporary("test"):
             assert left.exists()
         process.kill()
         process.wait()
-    with folders.temporary("test"):
+    with temporary("test"):
         assert not left.exists()
     assert list(tmp_path.iterdir()) == [other]
 
@@ -168,7 +169,7 @@ def test_programs_are_built_where_they_run(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     real = folders.runs_programs
     monkeypatch.setattr(folders, "runs_programs", lambda path: tmp_path != path and real(path))
-    with folders.temporary("test", programs=True) as folder:
+    with temporary("test", programs=True) as folder:
         assert folder.parent != tmp_path
     monkeypatch.setattr(folders, "runs_programs", lambda path: False)
     with pytest.raises(ExecutorUnavailable, match=r"TMPDIR is .*noexec.*set it to a folder on another"):

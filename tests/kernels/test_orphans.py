@@ -69,7 +69,7 @@ def test_what_a_program_has_started_ends_too(tmp_path, end) -> None:
     """A renderer's own children lived on after the time limit, and when the command was killed."""
     started = "sleep 600 & sleep 600 & echo $!; wait"
     code = (
-        "import subprocess, time; from wamnet.kernels.orphans import running\n"
+        "import subprocess, time; from wamnet_verify.programs import running\n"
         f"with running(['sh', '-c', {started!r}], stdout=subprocess.PIPE) as process:\n"
         "    print(process.pid, process.stdout.readline().decode().strip(), flush=True)\n"
         f"    time.sleep({600 if end == 'parent' else 0})\n"

@@ -22,8 +22,6 @@ from typing import Protocol
 
 import numpy as np
 
-from wamnet.kernels.folders import temporary
-from wamnet.kernels.orphans import printed, running
 from wamnet.kernels.run.render_frame import render_frame
 from wamnet.refimpl import encoding
 from wamnet.refimpl.errors import InputError
@@ -35,6 +33,7 @@ from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_pov
 from .cases import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
 from .parts import NotExpressed
+from .programs import printed, running, temporary
 
 LIMIT_S = 300.0
 """Seconds after which a renderer's process counts as one that never ends."""

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from wamnet.kernels.orphans import printed, running
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.materials import Mirror
 from wamnet.refimpl.light.scene import Scene, Sphere, from_json
@@ -22,6 +21,7 @@ from wamnet_verify.cases import Shot, chosen, questions
 from wamnet_verify.command import read_layers
 from wamnet_verify.judgement import DEVIATES, FAILED, PASS, UNTESTED, Missing, Verdict
 from wamnet_verify.parts import NotExpressed, parts_of
+from wamnet_verify.programs import printed, running
 
 SHOT = Shot("a shot", empty(), size=4, spp=1)
 WRITES = "import sys; import numpy as np; np.savez(sys.argv[2], color=np.full((4, 4, 3), 0.25))"

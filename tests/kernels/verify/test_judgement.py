@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from statistical import stats
 
-from wamnet.kernels.judge.welch import holm, student_quantile
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify import judgement as J
 from wamnet_verify import report, run
 from wamnet_verify.cases import RULES, Question, Shot, chosen
+from wamnet_verify.judgement import holm, student_quantile
 
 SIZE = 4
 SHOT = Shot("shot", empty(), size=SIZE)

@@ -13,6 +13,7 @@ kernels return are such arrays too: page faults took a sixth of the time of a 51
 from __future__ import annotations
 
 import ctypes
+import os
 import resource
 from contextlib import suppress
 
@@ -35,6 +36,11 @@ def keep_freed_memory() -> bool:
     except (AttributeError, OSError):
         return False  # another C library, or another system
     return all(mallopt(name, KEPT_BYTES) == 1 for name in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD))
+
+
+def cores() -> int:
+    """Return the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 THREAD_STACK = 1 << 21

@@ -25,7 +25,6 @@ from wamnet.compiler.variants import plan_model
 from wamnet.kernels.bench.fresh import CACHES, empty_caches, in_process
 from wamnet.kernels.cache import FOLDER_VARIABLE
 from wamnet.kernels.devices.executor import Executor
-from wamnet.kernels.devices.passes import PICTURE
 from wamnet.kernels.devices.registry import open_executor
 from wamnet.kernels.measure import Entry
 from wamnet.kernels.run.denoise_on import images_of
@@ -139,7 +138,7 @@ def _parts(pipeline: Pipeline) -> dict[str, Callable[[], Any]]:
         f"of it: paths{encoded}": waited(lambda: passes.trace(pipeline.path, part, pipeline.moment.numbers)),
         **({} if encoded else {"of it: encoding": waited(lambda: passes.encode(1))}),
         "of it: denoising": waited(passes.denoise),
-        "of it: reading back": lambda: passes.read(PICTURE),
+        "of it: reading back": pipeline.picture,
     }
 
 

@@ -24,13 +24,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import ENCODE, INTEGERS, PATH, PLAIN
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from .. import cache
 from ..folders import discard, new_temporary
+from ..memory import cores
 from .executor import BYTE_SCHEDULE, INDEX_LIMIT, VECTOR_SCHEDULES, Executor
 from .kernel import Memory, words
 
@@ -55,9 +54,6 @@ Contraction is off in the source too."""
 
 NATIVE = "-march=native"
 """Option for this very processor's instructions; not all compilers take it."""
-
-PRIVATE_BYTES = 2**20
-"""Most bytes of a pixel's arrays: half the smallest stack that glibc gives a thread."""
 
 TRIAL = """\
 #include <math.h>
@@ -111,28 +107,8 @@ int main(int count, char **arguments)
 denormal numbers, signs of zeros, comparison with NaN. Last it prints whether kernels are compiled for an
 instruction for products of bytes, and the floats in a vector register: 1 where there are no vectors."""
 
-
-def trial_bits() -> list[str]:
-    """Return what the trial's arithmetic prints, by NumPy: the definition of all arithmetic here."""
-    f = np.float32
-    one, large, small = f(1), f(16777216), f(1e-30)
-    third, total = one / f(3), f(0)
-    for i in range(64):
-        total = total + one / f(i + 1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        no_number = large * large * large * large * large * large * f(0)
-    values = [
-        total,
-        (large + one) - large,
-        third * third - one / f(9),
-        small * f(1e-12),
-        large / f(7),
-        np.sqrt(third),
-        -one * f(0) + -f(0),
-        one if no_number == 0 else f(0),
-    ]
-    return [f"{int(f(value).view(np.uint32)):08x}" for value in values]
-
+TRIAL_BITS = "4097cdf6 00000000 32000000 000002ca 4a124925 3f13cd3a 80000000 00000000"
+"""What the trial's arithmetic prints where it is IEEE 754's, as NumPy's is."""
 
 WAY_OUT = f"install one (Debian: gcc and libc6-dev), or name yours in {COMPILER_VARIABLE}"
 """What to do without a compiler."""
@@ -220,9 +196,8 @@ class CExecutor(Executor):
             discard(self._folder, self._lock)
             raise
         self.byte_schedule = BYTE_SCHEDULE if byte_products else ""
-        self.schedule = VECTOR_SCHEDULES.get(lanes, PLAIN)
-        self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
-        self._threads = ThreadPoolExecutor(os.cpu_count() or 1)
+        self._suits(f"processors with {lanes} floats in a register", VECTOR_SCHEDULES.get(lanes, PLAIN))
+        self._threads = ThreadPoolExecutor(cores())
 
     def _try(self) -> dict[str, Any]:
         """Return what the compiler takes; raise where its programs do not compute as they must."""
@@ -244,7 +219,7 @@ class CExecutor(Executor):
             rule = f"what it compiles does not run here ({type(error).__name__})"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {WAY_OUT}") from None
         *bits, byte_products, lanes = found or ["", ""]
-        if bits != trial_bits():
+        if bits != TRIAL_BITS.split():
             rule = "what it compiles does not compute as IEEE 754 says"
             way_out = f"take options that relax arithmetic out of {COMPILER_VARIABLE}"
             raise ExecutorUnavailable(f"c: {self.device}: {rule}; {way_out}")
@@ -252,12 +227,7 @@ class CExecutor(Executor):
 
     def _prepare(self, kernel: Artifact) -> Any:
         """Return the function of a loaded kernel."""
-        used = kernel.manifest.get("private_bytes", 0)
-        if used > PRIVATE_BYTES:
-            raise CompileError(
-                f"{self.device}: arrays take {used} bytes per pixel; at most {PRIVATE_BYTES} fit "
-                "a thread's stack; use narrower layers, or executor numpy"
-            )
+        self.check_stack(kernel.manifest.get("private_bytes", 0))
         function = self._library(kernel, glue_of(kernel, _header(kernel)))
         function.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int] * 2]
         return function
@@ -313,7 +283,7 @@ class CExecutor(Executor):
 
     def _in_threads(self, height: int, whole: int, rows: Callable[[int, int], None]) -> None:
         """Call a function for blocks of rows [first, end), multiples of `whole`, shared out to threads."""
-        count = max(1, height // (8 * (os.cpu_count() or 1)))
+        count = max(1, height // (8 * cores()))
         firsts = range(0, height, -(-count // whole) * whole)
         list(self._threads.map(rows, firsts, [*firsts[1:], height]))
 

@@ -19,12 +19,10 @@ and copies the result back; the times that wamnet reports mean these two [`denoi
 
 from __future__ import annotations
 
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,8 +41,10 @@ from ...compiler.kernel.interface import (
     SUMS,
     WEIGHTS,
 )
-from ...refimpl.errors import InputError
+from ...refimpl.errors import CompileError, InputError
+from ..memory import cores
 from .kernel import (
+    Closing,
     Images,
     Memory,
     Part,
@@ -69,6 +69,12 @@ VECTOR_SCHEDULES = {lanes: f"fft:{lanes}" for lanes in (16, 8, 4)}
 """Schedule of a denoiser on a processor, by the floats in its vector registers: each took the least time of
 all when PoCL and GCC compiled them for such registers; the tiles of the same vectors take what it refuses."""
 
+GPU_SCHEDULE = "group:2"
+"""Schedule of a denoiser on a graphics processor: the fastest of all on an H200."""
+
+STACK_BYTES = 2**20
+"""Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
+
 BYTE_SCHEDULE = "dot:16"
 """Schedule of networks of integers on processors with an instruction for products of bytes. Without it loops
 and shifts take far longer than tiles of floats."""
@@ -86,7 +92,7 @@ class Built:
     run_at: set[Size] = field(default_factory=set)
 
 
-class Executor(ABC):
+class Executor(Closing, ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
@@ -130,8 +136,7 @@ class Executor(ABC):
     @property
     def identity(self) -> list[Any]:
         """Return what names the device with its driver, for keys of the cache."""
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        return [self.name, self.device, self.driver, cores]
+        return [self.name, self.device, self.driver, cores()]
 
     # ---- what a device provides --------------------------------------------------------------------------
 
@@ -209,15 +214,24 @@ class Executor(ABC):
                 "split the image, or use executor numpy",
             )
 
+    def check_stack(self, used: int) -> None:
+        """Refuse a kernel whose arrays take so many bytes of a thread's stack."""
+        if used > STACK_BYTES:
+            raise CompileError(
+                f"{self.device}: arrays take {used} bytes per pixel; at most {STACK_BYTES} fit a thread's "
+                "stack; use narrower layers, or executor numpy"
+            )
+
+    def _suits(self, devices: str, schedule: str = PLAIN) -> None:
+        """Choose a schedule for devices like this one."""
+        self.schedule, self.schedule_reason = schedule, f"built-in choice for {devices}"
+
     def open_trainer(self, kernel: Artifact, values: NDArray[Any], targets: NDArray[Any]) -> Any:
         """Return a trainer (opencl_trainer.py) for pictures laid out end to end, or refuse."""
         rule = "has no compiled trainer"
         raise InputError(
             "executor that trains", self.name, rule, "use executor opencl, or refimpl.network.train"
         )
-
-    def close(self) -> None:
-        """Give the device back."""
 
     # ---- what follows from it ----------------------------------------------------------------------------
 
@@ -391,14 +405,6 @@ class Executor(ABC):
                 f"must be {self.name}",
                 f"compile the program for {self.name}",
             )
-
-    def __enter__(self) -> Any:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _numbers(kernel: Artifact, numbers: NDArray[np.float32] | None) -> Images:

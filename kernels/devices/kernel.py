@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,21 @@ from ...refimpl.errors import InputError
 
 Size = tuple[int, int]
 """Height and width."""
+
+_Closed = TypeVar("_Closed", bound="Closing")
+
+
+class Closing:
+    """What is closed at the end of a `with` block."""
+
+    def close(self) -> None:
+        """Give back what it holds."""
+
+    def __enter__(self: _Closed) -> _Closed:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 BATCH_TILES = 128

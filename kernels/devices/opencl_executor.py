@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...compiler.kernel.interface import BLOCK, DENOISE, RESULT, SCENE_NUMBERS
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import pocl_cpu
-from .executor import BYTE_SCHEDULE, VECTOR_SCHEDULES, Executor
+from .executor import BYTE_SCHEDULE, GPU_SCHEDULE, STACK_BYTES, VECTOR_SCHEDULES, Executor
 from .kernel import Images, Memory, Size, in_order, shapes
 
 if TYPE_CHECKING:
@@ -54,12 +54,6 @@ __kernel void wamnet_has_bytes(__global int *found)
 """
 """A kernel that says whether the compiler has VNNI's instruction for products of bytes."""
 
-GPU_SCHEDULE = "group:2"
-"""Schedule of a denoiser on a graphics processor: the fastest of all on an H200."""
-
-STACK_BYTES = 2**20
-"""Most bytes of a group's arrays on a processor: half the smallest stack that glibc gives a thread."""
-
 PATH_LOCAL_SIZE = {1: (8, 8), 2: (1, 1)}
 """Work items (x, y) in a group of a path kernel: one path each, or (2) vectors of paths, which are groups by
 themselves and need no second loop around them."""
@@ -89,19 +83,16 @@ class OpenCLExecutor(Executor):
             pocl_cpu.name_the_processor(chosen.int_ptr)
         self._context = cl.Context([chosen])
         self._queue = cl.CommandQueue(self._context)
-        self._shares = False
-        if chosen.type & cl.device_type.CPU:
-            self._shares = True
+        self._shares = self.trains = bool(chosen.type & cl.device_type.CPU)
+        if self._shares:
             self.lanes = CPU_LANES
-            self.trains = True
             lanes = chosen.native_vector_width_float
-            self.schedule = VECTOR_SCHEDULES.get(lanes, VECTOR_SCHEDULES[4])
-            self.schedule_reason = f"built-in choice for processors with {lanes} floats in a register"
+            suits = VECTOR_SCHEDULES.get(lanes, VECTOR_SCHEDULES[4])
+            self._suits(f"processors with {lanes} floats in a register", suits)
         elif chosen.type & cl.device_type.GPU:
-            self.schedule = GPU_SCHEDULE
-            self.schedule_reason = "built-in choice for graphics processors"
+            self._suits("graphics processors", GPU_SCHEDULE)
         else:
-            self.schedule_reason = "built-in choice for unknown devices"
+            self._suits("unknown devices")
         self._kept: Memory | None = None
 
     @cached_property
@@ -137,12 +128,8 @@ class OpenCLExecutor(Executor):
             return group[0], group[1]
         items, used = int(self._device.max_work_group_size), int(artifact.manifest["private_bytes"])
         if self._device.type & cl.device_type.CPU:
+            self.check_stack(used)
             items = min(items, STACK_BYTES // max(used, 1))
-        if not items:
-            raise CompileError(
-                f"{self.device}: the kernel's arrays take {used} bytes per pixel; at most {STACK_BYTES} fit "
-                "a CPU thread's stack; use narrower layers, or a GPU, or executor numpy"
-            )
         wanted = LOCAL_SIZE if artifact.manifest["schedule"]["pixels"] == 1 else TILE_LOCAL_SIZE
         x = min(wanted[0], items)
         return x, min(wanted[1], items // x)

@@ -25,7 +25,7 @@ from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_T
 from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
-from .executor import Executor
+from .executor import GPU_SCHEDULE, Executor
 from .kernel import Memory, Size, batches
 from .registry import CONTEXT_VARIABLE
 
@@ -66,9 +66,6 @@ SOFTWARE = (llvmpipe.NAME, "softpipe", "swrast", "SwiftShader")
 SOFTWARE_SCHEDULE = "fftpasses:32"
 """Schedule of a denoiser there: a twelfth of the operations, and short programs, which compile in seconds."""
 
-GPU_SCHEDULE = "group:2"
-"""Schedule of a denoiser on a graphics processor with compute shaders: the fastest of all on an H200."""
-
 SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
 kernel computes some 14,000 pixels of the bundled network."""
@@ -107,13 +104,11 @@ class OpenGLExecutor(Executor):
         self.software = any(name in self.device for name in SOFTWARE)
         computes = self._context.version_code >= SHADER_VERSION
         if llvmpipe.NAME in self.device and computes:
-            self.schedule, self.schedule_pixels = SOFTWARE_SCHEDULE, SOFTWARE_PIXELS
-            self.schedule_reason = (
-                f"built-in choice for software, {self.schedule} from {self.schedule_pixels} pixels on"
-            )
+            self.schedule_pixels = SOFTWARE_PIXELS
+            devices = f"software, {SOFTWARE_SCHEDULE} from {SOFTWARE_PIXELS} pixels on"
+            self._suits(devices, SOFTWARE_SCHEDULE)
         elif computes:
-            self.schedule = GPU_SCHEDULE
-            self.schedule_reason = "built-in choice for graphics processors"
+            self._suits("graphics processors", GPU_SCHEDULE)
         else:
             self.schedule_reason = f"built-in choice before OpenGL {SHADER_VERSION / 100:.1f}"
         self.driver = self._context.info["GL_VERSION"]
@@ -206,7 +201,7 @@ class OpenGLExecutor(Executor):
             )
         padded = np.zeros((rows, WEIGHT_TEXTURE_WIDTH, texel), np.float32)
         padded.reshape(-1)[: artifact.weights.size] = artifact.weights
-        return Memory(padded.shape, [self._texture("weights", padded)])
+        return Memory(padded.shape, [self._texture("weights", padded.shape, padded.tobytes())])
 
     def _store(self, name: str, array: NDArray[np.float32]) -> Memory:
         """Return an image or a table as a texture, planes as textures of four, numbers as uniforms."""
@@ -214,29 +209,25 @@ class OpenGLExecutor(Executor):
             return Memory(array.shape, [_Uniforms(np.pad(array, (0, -len(array) % 4)))])
         if name not in PLANES:
             image = array if array.ndim == 3 else np.atleast_2d(array)[..., np.newaxis]
-            return Memory(array.shape, [self._texture(name, image)])
-        planes, made = np.pad(array, ((0, -len(array) % 4), (0, 0), (0, 0))), ExitStack()
-        with made:
-            textures = []
-            for first in range(0, len(planes), 4):
-                four = np.ascontiguousarray(np.moveaxis(planes[first : first + 4], 0, -1))
-                textures.append(self._texture(name, four))
-                made.callback(textures[-1].release)
-            made.pop_all()
-        return Memory(array.shape, textures)
+            return Memory(array.shape, [self._texture(name, image.shape, image.tobytes())])
+        planes = np.pad(array, ((0, -len(array) % 4), (0, 0), (0, 0)))
+        fours = [np.moveaxis(planes[first : first + 4], 0, -1) for first in range(0, len(planes), 4)]
+        return Memory(array.shape, self._textures(name, array.shape[1:], [four.tobytes() for four in fours]))
 
     def _memory(self, name: str, shape: tuple[int, ...]) -> Memory:
         """Return textures of four channels, or planes, each."""
         numbers, size = (shape[0], shape[1:]) if name in PLANES else (shape[2], shape[:2])
+        return Memory(shape, self._textures(name, size, [None] * -(-numbers // 4)))
+
+    def _textures(self, name: str, size: Sequence[int], contents: Sequence[bytes | None]) -> list[Any]:
+        """Return textures of four channels; if one fails the others are given back."""
         with ExitStack() as made:
             textures = []
-            for _ in range(-(-numbers // 4)):
-                self._check_texture(repr(name), (size[1], size[0]), 4)
-                textures.append(self._context.texture((size[1], size[0]), 4, dtype="f4"))
+            for content in contents:
+                textures.append(self._texture(name, (*size, 4), content))
                 made.callback(textures[-1].release)
-                textures[-1].filter = (moderngl.NEAREST, moderngl.NEAREST)
             made.pop_all()
-        return Memory(shape, textures)
+        return textures
 
     def _release(self, memory: Memory) -> None:
         for texture in memory.held:
@@ -345,24 +336,19 @@ class OpenGLExecutor(Executor):
             elif name in program:
                 program[name].value = value
 
-    def _texture(self, name: str, array: NDArray[np.float32]) -> Any:
-        """Return (H, W, C) as a float texture that is read texel by texel."""
-        height, width, channels = array.shape
-        self._check_texture(repr(name), (width, height), channels)
-        texture = self._context.texture((width, height), channels, array.tobytes(), dtype="f4")
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return texture
-
-    def _check_texture(self, name: str, size: tuple[int, int], channels: int) -> None:
-        """Refuse what no texture holds."""
-        largest = self._context.info["GL_MAX_TEXTURE_SIZE"]
-        if max(size) > largest or channels > 4:
+    def _texture(self, name: str, shape: tuple[int, ...], content: bytes | None) -> Any:
+        """Return a float texture (H, W, C) that is read texel by texel; refuse what none holds."""
+        (height, width, channels), largest = shape, self._context.info["GL_MAX_TEXTURE_SIZE"]
+        if max(height, width) > largest or channels > 4:
             raise InputError(
-                f"texture for {name}",
-                f"{size[0]} x {size[1]} with {channels} channels",
+                f"texture for {name!r}",
+                f"{width} x {height} with {channels} channels",
                 f"this OpenGL takes at most {largest} x {largest} with 4 channels",
                 "split the image, or use another executor",
             )
+        texture = self._context.texture((width, height), channels, content, dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
 
     def close(self) -> None:
         """Release the context and all that lives in it."""

@@ -29,14 +29,14 @@ from ...compiler.scenes.smooth_kernel import FEATURE
 from ...refimpl.network.dataset import known
 from ...refimpl.network.smoothing import LEVELS
 from .executor import Executor
-from .kernel import Memory, Part, Size, images_of, numbers_for, plane_integers, plane_shape, shapes
+from .kernel import Closing, Memory, Part, Size, images_of, numbers_for, plane_integers, plane_shape, shapes
 
 PICTURE = "picture"
 """Name under which the result is read."""
 
 
 @dataclass
-class Passes:
+class Passes(Closing):
     """Kernels with their images of `size` (height, width) on a device, which a context manager gives back."""
 
     executor: Executor
@@ -102,19 +102,20 @@ class Passes:
         with executor._session(self.size):
             executor._chain(self.denoiser, images, self._written)
 
-    def read(self, name: str) -> NDArray[np.float32]:
-        """Copy an image to the host, (H, W, C): a feature by name, or the result, [`PICTURE`]."""
-        with self.executor._session(self.size):
-            return self.executor._fetch(*self._held(name))
+    def read(self, name: str) -> Callable[[], NDArray[np.float32]]:
+        """Begin to copy an image (H, W, C) to the host: a feature by name, or the result, [`PICTURE`].
 
-    def read_later(self, name: str) -> Callable[[], NDArray[np.float32]]:
-        """Begin to copy an image to the host, and return what waits for it: passes may start meanwhile."""
+        What is returned waits for it, and passes may start meanwhile.
+        """
+        named = (RESULT, self._written[-1]) if name == PICTURE else (f"{IMAGE}{name}", self._images[name])
         with self.executor._session(self.size):
-            return self.executor._fetch_later(*self._held(name))
+            content = self.executor._fetch_later(*named)
 
-    def _held(self, name: str) -> tuple[str, Memory]:
-        """Return a kernel's name for an image, and its memory."""
-        return (RESULT, self._written[-1]) if name == PICTURE else (f"{IMAGE}{name}", self._images[name])
+        def waited() -> NDArray[np.float32]:
+            with self.executor._session(self.size):
+                return content()
+
+        return waited
 
     def finish(self) -> None:
         """Wait until all passes that were started have ended; reading waits by itself."""
@@ -133,12 +134,6 @@ class Passes:
         if old.shape:
             self.executor._release(old)
         return Memory((), None)
-
-    def __enter__(self) -> Any:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 # ---- kernels on planes ------------------------------------------------------------------------------------

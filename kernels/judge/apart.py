@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ..devices.executor import Executor
-from ..devices.kernel import Images
+from ..devices.kernel import Closing, Images
 from ..devices.registry import WAYS, open_executor
 from ..orphans import Worker, WorkerEnded
 
@@ -48,7 +48,7 @@ def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
         return Outcome(failure=_line(f"{type(error).__name__}: {error}"))
 
 
-class Apart:
+class Apart(Closing):
     """An executor in a process of its own, which tells failures in place of raising them.
 
     `way` is its name in registry.WAYS; raises ExecutorUnavailable where it is missing.
@@ -90,12 +90,6 @@ class Apart:
         if self._worker is not None:
             self._worker.close()
             self._worker = None
-
-    def __enter__(self) -> Apart:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 @lru_cache(1)

@@ -12,7 +12,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +31,7 @@ from ...refimpl.network.denoise import Model, input_image
 from ..devices.executor import Executor
 from ..devices.kernel import Images, Size
 from ..devices.passes import Filter
-from ..memory import keep_freed_memory
+from ..memory import cores, keep_freed_memory
 from .tune import Subject, Tuning
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ class RunResult:
 def images_of(model: Model, frame: Frame) -> Images:
     """Return the encoded feature images (H, W, C) that the model's kernel reads, by name."""
     # NumPy works without the interpreter's lock: features are encoded beside each other.
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         images = pool.map(lambda name: _image(model, frame, name), model.features)
         return dict(zip(model.features, images, strict=True))
 

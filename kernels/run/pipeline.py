@@ -39,7 +39,7 @@ from ...refimpl.network.dataset import check_features
 from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS
 from ..devices.executor import Executor
-from ..devices.kernel import Part
+from ..devices.kernel import Closing, Part
 from ..devices.passes import PICTURE, Passes
 from .render_on import SAMPLES_AT_ONCE, MovingPaths
 from .tune import Subject, Tuning
@@ -70,7 +70,7 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
     return FeatureRays(job.feature_spp, source)
 
 
-class Pipeline:
+class Pipeline(Closing):
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
     `show` names features that are to be readable in addition to the model's. With `whole`, paths are traced
@@ -207,7 +207,7 @@ class Pipeline:
     def picture(self) -> NDArray[np.float32]:
         """Return the denoised picture (H, W, 3) that was drawn last, display-encoded."""
         self._check_drawn()
-        return self.passes.read(PICTURE)
+        return self.passes.read(PICTURE)()
 
     def image(self, feature: str) -> NDArray[np.float32]:
         """Return a feature image (H, W, C) of the picture that was drawn last, encoded.
@@ -216,7 +216,7 @@ class Pipeline:
         """
         self._check_shown(feature)
         self._check_drawn()
-        return self._meant(self.passes.read(feature))
+        return self._meant(self.passes.read(feature)())
 
     def _meant(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return what a feature image stands for."""
@@ -230,8 +230,8 @@ class Pipeline:
         self._check_drawn()
         for feature in features:
             self._check_shown(feature)
-        picture = self.passes.read_later(PICTURE)
-        images = {feature: self.passes.read_later(feature) for feature in features}
+        picture = self.passes.read(PICTURE)
+        images = {feature: self.passes.read(feature) for feature in features}
         return lambda: Drawn(picture(), {name: self._meant(image()) for name, image in images.items()})
 
     def stream(self, scenes: Iterable[Scene], seeds: Iterable[int], spp: int = 1) -> Iterator[Drawn]:
@@ -274,9 +274,3 @@ class Pipeline:
         if not self._closed:
             self._closed = True
             self.passes.close()
-
-    def __enter__(self) -> Pipeline:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

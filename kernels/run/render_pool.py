@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -22,7 +21,7 @@ from typing import Any
 from ...refimpl.errors import InputError
 from ...refimpl.light.render import Job, Render, join_rows, render
 from ...refimpl.light.scene import Scene
-from ..memory import keep_freed_memory
+from ..memory import cores, keep_freed_memory
 from ..orphans import end_with_parent
 
 PROGRESS_INTERVAL_S = 0.2
@@ -51,7 +50,7 @@ def render_parallel(
     workers than one, and when the system has ended one of them. An interrupt ends the workers and is passed
     on.
     """
-    count = workers if workers is not None else len(os.sched_getaffinity(0))
+    count = workers if workers is not None else cores()
     if count < 1:
         raise InputError("workers", count, "at least one process must work", "use 1 or more")
     parts = bands(job, count)

@@ -11,7 +11,6 @@ The definition is refimpl/network/train.py; how far a step may be from it: compi
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -34,6 +33,7 @@ from ...refimpl.network.factored import Factors
 from ...refimpl.network.siren import Siren
 from ...refimpl.network.train import Checkpoint, Progress, Recipe, TrainState
 from ..devices.executor import Executor
+from ..memory import cores
 
 BLOCK_STEPS = 32
 """Most steps in a block: an interrupt waits for one to end, and each needs the host once."""
@@ -144,7 +144,7 @@ def train_on(
         dataset.normalization_of([noisy for noisy, _ in pairs]) if state is None else state.normalization
     )
     # NumPy works without the interpreter's lock: frames are encoded beside each other.
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         data = dataset.build(pairs, recipe.features, recipe.window, normalization, pool.map)
     if state is None:
         state = train.start(recipe, normalization, data.digest, network=network)

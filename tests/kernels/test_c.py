@@ -185,6 +185,22 @@ def test_a_compiler_without_vectors_gets_the_plain_schedule(executor_named, monk
         assert executor.schedule == "plain"
 
 
+def test_the_trial_prints_what_numpy_computes():
+    """NumPy is the definition of all arithmetic here."""
+    f = np.float32
+    one, large, small = f(1), f(16777216), f(1e-30)
+    third, total = one / f(3), f(0)
+    for i in range(64):
+        total = total + one / f(i + 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        no_number = large * large * large * large * large * large * f(0)
+    values = [
+        *(total, (large + one) - large, third * third - one / f(9), small * f(1e-12), large / f(7)),
+        *(np.sqrt(third), -one * f(0) + -f(0), one if no_number == 0 else f(0)),
+    ]
+    assert [f"{int(f(value).view(np.uint32)):08x}" for value in values] == c_executor.TRIAL_BITS.split()
+
+
 # ---- refusals ----------------------------------------------------------------------------------------
 
 

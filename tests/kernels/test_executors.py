@@ -349,10 +349,10 @@ def test_a_refused_texture_gives_the_others_back(executor_named, kit, monkeypatc
     made = []
     real = executor._texture
 
-    def texture(name, array):
+    def texture(name, shape, content):
         if name == "b":
             raise InputError("texture", name, "refused", "none")
-        made.append(real(name, array))
+        made.append(real(name, shape, content))
         return made[-1]
 
     monkeypatch.setattr(executor, "_texture", texture)

@@ -264,9 +264,9 @@ def test_nothing_is_read_back_or_uploaded_in_between_on_opencl(executor_named, m
         pipeline.run()
         real_copy, real_buffer = module.cl.enqueue_copy, module.cl.Buffer
 
-        def copy(queue, target, source):
+        def copy(queue, target, source, **options):
             copied.append(target.shape)
-            return real_copy(queue, target, source)
+            return real_copy(queue, target, source, **options)
 
         def buffer(context, flags, *arguments, **options):
             uploaded.append((arguments, options))

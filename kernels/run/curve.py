@@ -36,7 +36,7 @@ from ...refimpl.errors import CompileError, InputError
 from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
 from ...refimpl.network.denoise import Model, denoise
-from ...refimpl.reading import parse_json, read_file, refusing
+from ...refimpl.reading import parse_json, read_file, refusing, to_dataclass
 from .. import cache
 from ..devices.executor import Executor
 from ..measure import in_turns
@@ -46,8 +46,8 @@ from .tune import TRIAL, Subject, Tuning, noise
 SCHEMA = "wamnet-curve-1"
 """Name and version of a curve's form; described in spec/variants.md."""
 
-NUMBERS = ("milliseconds", "error_max", "error_mean", "psnr_loss_db", "error_bound")
-"""A point's numbers; null where it was not measured, or is not a number."""
+LIMITED = {"max_error": "error_max", "max_ms": "milliseconds", "max_loss_db": "psnr_loss_db"}
+"""The number of a point that each limit is about."""
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,7 @@ class Curve:
 
     def as_data(self) -> dict[str, Any]:
         """Return the curve as JSON's types, null for what is not a finite number."""
-        points = []
-        for point in self.points:
-            data = asdict(point)
-            data.update({name: data[name] if math.isfinite(data[name]) else None for name in NUMBERS})
-            points.append(data)
-        head = {"schema": SCHEMA, "model": self.model, "device": self.device, "size": list(self.size)}
-        return {**head, "profile": self.profile, "points": points}
+        return {"schema": SCHEMA, **cache.clean(asdict(self))}
 
     def key(self, *others: object) -> str:
         """Return the name under which it is kept: of all that it depends on, such as frames."""
@@ -109,12 +103,8 @@ class Limits:
     @property
     def rules(self) -> tuple[tuple[str, str, float], ...]:
         """Return (option, name of a point's number, limit) of the rules that there are."""
-        found = (
-            ("--max-error", "error_max", self.max_error),
-            ("--max-ms", "milliseconds", self.max_ms),
-            ("--max-loss-db", "psnr_loss_db", self.max_loss_db),
-        )
-        return tuple((option, name, limit) for option, name, limit in found if limit is not None)
+        given = ((f"--{key.replace('_', '-')}", LIMITED[key], limit) for key, limit in vars(self).items())
+        return tuple((option, name, limit) for option, name, limit in given if limit is not None)
 
 
 @dataclass(frozen=True)
@@ -203,25 +193,21 @@ def from_data(data: Any, where: str) -> Curve:
     if not isinstance(data, Mapping) or data.get("schema") != SCHEMA:
         found = data.get("schema", "missing") if isinstance(data, Mapping) else type(data).__name__
         raise InputError(f"{where}: schema", found, f"must be {SCHEMA}", "give a curve that wamnet measured")
+    names = [[field.name for field in fields(kind)] for kind in (Curve, Point)]
     rule, way_out = "a curve has model, device, size, profile and points", "measure it again"
     with refusing(f"{where}: content", "damaged", rule, way_out):
-        height, width = (int(n) for n in data["size"])
-        points = tuple(_point(entry) for entry in data["points"])
-        texts = [data[name] for name in ("model", "device", "profile")]
-        if not all(isinstance(text, str) for text in texts):
-            raise ValueError("model, device and profile are texts")
-        return Curve(texts[0], texts[1], (height, width), texts[2], points)
+        # Keys of a point that are not here are another reader's.
+        points = [{name: point[name] for name in names[1]} for point in data["points"]]
+        held = {name: data[name] for name in names[0]} | {"points": points}
+        curve = to_dataclass(Curve, held, where, special={float: _number})
+        for point in curve.points:
+            variants.parse(point.variant)
+        return curve
 
 
-def _point(entry: Mapping[str, Any]) -> Point:
-    """Return a point; keys that it does not know are another reader's."""
-    texts = {name: entry[name] for name in ("variant", "schedule", "executor")}
-    if not all(isinstance(text, str) for text in texts.values()):
-        raise ValueError("variant, schedule and executor are texts")
-    variants.parse(texts["variant"])
-    numbers = {name: math.nan if entry[name] is None else float(entry[name]) for name in NUMBERS}
-    assert {*texts, *numbers} == {field.name for field in fields(Point)}
-    return Point(texts["variant"], texts["schedule"], texts["executor"], *numbers.values())
+def _number(value: Any, _path: str) -> float:
+    """Return a point's number; NaN where it was not measured."""
+    return math.nan if value is None else float(value)
 
 
 def read(path: Any) -> Curve:
@@ -241,15 +227,11 @@ def check_fits(curve: Curve, wanted: Curve, where: str) -> None:
 
 def cached(key: str, wanted: Curve) -> Curve | None:
     """Return the curve that is kept, if it is there, whole, and of what is wanted."""
-    data = cache.read_json(key)
-    if data is None:
-        return None
-    try:
-        curve = from_data(data, key)
-    except InputError:
-        return None
-    same = (curve.model, curve.device, curve.size, curve.profile)
-    return curve if same == (wanted.model, wanted.device, wanted.size, wanted.profile) else None
+    with suppress(InputError):
+        curve = from_data(cache.read_json(key), key)
+        if replace(curve, points=()) == replace(wanted, points=()):
+            return curve
+    return None
 
 
 # ---- measuring --------------------------------------------------------------------------------------------

@@ -145,18 +145,8 @@ def sample_ranges(job: Job, band: tuple[int, int]) -> Iterator[list[Part]]:
     for first_sample in range(0, job.spp, SAMPLES_AT_ONCE):
         samples = min(SAMPLES_AT_ONCE, job.spp - first_sample)
         rows = max(1, PATHS_AT_ONCE // (job.width * samples))
-        yield [
-            Part(
-                job.width,
-                job.height,
-                first_row,
-                min(rows, last - first_row),
-                job.first_sample + first_sample,
-                samples,
-                job.seed,
-            )
-            for first_row in range(first, last, rows)
-        ]
+        whole = Part(job.width, job.height, 0, rows, job.first_sample + first_sample, samples, job.seed)
+        yield [replace(whole, first_row=row, rows=min(rows, last - row)) for row in range(first, last, rows)]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -25,8 +26,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...refimpl import rng
-from ...refimpl.errors import CompileError
+from ...refimpl.errors import CompileError, InputError
 from ...refimpl.network.denoise import Model
+from ...refimpl.reading import to_dataclass
 from .. import cache, measure
 from ..devices.executor import Executor
 from ..devices.kernel import Images
@@ -123,13 +125,9 @@ class Tuning:
 
     def remembered(self) -> Table | None:
         """Return what was measured for this device, network and size, if it was."""
-        found = cache.read_json(self.entry)
-        try:
-            rows = tuple(Row(**row) for row in found["rows"])
-            height, width = found["size"]
-            return Table(found["device"], found["network"], (height, width), found["day"], rows)
-        except (TypeError, KeyError, ValueError):
-            return None
+        with suppress(InputError):
+            return to_dataclass(Table, cache.read_json(self.entry), "table")
+        return None
 
     def measured(
         self, plan: Plan, repeats: int | None = None, progress: Callable[[str], None] = lambda _: None
@@ -221,20 +219,10 @@ def size_class(size: tuple[int, int]) -> int:
     return (size[0] * size[1] - 1).bit_length()
 
 
-FIRSTS = 64
-"""Kernels of a device whose first time to compile is remembered."""
-
-
 def first_time(identity: Sequence[object], artifact_digest: str, seconds: float) -> float:
     """Return how long this kernel took to compile on a device when first met; remember it if now.
 
     `identity` names the device.
     """
-    entry = f"first-{cache.key(*identity)}"
-    found = cache.read_json(entry)
-    known: dict[str, float] = dict(found) if isinstance(found, Mapping) else {}
-    if isinstance(known.get(artifact_digest), float):
-        return known[artifact_digest]
-    newest = list(known.items())[-(FIRSTS - 1) :]
-    cache.write_json(entry, dict([*newest, (artifact_digest, seconds)]))
-    return seconds
+    found = cache.kept("first", (*identity, artifact_digest), lambda: seconds)
+    return found if isinstance(found, float) else seconds

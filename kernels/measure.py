@@ -1,6 +1,6 @@
 """Interleaved times of several entries, or ways to do one thing: drift of the machine affects all alike.
 
-1. Each entry opens and does its work `warm` times unmeasured [`begin`], then all take turns [`measure`].
+1. Each entry opens and does its work `warm` times unmeasured [`begin`], then all take turns [`take_turns`].
 2. In each of `repeats` rounds every entry works once, after a pause: threads of a library that ran before may
    spin for a while, and a processor that is hot slows down [`take_turns`].
 3. Medians are compared, or ratios of times of one round.
@@ -118,18 +118,6 @@ def take_turns(
                 rest(pause_s)
                 entry.turn(number, clock)
             done()
-
-
-def measure(
-    entries: Sequence[Entry],
-    repeats: int,
-    warm: int = 1,
-    pause_s: float = 0.0,
-    done: Callable[[], None] = lambda: None,
-) -> None:
-    """Open all entries, and let them work in turn; `done` is called after each."""
-    begin(entries, warm, done)
-    take_turns(entries, repeats, pause_s, done)
 
 
 def in_turns(

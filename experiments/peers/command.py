@@ -18,7 +18,7 @@ from wamnet.kernels import EXECUTORS, open_executor
 from wamnet.kernels.bench.fresh import empty_caches
 from wamnet.kernels.bench.workload import check_size, paper_model
 from wamnet.kernels.devices.kernel import Part
-from wamnet.kernels.measure import Entry, environment, measure, take_turns
+from wamnet.kernels.measure import Entry, environment, take_turns
 from wamnet.models.data.scene_source import scene_source
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.render import Job
@@ -28,6 +28,7 @@ from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import PRESETS
 
 from . import paths, pipelines, table, training
+from .common import measure
 
 COMMANDS = {f"bench {name}": name for name in ("render", "train", "pipeline", "primitives")}
 """Function of each command, which `wamnet` registers."""

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from wamnet.kernels.bench.rates import FLOAT_BYTES, Stage
+from wamnet.kernels.measure import Entry, begin, take_turns
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.network.activation import SINE
@@ -63,3 +64,15 @@ class Maker(Protocol):
 
     def close(self) -> None:
         """Give back what it holds."""
+
+
+def measure(
+    entries: Sequence[Entry],
+    repeats: int,
+    warm: int = 1,
+    pause_s: float = 0.0,
+    done: Callable[[], None] = lambda: None,
+) -> None:
+    """Open all entries, and let them work in turn; `done` is called after each."""
+    begin(entries, warm, done)
+    take_turns(entries, repeats, pause_s, done)

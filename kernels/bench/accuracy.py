@@ -25,7 +25,7 @@ from ...compiler.schedules.schedules import PLAIN, windows
 from ...refimpl import metrics
 from ...refimpl.frame import Frame
 from ...refimpl.network import dataset
-from ...refimpl.network.denoise import Model, denoise
+from ...refimpl.network.denoise import Model
 from ...refimpl.network.whole import round_image
 from ..devices.kernel import Images
 from .contenders import Variant
@@ -100,28 +100,23 @@ def errors(picture: NDArray[Any], reference: Array) -> dict[str, float]:
     }
 
 
-def full_quality(model: Model, pairs: Sequence[tuple[Frame, Frame]]) -> list[tuple[float, float]]:
-    """Return PSNR and SSIM of the full network's pictures, by the reference."""
-    return [_scores(model, denoise(model, noisy), clean) for noisy, clean in pairs]
+def scores(
+    model: Model, pairs: Sequence[tuple[Frame, Frame]], picture_of: Callable[[Frame], NDArray[Any]]
+) -> list[tuple[float, float]]:
+    """Return PSNR and SSIM of display-encoded pictures (H, W, 3) of noisy frames, by the reference.
+
+    SSIM is NaN where a frame is too small.
+    """
+    found = []
+    for noisy, clean in pairs:
+        picture, target = picture_of(noisy), dataset.target_image(clean, model.normalization)
+        small = min(target.shape[:2]) < metrics.WINDOW_SIZE_PX
+        found.append((metrics.psnr(picture, target), math.nan if small else metrics.ssim(picture, target)))
+    return found
 
 
-def quality(
-    model: Model,
-    pairs: Sequence[tuple[Frame, Frame]],
-    full: Sequence[tuple[float, float]],
-    picture_of: Callable[[Frame], NDArray[Any]],
-) -> dict[str, Any]:
-    """Return the mean PSNR (dB) and SSIM over the pairs, what is lost of the full ones, and each PSNR."""
-    scores = [_scores(model, picture_of(noisy), clean) for noisy, clean in pairs]
-    count = len(scores)
-    psnr, ssim = (math.fsum(score[k] for score in scores) / count for k in (0, 1))
-    full_psnr, full_ssim = (math.fsum(score[k] for score in full) / count for k in (0, 1))
-    found = {"psnr_db": psnr, "ssim": ssim, "psnr_loss_db": full_psnr - psnr, "ssim_loss": full_ssim - ssim}
-    return {**found, "psnr_frames_db": [each for each, _ in scores]}
-
-
-def _scores(model: Model, picture: NDArray[Any], clean: Frame) -> tuple[float, float]:
-    """Return PSNR and SSIM of a display-encoded picture (H, W, 3); SSIM is NaN where a frame is too small."""
-    target = dataset.target_image(clean, model.normalization)
-    small = min(target.shape[:2]) < metrics.WINDOW_SIZE_PX
-    return metrics.psnr(picture, target), math.nan if small else metrics.ssim(picture, target)
+def quality(found: Sequence[tuple[float, float]], full: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    """Return mean PSNR (dB) and SSIM of scores, what is lost of the full network's, and each PSNR."""
+    (psnr, ssim), (full_psnr, full_ssim) = (np.mean(each, axis=0).tolist() for each in (found, full))
+    means = {"psnr_db": psnr, "ssim": ssim, "psnr_loss_db": full_psnr - psnr, "ssim_loss": full_ssim - ssim}
+    return {**means, "psnr_frames_db": [each for each, _ in found]}

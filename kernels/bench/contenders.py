@@ -3,7 +3,7 @@
 1. A contender is data until it is opened for a model and a size. One that computes the network says which
    program it computes [`Variant`]; its error is against the full network in float64, whatever it leaves out.
    Another denoiser has no error, only a quality.
-2. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`Kernel`].
+2. A kernel is named EXECUTOR:SCHEDULE, with :VARIANT where it is not the whole network [`kernel`].
 3. Variants run with the schedule that suits the device, or the one that takes its place [`of_machine`]: sines
    and profiles, which need no training [`VARIANTS`], and forms that were trained and are given.
 4. Peers come from another distribution, where it is installed [`peers`].
@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import partial
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from typing import Any
@@ -212,42 +213,36 @@ QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
 
 
-@dataclass(frozen=True)
-class Kernel:
-    """What opens a kernel of an executor with a schedule: of the whole network, or of a variant."""
+def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
+    """Return the kernel of an executor with a schedule: of the whole network, or of a variant."""
+    name, text = f"{executor}:{schedule}", schedule_named(executor, schedule).idea
+    if variant is not FULL:
+        name, text = f"{name}:{variant.name}", variant.text
+    opens = partial(_opened, executor, schedule, variant)
+    caches = CACHES.get(executor, NO_CACHE)
+    return Contender(name, text, opens, variant, executor, schedule, caches=caches)
 
-    executor: str
-    schedule: str
-    variant: Variant = FULL
 
-    @property
-    def contender(self) -> Contender:
-        """Return the contender that is this kernel."""
-        full, caches = self.variant is FULL, CACHES.get(self.executor, NO_CACHE)
-        name = f"{self.executor}:{self.schedule}" + ("" if full else f":{self.variant.name}")
-        text = schedule_named(self.executor, self.schedule).idea if full else self.variant.text
-        return Contender(name, text, self, self.variant, self.executor, self.schedule, caches=caches)
-
-    def __call__(self, tools: Tools, model: Model, size: int) -> Opened:
-        """Compile the kernel and build it."""
-        runner, variant = tools.executor(self.executor), self.variant
-        plan = variant.plan(model, self.executor, self.schedule)
-        artifact = compile_plan(plan)
-        runner.build(artifact, (size, size))
-        alone = getattr(runner, "kernel_seconds", None)
-        picked = str(artifact.manifest["schedule"]["name"])
-        profile = "" if variant.profile == IEEE else f":{variant.profile}"
-        return Opened(
-            run=lambda given: runner.run(artifact, _read(artifact, given)),
-            device=runner.device,
-            stages=fused(artifact, sines_of(plan.analysed)),
-            source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
-            rates=f"{self.executor}:{picked}{profile}",
-            kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
-            schedule=picked,
-            bound=bound_of(artifact),
-            certified=artifact.certificate is not None,
-        )
+def _opened(executor: str, schedule: str, variant: Variant, tools: Tools, model: Model, size: int) -> Opened:
+    """Compile the kernel and build it."""
+    runner = tools.executor(executor)
+    plan = variant.plan(model, executor, schedule)
+    artifact = compile_plan(plan)
+    runner.build(artifact, (size, size))
+    alone = getattr(runner, "kernel_seconds", None)
+    picked = str(artifact.manifest["schedule"]["name"])
+    profile = "" if variant.profile == IEEE else f":{variant.profile}"
+    return Opened(
+        run=lambda given: runner.run(artifact, _read(artifact, given)),
+        device=runner.device,
+        stages=fused(artifact, sines_of(plan.analysed)),
+        source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
+        rates=f"{executor}:{picked}{profile}",
+        kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
+        schedule=picked,
+        bound=bound_of(artifact),
+        certified=artifact.certificate is not None,
+    )
 
 
 def _read(artifact: Artifact, given: Given) -> Images:
@@ -272,10 +267,10 @@ def of_machine(
         except ExecutorUnavailable:
             suits = target.schedules[0].name
         schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
-        found += [Kernel(name, schedule).contender for schedule in schedules]
+        found += [kernel(name, schedule) for schedule in schedules]
         varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
         for form in [*varied, *([] if quick else [INTEGERS])] if name != "numpy" else []:
-            found += [Kernel(name, each, form).contender for each in _schedules(target, suits, form)]
+            found += [kernel(name, each, form) for each in _schedules(target, suits, form)]
     return [*found, *(peer for peer in peers() if not quick or peer.name in QUICK)]
 
 

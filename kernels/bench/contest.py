@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
@@ -30,7 +31,8 @@ from numpy.typing import NDArray
 from ...compiler.schedules.names import split
 from ...refimpl.errors import ExecutorUnavailable, WamnetError
 from ...refimpl.frame import Frame
-from ...refimpl.network.denoise import Model
+from ...refimpl.network.denoise import Model, denoise
+from ..cache import clean
 from ..measure import PAUSE_S, Clock, Entry, Times, begin, take_turns
 from ..memory import keep_freed_memory
 from . import accuracy, rates
@@ -68,19 +70,23 @@ COUNTS = ("products", "sines", "bytes")
 """What the cost model counts of a pixel."""
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Row(Entry):
     """A contender whose failure does not end the run: `state` says how far it got, `reason` why no further.
 
     `opened`: the contender that is ready, if it is.
     """
 
-    text: str = ""
-    kind: str = KERNEL
+    contender: Contender
     state: str = PENDING
     reason: str = ""
     kernel_seconds: list[float] = field(default_factory=list)
     opened: Opened | None = None
+
+    @property
+    def kind(self) -> str:
+        """Return whether this compiler makes it."""
+        return KERNEL if self.contender.executor else PEER
 
     @contextmanager
     def failing(self) -> Iterator[None]:
@@ -132,7 +138,7 @@ class Row(Entry):
         """Return the row as JSON's types."""
         # One that was interrupted between its first frame and its rounds has no time.
         state = PENDING if self.state == MEASURED and not self.seconds else self.state
-        head = {"name": self.name, "text": self.text, "kind": self.kind, "state": state}
+        head = {"name": self.name, "text": self.contender.text, "kind": self.kind, "state": state}
         times = {"ms": milliseconds(self.seconds), "kernel_ms": milliseconds(self.kernel_seconds)}
         found: dict[str, Any] = clean({**head, "reason": self.reason, **times, **self.facts})
         return found
@@ -178,17 +184,16 @@ class Contest:
     contenders: Sequence[Contender]
     tools: Tools
     told: Callable[[float], None] = lambda share: None
-    rows: dict[str, Row] = field(default_factory=dict)
     machine: list[Entry] = field(default_factory=list)
     found_rates: dict[str, Rates] = field(default_factory=dict)
     sizes: dict[int, dict[str, Row]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.rows = self.sizes[self.request.size] = {}
         for each in self.contenders:
             facts = {"caches": each.caches, "executor": each.executor}
             facts |= each.variant.facts(self.request.model) if each.variant else {}
-            kind = KERNEL if each.executor else PEER
-            self.rows[each.name] = Row(each.name, text=each.text, kind=kind, facts=facts)
+            self.rows[each.name] = Row(name=each.name, contender=each, facts=facts)
 
     def run(self) -> None:
         """Do all steps."""
@@ -200,10 +205,10 @@ class Contest:
         begin(self.machine)
         take_turns(self.machine, 1, request.pause_s)
         self.told(0.02)
-        for contender in self.contenders:
-            with self.rows[contender.name].failing():
-                self._open(contender, shown, crop)
-            self.told(0.45 / len(self.contenders))
+        for row in self.rows.values():
+            with row.failing():
+                self._open(row, shown, crop)
+            self.told(0.45 / len(self.rows))
         for row in self._going():
             with row.failing():
                 self._warm(row, shown)
@@ -229,9 +234,9 @@ class Contest:
 
     # ---- opening ------------------------------------------------------------------------------------------
 
-    def _open(self, contender: Contender, shown: Given, crop: accuracy.Crop) -> None:
+    def _open(self, row: Row, shown: Given, crop: accuracy.Crop) -> None:
         """Open a contender and let it make its first frame, which is compared with the reference."""
-        row, budget_s = self.rows[contender.name], self.request.budget_s
+        contender, budget_s = row.contender, self.request.budget_s
         contender.prepare(self.tools)
         start = time.perf_counter()
         opened = contender.open(self.tools, self.request.model, self.request.size)
@@ -271,8 +276,9 @@ class Contest:
             return limits.rates
         if name not in self.found_rates:
             executor, schedule, profile = split(name)
-            probe = rates.Probe(self.tools.executor(executor), schedule, profile or IEEE)
-            times, side = probe.times(min(PROBE_PAUSE_S, self.request.pause_s))
+            pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
+            device = self.tools.executor(executor)
+            times, side = rates.probe_times(device, schedule, profile or IEEE, pause_s)
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
 
@@ -307,7 +313,7 @@ class Contest:
                 continue
             facts = {key: main.facts[key] for key in COUNTS}
             facts["predicted_ms"] = predicted and predicted * (size / self.request.size) ** 2
-            row = Row(main.name, text=main.text, kind=main.kind, facts=facts, opened=main.opened)
+            row = Row(name=main.name, contender=main.contender, facts=facts, opened=main.opened)
             rows[main.name] = row
             if hoped > self.request.budget_s:
                 row.leave_out(hoped, "its time at another size", self.request.budget_s)
@@ -322,7 +328,6 @@ class Contest:
     def _hoped(self, name: str, size: int) -> float | None:
         """Return the time that a contender should need at a size; None if it has none, or failed at one."""
         known = {at: rows[name] for at, rows in self.sizes.items() if name in rows}
-        known[self.request.size] = self.rows[name]
         measured = {at: statistics.median(row.seconds) for at, row in known.items() if row.seconds}
         if not measured or any(row.state not in (MEASURED, SKIPPED) for row in known.values()):
             return None
@@ -336,7 +341,7 @@ class Contest:
         model, pairs = self.request.model, self.request.pairs
         if not pairs:
             return
-        full = accuracy.full_quality(model, pairs)
+        full = accuracy.scores(model, pairs, partial(denoise, model))
         images = {id(noisy): given(model, noisy) for noisy, _ in pairs}
         pixels = sum(noisy.height * noisy.width for noisy, _ in pairs)
         going = self._going()
@@ -351,15 +356,14 @@ class Contest:
                 return row.opened.display(row.make(images[id(frame)]))
 
             with row.failing():
-                row.facts["quality"] = accuracy.quality(model, pairs, full, show)
+                row.facts["quality"] = accuracy.quality(accuracy.scores(model, pairs, show), full)
             self.told(0.05 / len(going))
 
     def _begin_anew(self) -> None:
         """Note how long a first frame takes with empty caches, and with what a process before has left."""
         # A form that was trained has a kernel of another network: the process would not have it.
-        others = {each.name for each in self.contenders if each.variant and each.variant.model}
         for row in self._going():
-            if row.name not in others:
+            if not (row.contender.variant and row.contender.variant.model):
                 never, later = first_runs(row.name, self.request.model, self.request.size)
                 row.facts |= {"first_run_s": never, "later_run_s": later}
                 self.told(0.05)
@@ -367,11 +371,14 @@ class Contest:
     def as_data(self) -> dict[str, Any]:
         """Return all that is known so far as JSON's types; the keys are those of spec/bench.md."""
         request, model, limits = self.request, self.request.model, self.limits
-        rows = self._data_of(self.rows, request.size)
+        rows, *others = (
+            {"size_px": size, "contenders": [self._data_of(row, size) for row in rows.values()]}
+            for size, rows in self.sizes.items()
+        )
         found: dict[str, Any] = clean(
             {
                 "schema": SCHEMA,
-                "size_px": request.size,
+                **rows,
                 "repeats": request.repeats,
                 "budget_s": request.budget_s,
                 "frames": request.frames or None,
@@ -388,48 +395,41 @@ class Contest:
                 "limits": limits and asdict(limits),
                 "limits_rounds_s": {entry.name: entry.seconds for entry in self.machine},
                 "rates": {name: asdict(found) for name, found in self.found_rates.items()},
-                "contenders": rows,
-                "front": {part: front({r["name"]: _point(r, part) for r in rows}) for part in FRONTS},
-                "sizes": [
-                    {"size_px": size, "contenders": self._data_of(found, size)}
-                    for size, found in sorted(self.sizes.items())
-                ],
+                "front": {part: _front_of(rows["contenders"], part) for part in FRONTS},
+                "sizes": others,
             }
         )
         return found
 
-    def _data_of(self, rows: Mapping[str, Row], size: int) -> list[dict[str, Any]]:
-        """Return the rows of a size as JSON's types, with what follows from their times."""
-        found = [row.as_data() for row in rows.values()]
-        return [data | _derived(data, size * size, self.limits) for data in found]
+    def _data_of(self, row: Row, size: int) -> dict[str, Any]:
+        """Return a row as JSON's types, with what follows from its times of pictures of this size."""
+        data, limits = row.as_data(), self.limits
+        if data["ms"] is None:
+            return data
+        ms, counted_s = data["ms"]["median"], 1e-3 * (data["kernel_ms"] or data["ms"])["median"]
+        data["frames_per_s"] = 1e3 / ms
+        if data.get("products") and limits:
+            flops, memory = (size**2 * n / counted_s for n in (2 * data["products"], data["bytes"]))
+            data |= {"gflops": 1e-9 * flops, "of_sgemm": flops / limits.flops_per_s}
+            data["of_memory"] = memory / limits.bytes_per_s
+        if data.get("predicted_ms"):
+            data["predicted_over_measured"] = data["predicted_ms"] / ms
+        if "first_frame_s" in data:
+            data["compile_s"] = max(0.0, data["open_s"] + data["first_frame_s"] - 1e-3 * ms)
+        return data
 
 
 # ---- what follows from rows -------------------------------------------------------------------------------
 
 
-def _derived(row: Mapping[str, Any], pixels: int, limits: rates.Limits | None) -> dict[str, Any]:
-    """Return what follows from a row's times."""
-    if row["ms"] is None:
-        return {}
-    ms, counted_s = row["ms"]["median"], 1e-3 * (row["kernel_ms"] or row["ms"])["median"]
-    found: dict[str, Any] = {"frames_per_s": 1e3 / ms}
-    if row.get("products") and limits:
-        flops, memory = 2 * row["products"] * pixels / counted_s, row["bytes"] * pixels / counted_s
-        found |= {"gflops": 1e-9 * flops, "of_sgemm": flops / limits.flops_per_s}
-        found["of_memory"] = memory / limits.bytes_per_s
-    if row.get("predicted_ms"):
-        found["predicted_over_measured"] = row["predicted_ms"] / ms
-    if "first_frame_s" in row:
-        found["compile_s"] = max(0.0, row["open_s"] + row["first_frame_s"] - 1e-3 * ms)
-    return found
-
-
-def _point(row: Mapping[str, Any], part: str) -> tuple[float | None, float | None]:
-    """Return a row's median time, and the number of one of its parts, to the nearest multiple of a step."""
+def _front_of(rows: Sequence[Mapping[str, Any]], part: str) -> list[str]:
+    """Return the names on the front of a part of the rows, whose numbers are taken to multiples of a step."""
     key, step = FRONTS[part]
-    found = (row.get(part) or {}).get(key)
-    median = row["ms"] and row["ms"]["median"]
-    return median, found if step is None or found is None else step * round(found / step)
+    points = {}
+    for row in rows:
+        found, median = (row.get(part) or {}).get(key), row["ms"] and row["ms"]["median"]
+        points[row["name"]] = median, found if step is None or found is None else step * round(found / step)
+    return front(points)
 
 
 def milliseconds(seconds: Sequence[float]) -> dict[str, Any] | None:
@@ -457,15 +457,3 @@ def front(points: Mapping[str, tuple[float | None, float | None]]) -> list[str]:
         return any(o[0] <= point[0] and o[1] <= point[1] and o != point for o in known.values())
 
     return sorted((name for name, point in known.items() if not beaten(point)), key=lambda name: known[name])
-
-
-def clean(value: Any) -> Any:
-    """Return data with null in place of numbers that JSON does not know, and Python's own numbers."""
-    if isinstance(value, Mapping):
-        return {str(key): clean(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [clean(item) for item in value]
-    if isinstance(value, bool | str | int) or value is None:
-        return value
-    number = float(value)
-    return number if math.isfinite(number) else None

@@ -5,7 +5,7 @@
    Balance in Current High Performance Computers", IEEE TCCA Newsletter, 1995), and NumPy's sine; the last two
    in a thread for each core [`machine_ways`, `limits_of`].
 2. An executor with a schedule: three small programs of its own [`probes`]: a window of 2 x 2, one of 6 x 6,
-   and the first one with a chain of sines, on a picture so large that they take milliseconds [`Probe`].
+   and the first one with a chain of sines, on a picture so large that they take milliseconds [`probe_times`].
    Differences of their times give products and sines a second, and what is left of the first one's time is
    that of a pixel [`rates_of`].
 3. A way to denoise is a list of stages that run one after another: a kernel, or an operation of a library
@@ -21,7 +21,6 @@ Departure from the source: sines are counted apart from products, because one ta
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -40,6 +39,7 @@ from ...refimpl import rng
 from ...refimpl.network.dataset import Window
 from ..devices.executor import Executor
 from ..measure import Round, Times, in_turns
+from ..memory import cores
 from ..run.denoise_on import products_of
 from ..run.tune import noise
 
@@ -86,11 +86,6 @@ class Limits:
     def rates(self) -> Rates:
         """Return what a library could do at best: the arithmetic of sgemm, NumPy's sine, no other cost."""
         return Rates(self.flops_per_s / 2, self.sines_per_s, self.bytes_per_s)
-
-
-def cores() -> int:
-    """Return the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def machine_ways(scale: int = 1) -> Mapping[str, Round]:
@@ -152,29 +147,23 @@ def probes() -> Mapping[str, Program]:
     return {"small": _probe(2, 0), "window": _probe(6, 0), "sines": _probe(2, PROBE_SINES)}
 
 
-@dataclass(frozen=True)
-class Probe:
-    """The small programs on an executor, with a schedule and a profile."""
-
-    executor: Executor
-    schedule: str
-    profile: str = "ieee"
-
-    def times(self, pause_s: float) -> tuple[dict[str, Times], int]:
-        """Return the times of the programs by name, and the size of the picture on which they ran."""
-        executor, how = self.executor, (self.executor.language, self.profile, self.schedule)
-        made = {name: compile_program(program, *how) for name, program in probes().items()}
-        for size in PROBE_PX:
-            images = noise(probes()["small"], (size, size))
-            for artifact in made.values():
-                executor.build(artifact, (size, size))
-            # Without copies, where the executor can tell.
-            alone = getattr(executor, "kernel_seconds", executor.run)
-            ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
-            small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
-            if min(small.seconds) >= PROBE_S or size == PROBE_PX[-1]:
-                break
-        return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
+def probe_times(
+    executor: Executor, schedule: str, profile: str, pause_s: float
+) -> tuple[dict[str, Times], int]:
+    """Return the times of the small programs by name, and the size of the picture on which they ran."""
+    programs = probes()
+    made = {name: compile_program(p, executor.language, profile, schedule) for name, p in programs.items()}
+    for size in PROBE_PX:
+        images = noise(programs["small"], (size, size))
+        for artifact in made.values():
+            executor.build(artifact, (size, size))
+        # Without copies, where the executor can tell.
+        alone = getattr(executor, "kernel_seconds", executor.run)
+        ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
+        small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
+        if min(small.seconds) >= PROBE_S:
+            break
+    return in_turns(ways, ROUNDS, warm=1, pause_s=pause_s), size
 
 
 def rates_of(times: Mapping[str, Times], pixels: int, bytes_per_s: float) -> Rates:

@@ -38,7 +38,7 @@ def small_machine(monkeypatch) -> None:
 
 
 def kernel(*facts) -> Contender:
-    return contenders.Kernel(*facts).contender
+    return contenders.kernel(*facts)
 
 
 def fake(name: str, open_it: Callable[..., Opened], **facts) -> Contender:

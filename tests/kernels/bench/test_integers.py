@@ -40,7 +40,7 @@ def test_kernels_of_integers_give_the_reference_s_bits(executor_named, model, ex
     executor_named(executor)
     frame = workload.noise(SIZE)
     given = workload.given(model, frame)
-    contender = contenders.Kernel(executor, schedule, contenders.INTEGERS).contender
+    contender = contenders.kernel(executor, schedule, contenders.INTEGERS)
     assert contender.name == f"{executor}:{schedule}:whole8"
     with Tools() as tools:
         opened = contender.open(tools, model, SIZE)

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.kernels.bench.contest import clean, front
+from wamnet.kernels.bench.contest import front
+from wamnet.kernels.cache import clean
 
 NUMBERS = st.one_of(st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.just(math.nan), st.none())
 """Few values, so that ties are common."""

@@ -27,8 +27,7 @@ from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.scenes.emit_path import FRAME_GROUPS, planes
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of, layers_of, sees
-from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
-from ...compiler.scenes.path_kernel import compile_path
+from ...compiler.scenes.lower_scene import FeatureRays
 from ...compiler.scenes.scene_inputs import SceneInputs
 from ...compiler.variants import FULL, plan_model
 from ...refimpl.errors import NO_VALUE, InputError
@@ -107,59 +106,34 @@ class Pipeline(Closing):
         plan = replace(plan_model(model, executor.language, profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
-        self._executor, self._profile, self._settings = executor, profile, settings or Settings()
+        self._settings = settings or Settings()
         self._features = tuple(dict.fromkeys((*model.features, *show)))
         check_features(self._features)
         # The job refuses sizes and numbers that mean nothing.
         rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
         job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
-        self._shadow_rays = learned_shadow_rays(replace(model, features=self._features))
+        shadow_rays = learned_shadow_rays(replace(model, features=self._features))
         self._rays = _rays_of(job, whole, sees(self._features))
         if whole and sees(self._features):
             rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
             raise InputError("whole", whole, rule, "render references with a separate kernel")
-        self._in_integers = model.is_whole
+        self._in_integers = integers = model.is_whole
+        features, scales, language = self._features, model.normalization, executor.language
+        count = self._rays.count if self._rays else 0
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
-        self._encoding = (
-            encoding_of(self._features, model.normalization, profile, model.is_whole, self._ray_count)
-            if painted
-            else None
-        )
+        encoding = encoding_of(features, scales, profile, integers, count) if painted else None
         groups = layers_of(self._features)
-        self._groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
-        self._paths = MovingPaths(executor, self._compiled, self._settings, moving)
+        groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
+        more = {"seen": sees(self._features), "rays": self._rays, "shadow_rays": shadow_rays}
+        self._paths = MovingPaths(executor, self._settings, profile, groups, more, encoding, moving)
         self.set_scene(scene)
-        self.encode = compile_encode(
-            self._features,
-            model.normalization,
-            executor.language,
-            profile,
-            planes(self._groups),
-            model.is_whole,
-            self._ray_count,
-        )
+        planned = planes(groups)
+        self.encode = compile_encode(features, scales, language, profile, planned, integers, count)
         schedule, _ = Tuning(executor, Subject.of(plan), size).picked(pictures)
         self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False
         self.passes = Passes(executor, self.encode, self.denoise, size)
-
-    @property
-    def _ray_count(self) -> int:
-        """Return the number of the features' own camera rays; 0: there are none."""
-        return self._rays.count if self._rays else 0
-
-    def _compiled(self, scene: Scene, inputs: SceneInputs) -> Artifact:
-        """Return the path kernel of a scene, built; numbers of the scene are inputs of it."""
-        executor, profile = self._executor, self._profile
-        seen = sees(self._features)
-        forms = executor.language.forms
-        more = {"seen": seen, "rays": self._rays, "shadow_rays": self._shadow_rays}
-        programs = lower_scene(scene, self._settings, forms, inputs, **more)  # type: ignore[arg-type]
-        lanes, groups = executor.lanes, self._groups
-        kernel = compile_path(programs, executor.language, profile, lanes, groups, self._encoding)
-        executor.build(kernel)
-        return kernel
 
     def set_scene(self, scene: Scene) -> None:
         """Continue with another scene, or another time of it.
@@ -169,6 +143,7 @@ class Pipeline(Closing):
         another way, its own kernel is compiled. Encoding and denoiser stay.
         """
         self.moment = self._paths.of(scene)
+        self._paths.executor.build(self.path)
 
     @property
     def path(self) -> Artifact:

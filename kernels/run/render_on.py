@@ -17,7 +17,7 @@ rounding, and to paths whose decision fell differently by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
-from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, planes
+from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, Encoding, planes
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import can_move, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
@@ -82,14 +82,9 @@ class Frames:
         settings, groups = job.settings, tuple(groups) or groups_of(job)
         key = (executor.name, executor.lanes, profile, settings, groups, job.shadow_rays)
         if key not in self._paths:
-            language, lanes = executor.language, executor.lanes
-            more: dict[str, Any] = {"seen": job.seen, "shadow_rays": job.shadow_rays}
-
-            def compiled(scene: Scene, inputs: SceneInputs) -> Artifact:
-                programs = lower_scene(scene, settings, language.forms, inputs, **more)
-                return compile_path(programs, language, profile, lanes, groups)
-
-            self._paths[key] = MovingPaths(executor, compiled, settings, self._scenes)
+            more = {"seen": job.seen, "shadow_rays": job.shadow_rays}
+            paths = MovingPaths(executor, settings, profile, groups, more, moving=self._scenes)
+            self._paths[key] = paths
         return self._paths[key].of(scene)
 
 
@@ -185,10 +180,6 @@ def _render(kernel: Artifact, totals: Totals, names: Sequence[str], info: dict[s
 # ---- scenes that move -------------------------------------------------------------------------------------
 
 
-Compiler = Callable[[Scene, SceneInputs], Artifact]
-"""(scene, its numbers that are inputs) -> the kernel."""
-
-
 @dataclass(frozen=True)
 class Moment:
     """A kernel that draws a scene, what runs it, and the scene's numbers (n,) that it is given."""
@@ -231,11 +222,17 @@ class _Family:
 
 @dataclass
 class MovingPaths:
-    """The kernels of scenes on a device; `compiled` makes one, `moving` are scenes to come, or inputs."""
+    """The kernels of scenes on a device, for groups of planes or with the end of an `encoding`.
+
+    `more`: what else lower_scene takes; `moving`: scenes to come, or inputs.
+    """
 
     executor: Executor
-    compiled: Compiler
     settings: Settings
+    profile: str
+    groups: Sequence[str]
+    more: Mapping[str, Any]
+    encoding: Encoding | None = None
     moving: Sequence[Scene] | SceneInputs = ()
     families: dict[tuple[object, ...], _Family] = field(default_factory=dict)
 
@@ -259,11 +256,17 @@ class MovingPaths:
         if family.moves is None:
             family.moves = can_move(self.executor.language, family.scene, family.tables, family.inputs)
         if not family.moves:
-            alone = self.compiled(scene, SceneInputs(self.settings, ()))
+            alone = self._compiled(scene, SceneInputs(self.settings, ()))
             return Moment(self.executor, alone, np.zeros(0, np.float32))
         if family.kernel is None:
-            family.kernel = self.compiled(family.scene, family.inputs)
+            family.kernel = self._compiled(family.scene, family.inputs)
         return Moment(self.executor, family.kernel, family.inputs.read(tables))
+
+    def _compiled(self, scene: Scene, inputs: SceneInputs) -> Artifact:
+        """Return the kernel of a scene, some of whose numbers are inputs."""
+        language, lanes = self.executor.language, self.executor.lanes
+        programs = lower_scene(scene, self.settings, language.forms, inputs, **self.more)
+        return compile_path(programs, language, self.profile, lanes, self.groups, self.encoding)
 
     def _find(self, scenes: Sequence[Scene]) -> None:
         """Make a family for each layout of some scenes, with the numbers in which they differ as inputs."""

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, Protocol
 
+from wamnet.kernels.bench.contenders import Contender, Tools
 from wamnet.kernels.bench.rates import FLOAT_BYTES, Stage
 from wamnet.kernels.measure import Entry, begin, take_turns
 from wamnet.refimpl.errors import ExecutorUnavailable
@@ -13,6 +17,27 @@ from wamnet.refimpl.light.scene import Scene
 from wamnet.refimpl.network.activation import SINE
 from wamnet.refimpl.network.dataset import channels_of
 from wamnet.refimpl.network.denoise import Model
+
+
+@dataclass(frozen=True)
+class Peer(Contender):
+    """A denoiser of others, whose `packages` must be installed."""
+
+    packages: tuple[str, ...] = ()
+
+    def missing(self) -> str:
+        """Return what is missing for it and how to get it, or nothing."""
+        absent = [name for name in self.packages if find_spec(name) is None]
+        if not absent:
+            return ""
+        return f"not installed: {', '.join(absent)}; pip install {' '.join(absent)}"
+
+    def prepare(self, tools: Tools) -> None:
+        """Import the packages, which is not compiling."""
+        if reason := self.missing():
+            raise ExecutorUnavailable(reason)
+        for package in self.packages:
+            importlib.import_module(package)
 
 
 @contextmanager

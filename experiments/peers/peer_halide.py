@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wamnet.compiler.core import sine
-from wamnet.kernels.bench.contenders import Contender, Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import Opened, Tools, activation_in
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.dataset import FEATURES
 from wamnet.refimpl.network.denoise import Model
 
-from .common import layered, told_as_missing
+from .common import Peer, layered, told_as_missing
 
 BLOCK = 12
 """Pixels whose sums are in registers: with 32 neurons 24 registers of 16 numbers."""
@@ -143,5 +143,5 @@ def _open(tools: Tools, model: Model, size: int) -> Opened:
     return Opened(run, device, layered(model, fuses=True))
 
 
-CONTENDERS = (Contender("halide", "Halide, a schedule by hand", _open, packages=("halide",)),)
+CONTENDERS = (Peer("halide", "Halide, a schedule by hand", _open, packages=("halide",)),)
 """Halide with one schedule."""

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import Contender, Opened, Tools
+from wamnet.kernels.bench.contenders import Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network.denoise import Model
 
-from .common import told_as_missing
+from .common import Peer, told_as_missing
 
 LAYERS = ("color", "albedo", "normal")
 """Layers that it is given, in the order of its arguments."""
@@ -128,7 +128,7 @@ def _open(quality: str, tools: Tools, model: Model, size: int) -> Opened:
 
 
 CONTENDERS = tuple(
-    Contender(
+    Peer(
         f"oidn:{quality}",
         f"Open Image Denoise, quality {quality}; another denoiser",
         partial(_open, quality),

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import Contender, Opened, Tools
+from wamnet.kernels.bench.contenders import Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
 
-from .common import layered, told_as_missing
+from .common import Peer, layered, told_as_missing
 
 CALIBRATION_PX = 256
 """Width and height of the part of the frame that ranges are measured on."""
@@ -93,8 +93,8 @@ def _open(name: str, tools: Tools, model: Model, size: int) -> Opened:
 
 
 CONTENDERS = (
-    Contender("onnxruntime", "ONNX Runtime", partial(_open, "onnxruntime"), packages=("onnx", "onnxruntime")),
-    Contender(
+    Peer("onnxruntime", "ONNX Runtime", partial(_open, "onnxruntime"), packages=("onnx", "onnxruntime")),
+    Peer(
         "onnxruntime:int8",
         "ONNX Runtime in 8 bits",
         partial(_open, "onnxruntime:int8"),

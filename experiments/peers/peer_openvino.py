@@ -10,12 +10,12 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from wamnet.kernels.bench.contenders import FULL, Contender, Opened, Tools
+from wamnet.kernels.bench.contenders import FULL, Opened, Tools
 from wamnet.kernels.bench.workload import Given
 from wamnet.kernels.export.onnx_export import graph
 from wamnet.refimpl.network.denoise import Model
 
-from .common import layered, told_as_missing
+from .common import Peer, layered, told_as_missing
 from .peer_onnxruntime import Run, at_first, quantised
 
 
@@ -40,7 +40,7 @@ def _open(name: str, precision: str, tools: Tools, model: Model, size: int) -> O
 
 
 CONTENDERS = tuple(
-    Contender(name, text, partial(_open, name, precision), variant, packages=packages)
+    Peer(name, text, partial(_open, name, precision), variant, packages=packages)
     for name, text, precision, variant, packages in (
         ("openvino", "OpenVINO", "f32", FULL, ("onnx", "openvino")),
         ("openvino:bf16", "OpenVINO in bfloat16", "bf16", None, ("onnx", "openvino")),

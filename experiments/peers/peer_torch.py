@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.kernels.bench.contenders import NO_CACHE, Contender, Opened, Tools, activation_in
+from wamnet.kernels.bench.contenders import NO_CACHE, Opened, Tools, activation_in
 from wamnet.kernels.bench.workload import Given
 from wamnet.refimpl.network.activation import RELU, SINE
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.siren import Siren
 from wamnet.refimpl.network.train import Recipe
 
-from .common import layered, told_as_missing
+from .common import Peer, layered, told_as_missing
 
 MODES = {"clamp": "replicate", "zero": "constant"}
 """Border rules as modes of `torch.nn.functional.pad`."""
@@ -165,7 +165,7 @@ CACHES = "PyTorch keeps code on disk, in a folder torchinductor_USER of temporar
 """What is kept of compiled code."""
 
 CONTENDERS = tuple(
-    Contender(name, text, partial(_open, name), packages=("torch",), caches=CACHES if at else NO_CACHE)
+    Peer(name, text, partial(_open, name), packages=("torch",), caches=CACHES if at else NO_CACHE)
     for at, (name, text) in enumerate(
         {
             "torch": "PyTorch, eager",

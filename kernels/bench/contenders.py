@@ -11,14 +11,12 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import entry_points
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -142,8 +140,8 @@ class Opened:
 class Contender:
     """A way to denoise: its name, what it is in words, and how it is opened for a model and a size (px).
 
-    `packages` must be installed; `variant` is None for another
-    denoiser. `executor` names the kernels' executor, None for peers. `caches` says where compiled code stays.
+    `variant` is None for another denoiser. `executor` names the kernels' executor, None for peers. `caches`
+    says where compiled code stays.
     """
 
     name: str
@@ -152,22 +150,10 @@ class Contender:
     variant: Variant | None = FULL
     executor: str | None = None
     schedule: str = ""
-    packages: tuple[str, ...] = ()
     caches: str = NO_CACHE
 
-    def missing(self) -> str:
-        """Return what is missing for it and how to get it, or nothing."""
-        absent = [name for name in self.packages if find_spec(name) is None]
-        if not absent:
-            return ""
-        return f"not installed: {', '.join(absent)}; pip install {' '.join(absent)}"
-
     def prepare(self, tools: Tools) -> None:
-        """Import the packages and open the executor, which is not compiling; or raise ExecutorUnavailable."""
-        if reason := self.missing():
-            raise ExecutorUnavailable(reason)
-        for package in self.packages:
-            importlib.import_module(package)
+        """Open what it needs before anything is compiled, or raise ExecutorUnavailable."""
         if self.executor:
             tools.executor(self.executor)
 

@@ -42,7 +42,7 @@ def kernel(*facts) -> Contender:
 
 
 def fake(name: str, open_it: Callable[..., Opened], **facts) -> Contender:
-    return Contender(name, "a fake", open_it, **{"packages": (), **facts})
+    return Contender(name, "a fake", open_it, **facts)
 
 
 def by_reference(model: Model, **facts) -> Opened:

@@ -73,7 +73,7 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
 
 
 def test_absent_peers_are_named_with_the_command_that_installs_them(monkeypatch) -> None:
-    monkeypatch.setattr("wamnet.kernels.bench.contenders.find_spec", lambda name: None)
+    monkeypatch.setattr("wamnet_peers.common.find_spec", lambda name: None)
     for peer in table.contenders:
         text = f"not installed: {', '.join(peer.packages)}; pip install {' '.join(peer.packages)}"
         assert peer.missing() == text

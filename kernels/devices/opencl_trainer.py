@@ -25,6 +25,7 @@ from ...compiler.training.step import SQUARES
 from ...compiler.training.step_kernel import TILE
 from ...compiler.training.step_layout import LANES, pack, slots, transposed_slots, unpack
 from ...refimpl.errors import InputError
+from .executor import INDEX_LIMIT
 
 Arrays = Mapping[str, NDArray[np.float32]]
 Size = tuple[int, ...]
@@ -35,9 +36,6 @@ other work does less; each has sums of its own, which cost memory and are added 
 
 MANY, GROUP_SIZE = 256, 16
 """A launch of so many work items has groups of so many; all others have groups of one."""
-
-INDEX_LIMIT = 2**31
-"""Numbers of all pictures together must be fewer: the kernel's indices are `int`."""
 
 
 class OpenCLTrainer:

@@ -63,7 +63,6 @@ def compare_images(
     scene: Scene,
     job: Job,
     *,
-    significance: float = SIGNIFICANCE,
     on_progress: Callable[[int], None] | None = None,
 ) -> ImageReport:
     """Compare the kernel's picture with the reference's of the next seed.
@@ -86,8 +85,8 @@ def compare_images(
     finite = all(np.isfinite(a).all() for a in (*means, *variances))
     least = float(np.min(p, initial=1.0)) if finite else 0.0
     comparisons = int(noisy.sum())
-    level = welch.sidak(significance, max(comparisons, 1))
-    return ImageReport(comparisons, least, level, significance, counts)
+    level = welch.sidak(SIGNIFICANCE, max(comparisons, 1))
+    return ImageReport(comparisons, least, level, SIGNIFICANCE, counts)
 
 
 def check_samples(job: Job) -> None:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import datetime
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -129,16 +129,13 @@ class Tuning:
             return to_dataclass(Table, cache.read_json(self.entry), "table")
         return None
 
-    def measured(
-        self, plan: Plan, repeats: int | None = None, progress: Callable[[str], None] = lambda _: None
-    ) -> Table:
+    def measured(self, plan: Plan, repeats: int = REPEATS) -> Table:
         """Measure all schedules of a plan of the subject, keep the table, and return it."""
         crop, images = noise(plan.analysed, CROP), noise(plan.analysed, self.size)
         rows: dict[str, Row] = {}
         ready: dict[str, Artifact] = {}
         trials: dict[str, float] = {}
         for name in (schedule.name for schedule in plan.target.schedules):
-            progress(name)
             try:
                 row, artifact = self._built(plan.scheduled(name))
                 self._check(artifact, crop)
@@ -152,7 +149,7 @@ class Tuning:
             note = f"about {trials[name] / least:.0f} times as slow in a trial"
             rows[name] = replace(rows[name], note=note)
         ways = {name: partial(self.executor.run, artifact, images) for name, artifact in ready.items()}
-        for name, times in measure.in_turns(ways, repeats or REPEATS).items():
+        for name, times in measure.in_turns(ways, repeats).items():
             rows[name] = replace(rows[name], ms=1e3 * times.median)
         day = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
         model, widths = plan.model, "-".join(map(str, plan.model.siren.widths))

@@ -44,7 +44,7 @@ ALLOWED = {
 
 ORDER = tuple(ALLOWED)
 OTHERS = {
-    "spec/conformance/renderers": {"numpy", "typer"},
+    "spec/conformance/renderers": {"jinja2", "numpy", "typer"},
     "experiments/peers": {"numpy", "wamnet_verify", *PEERS},
     "course": {"numpy", "typer", "wamnet_verify"},
 }

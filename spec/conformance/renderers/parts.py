@@ -13,9 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -85,6 +87,12 @@ class Sheet:
         """The unit normal of the front."""
         normal: Array = np.cross(self.edge_u, self.edge_v)
         return normal / np.linalg.norm(normal)
+
+    @property
+    def axes(self) -> Array:
+        """The map (3, 4) from the square [-1, 1]^2 at z = 0: half edges, the normal, the middle."""
+        u, v = 0.5 * self.edge_u, 0.5 * self.edge_v
+        return np.column_stack([u, v, self.normal, self.corner + u + v])
 
     @property
     def sides(self) -> list[Sheet]:
@@ -283,10 +291,37 @@ def physical(look: Look) -> tuple[float, float]:
     return rough, 1.0 if look.kind in (METAL, MIRROR) else 0.0
 
 
-def script(name: str, lines: Iterable[str]) -> str:
-    """Return a script of the folder `scripts` with the lines of a scene."""
-    whole = (Path(__file__).parent / "scripts" / f"{name}.txt").read_text(encoding="utf-8")
-    return whole.replace("# scene\n", "".join(f"{line}\n" for line in lines), 1)
+def mirrored(vector: Iterable[float]) -> str:
+    """Return a point as a text in left-handed coordinates."""
+    x, y, z = vector
+    return text((x, y, -z))
+
+
+def refuse(what: str) -> None:
+    """Say in a form what it cannot say."""
+    raise NotExpressed(what)
+
+
+@cache
+def forms() -> Any:
+    """Return the forms of scene files: templates in the folder `forms`."""
+    found = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "forms"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    functions = (parts_of, frame_of, axes_of, refuse, math.radians, math.sqrt, tuple)
+    found.globals |= {each.__name__: each for each in functions}
+    found.filters |= {"numbers": text, "mirrored": mirrored, "any": any}
+    return found
+
+
+def written(name: str, shot: Shot, seed: int) -> str:
+    """Return a shot for a seed in the form of a name; raises NotExpressed."""
+    values = {"shot": shot, "scene": shot.scene, "camera": shot.scene.camera, "seed": seed}
+    text: str = forms().get_template(f"{name}.jinja").render(values)
+    return text
 
 
 def text(values: Iterable[float], between: str = ", ") -> str:

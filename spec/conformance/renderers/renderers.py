@@ -17,6 +17,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -29,10 +30,10 @@ from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import to_json
 from wamnet.refimpl.light.transport import Settings
 
-from . import write_blender, write_gltf, write_luxcore, write_mitsuba, write_povray, write_three
+from . import write_gltf, write_three
 from .cases import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
-from .parts import NotExpressed
+from .parts import NotExpressed, written
 from .programs import printed, running, temporary
 
 LIMIT_S = 300.0
@@ -71,14 +72,14 @@ class Format:
 
 FORMATS: Mapping[str, Format] = {
     "wamnet": Format(".json", lambda shot, _: to_json(shot.scene)),
-    "mitsuba": Format(".xml", write_mitsuba.write),
-    "blender": Format(".py", write_blender.write),
-    "povray": Format(".pov", write_povray.write),
-    "luxcore": Format(".py", write_luxcore.write),
+    "mitsuba": Format(".xml", partial(written, "mitsuba")),
+    "blender": Format(".py", partial(written, "blender")),
+    "povray": Format(".pov", partial(written, "povray")),
+    "luxcore": Format(".py", partial(written, "luxcore")),
     "gltf": Format(".gltf", write_gltf.write, ("schlick-metals",)),
     "three": Format(".json", write_three.write, ("schlick-metals",)),
 }
-"""Forms of scene files by name: a new one is a module and a line here."""
+"""Forms of scene files by name: a new one is a file in `forms` or a module, and a line here."""
 
 
 class Renderer(Protocol):

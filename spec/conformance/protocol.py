@@ -11,18 +11,15 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import queue
+import selectors
 import signal
 import subprocess
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Any
+from time import monotonic
+from typing import IO, Any
 
 from ...refimpl.errors import InputError
 from ...refimpl.reading import parse_json
@@ -33,14 +30,8 @@ PROTOCOL = 1
 LONGEST_LINE = 2**24
 """Most bytes of an answer: what is longer is not an answer."""
 
-LINES_AHEAD = 4
-"""Most lines that are kept before they are read: an endless output must not fill the memory."""
-
 PATIENCE_S = 2.0
 """Time in which a program ends by itself once its input has ended, in seconds."""
-
-WRITER = "writer"
-"""Name of threads that write."""
 
 KEPT_ERRORS = 2_000
 """Characters of a program's standard error that a verdict shows: the last ones."""
@@ -54,23 +45,12 @@ class NoAnswerError(Exception):
         self.verdict = verdict
 
 
-@dataclass
-class _Child:
-    """A running program with the lines that it prints, as they come; None is their end."""
-
-    process: subprocess.Popen[bytes]
-    lines: queue.Queue[bytes | None] = field(default_factory=lambda: queue.Queue(LINES_AHEAD))
-    errors: list[bytes] = field(default_factory=list)
-    threads: list[threading.Thread] = field(default_factory=list)
-    ended: threading.Event = field(default_factory=threading.Event)
-
-
 class Session:
     """A program under test; a context manager that ends it."""
 
     def __init__(self, command: Sequence[str], timeout_s: float) -> None:
         self.command, self.timeout_s = list(command), timeout_s
-        self._child: _Child | None = None
+        self._process: subprocess.Popen[bytes] | None = None
 
     def hello(self) -> Mapping[str, Any]:
         """Return what the program says of itself."""
@@ -91,17 +71,22 @@ class Session:
 
     def _request(self, request: Mapping[str, Any]) -> Mapping[str, Any]:
         """Write a line and read one."""
-        child = self._start()
-        # A program that does not read must not stop the runner.
-        self._thread(child, _write, json.dumps(request).encode() + b"\n")
-        try:
-            line = child.lines.get(timeout=self.timeout_s)
-        except queue.Empty:
-            self._end(at_once=True)
-            raise NoAnswerError("timeout", f"no answer within {self.timeout_s:g} s") from None
-        if line is None:
-            raise NoAnswerError("crash", self._last_words())
-        return self._parsed(line)
+        process = self._start()
+        self._unsent += json.dumps(request).encode() + b"\n"
+        if process.stdin not in self._pipes.get_map():
+            self._pipes.register(process.stdin, selectors.EVENT_WRITE)  # type: ignore[arg-type]
+        deadline, line = monotonic() + self.timeout_s, bytearray()
+        while not line.strip():
+            while b"\n" not in self._unread and len(self._unread) < LONGEST_LINE:
+                if process.stdout not in self._pipes.get_map():
+                    break
+                if monotonic() > deadline or not self._exchanged(deadline - monotonic()):
+                    self._end(at_once=True)
+                    raise NoAnswerError("timeout", f"no answer within {self.timeout_s:g} s")
+            if not self._unread:
+                raise NoAnswerError("crash", self._last_words())
+            line, _, self._unread[:] = self._unread.partition(b"\n")
+        return self._parsed(bytes(line))
 
     def _parsed(self, line: bytes) -> Mapping[str, Any]:
         """Return a line as a JSON object."""
@@ -113,10 +98,10 @@ class Session:
             raise NoAnswerError("garbage", f"the line is not a JSON object: {line[:80]!r}")
         return answer
 
-    def _start(self) -> _Child:
+    def _start(self) -> subprocess.Popen[bytes]:
         """Return the running program, started again if it has ended."""
-        if self._child is not None and self._child.process.poll() is None:
-            return self._child
+        if self._process is not None and self._process.poll() is None:
+            return self._process
         self._end()
         pipe = subprocess.PIPE
         try:
@@ -127,94 +112,88 @@ class Session:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise NoAnswerError("crash", f"{self.command[0]} cannot be started: {reason}") from None
-        self._child = _Child(process)
-        for target in (_read_lines, _read_errors):
-            self._thread(self._child, target)
-        return self._child
+        assert process.stdin is not None
+        os.set_blocking(process.stdin.fileno(), False)
+        self._process, self._pipes = process, selectors.DefaultSelector()
+        self._unsent, self._unread, self._errors = b"", bytearray(), bytearray()
+        for stream, kept in ((process.stdout, self._unread), (process.stderr, self._errors)):
+            assert stream is not None
+            self._pipes.register(stream, selectors.EVENT_READ, kept)
+        return process
 
-    @staticmethod
-    def _thread(child: _Child, target: Callable[..., None], *arguments: Any) -> None:
-        """Start a thread that serves a program; those that are done are forgotten."""
-        name = WRITER if target is _write else None
-        thread = threading.Thread(target=target, args=(child, *arguments), name=name, daemon=True)
-        child.threads[:] = [known for known in child.threads if known.is_alive()] + [thread]
-        thread.start()
+    def _exchanged(self, limit_s: float) -> bool:
+        """Write and read what the pipes take and hold; tell whether any did in time.
+
+        A program that does not read, or that prints errors without end, must not stop the runner.
+        """
+        ready = self._pipes.select(max(limit_s, 0.0))
+        for key, mask in ready:
+            if mask & selectors.EVENT_WRITE:
+                # A program that has ended is noticed by the end of its output.
+                with suppress(BlockingIOError):
+                    self._unsent = self._unsent[_written(key.fd, self._unsent) :]
+                is_done = not self._unsent
+            else:
+                part = os.read(key.fd, 1 << 16)
+                key.data.extend(part)
+                is_done = not part
+            if is_done:
+                self._pipes.unregister(key.fileobj)
+        del self._errors[:-KEPT_ERRORS]
+        return bool(ready)
 
     def _last_words(self) -> str:
         """End the program and return its exit status and the end of its standard error."""
-        child = self._child
-        assert child is not None
+        process = self._process
+        assert process is not None
         self._end()
-        text = b"".join(child.errors).decode(errors="replace").strip()[-KEPT_ERRORS:]
-        return f"it ended with status {child.process.returncode}" + (f"; it said: {text}" if text else "")
+        text = self._errors.decode(errors="replace").strip()
+        return f"it ended with status {process.returncode}" + (f"; it said: {text}" if text else "")
 
     def _end(self, at_once: bool = False) -> None:
         """Close the program's input, and stop it if it does not end by itself soon; or `at_once`."""
-        child, self._child = self._child, None
-        if child is None:
+        process, self._process = self._process, None
+        if process is None:
             return
-        process, patience_s = child.process, 0.0 if at_once else PATIENCE_S
-        assert process.stdin is not None
-        if _written(child, patience_s):
-            process.stdin.close()
-        else:
-            patience_s = 0.0
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=patience_s)
+        # An answer may be there before all of the request is read.
+        if not at_once and self._served(lambda: not self._unsent):
+            self._close(process.stdin)
+            self._served(lambda: process.poll() is not None)
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        child.ended.set()
-        for thread in child.threads:
-            thread.join(timeout=PATIENCE_S)
-        process.stdin.close()
+        self._unsent = b""
+        # What it has said before.
+        self._served(lambda: not self._exchanged(0.0))
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            self._close(pipe)
+        self._pipes.close()
+
+    def _served(self, is_done: Callable[[], bool]) -> bool:
+        """Serve the pipes until something is done, but not for long; tell whether it is."""
+        end = monotonic() + PATIENCE_S
+        while not (done := is_done()) and monotonic() < end:
+            self._exchanged(PATIENCE_S / 100)
+            self._unread.clear()
+        return done
+
+    def _close(self, pipe: IO[bytes] | None) -> None:
+        """Close a pipe, which is served no more."""
+        assert pipe is not None
+        if not pipe.closed and pipe in self._pipes.get_map():
+            self._pipes.unregister(pipe)
+        pipe.close()
 
     def __enter__(self) -> Session:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._end()
 
 
-def _write(child: _Child, line: bytes) -> None:
-    """Write a request; a program that has ended is noticed by the end of its output."""
-    assert child.process.stdin is not None
-    with suppress(OSError, ValueError):
-        while line:
-            line = line[child.process.stdin.write(line) :]
-
-
-def _written(child: _Child, patience_s: float) -> bool:
-    """Wait until all lines are written, and return whether they are: an answer may be there before."""
-    writers = [thread for thread in child.threads if thread.name == WRITER]
-    for thread in writers:
-        thread.join(patience_s / len(writers))
-    return not any(thread.is_alive() for thread in writers)
-
-
-def _read_lines(child: _Child) -> None:
-    """Put the lines of a program into its queue as they come."""
-    assert child.process.stdout is not None
-    with io.BufferedReader(child.process.stdout) as stream:  # type: ignore[type-var]
-        while not child.ended.is_set() and (line := stream.readline(LONGEST_LINE)):
-            if line.strip():
-                _put(child, line)
-    _put(child, None)
-
-
-def _put(child: _Child, line: bytes | None) -> None:
-    """Put a line into the queue, and wait for room unless the program was ended."""
-    while not child.ended.is_set():
-        with suppress(queue.Full):
-            child.lines.put(line, timeout=0.1)
-            return
-
-
-def _read_errors(child: _Child) -> None:
-    """Keep the end of what a program says on standard error."""
-    assert child.process.stderr is not None
-    with child.process.stderr as stream:
-        while part := stream.read(4096):
-            child.errors[:] = [b"".join([*child.errors, part])[-KEPT_ERRORS:]]
+def _written(handle: int, content: bytes) -> int:
+    """Return how many bytes a pipe has taken: all where nobody reads them any more."""
+    try:
+        return os.write(handle, content)
+    except BrokenPipeError:
+        return len(content)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
 from wamnet.refimpl.errors import InputError
-from wamnet.spec.conformance import protocol, run
+from wamnet.spec.conformance import run
 from wamnet.spec.conformance.case import Case, Output
 from wamnet.spec.conformance.protocol import NoAnswerError, Session
 from wamnet.spec.conformance.report import first_blamed
@@ -165,22 +163,13 @@ def test_programs_that_do_not_introduce_themselves_are_refused(verdicts, command
 
 
 @pytest.mark.needs("programs")
-def test_a_program_that_has_answered_ends_by_itself(program, monkeypatch, tmp_path):
-    """Also where its answer is there before the thread that wrote the request is done: it was killed then."""
-    write = protocol._write
-
-    def slow(child, line):
-        write(child, line)
-        time.sleep(0.3)
-
-    monkeypatch.setattr(protocol, "_write", slow)
-    ended = tmp_path / "ended"
-    command = program()
-    with Path(command[-1]).open("a") as file:
-        file.write(f"\nopen({str(ended)!r}, 'w').close()\n")
-    with Session(command, 60.0) as session:
-        session.hello()
-    assert ended.exists()
+def test_a_program_that_has_answered_ends_by_itself(tmp_path):
+    """Also where its answer is there before it has read the request: it was killed then."""
+    code = "import sys; print('{\"id\": 1}', flush=True); sys.stdin.read(); open('ended', 'w').close()"
+    (tmp_path / "program.py").write_text(f"import os; os.chdir({str(tmp_path)!r}); {code}")
+    with Session([sys.executable, str(tmp_path / "program.py")], 60.0) as session:
+        session.ask({"id": 1, "input": "x" * 2**20})
+    assert (tmp_path / "ended").exists()
 
 
 ACCEPTS = (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, cast
 
@@ -17,14 +17,14 @@ from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirro
 from ....refimpl.light.materials.conductor import distribution, sample_visible_normal, schlick
 from ....refimpl.light.materials.dielectric import fresnel, refract
 from ....refimpl.light.materials.material import Site
-from ....refimpl.light.scene import Box, Camera, Light, Quad, Room, Scene, Sky, Sphere
+from ....refimpl.light.scene import Camera, Light, Quad, Scene, Sky, Sphere
 from ....refimpl.light.shapes.box import slabs
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK, inverse
 from ....refimpl.vectors import dot
 from ..case import FOLDER, Kind, within
 from ..functions import Numbers
-from .tables import direct, function, kind
+from .tables import ROWS, direct, function, kind
 
 ROUNDED = "float64, rounded once to float32"
 """Where bounds of numbers come from that are computed once for a scene: with a margin, one ulp."""
@@ -140,52 +140,18 @@ def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 # ---- boxes, rooms and scenes ------------------------------------------------------------------------------
 
-GRAY = (0.5, 0.5, 0.5)
-"""A reflectance, which these cases do not depend on."""
-
-EYE = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0))
-"""A camera, which they do not depend on either."""
-
-HALVES = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
-"""A rotation about z."""
-
-LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-"""The rotation of what is parallel to the axes."""
-
-BOX = Box((0.25, -0.5, 0.125), (0.5, 0.75, 1.0), GRAY, LEVEL)
-"""The box of all rays."""
-
-MIXED = Scene(
-    "mixed",
-    EYE,
-    boxes=(Box((0.0, -0.5, 0.0), (1.0, 0.5, 1.0), GRAY, LEVEL),),
-    spheres=(Sphere((0.0, 0.5, 0.0), 0.5, GRAY),),
-    quads=(Quad((-1.0, 1.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), GRAY),),
-)
-"""A sphere between a box and a quad, which it touches."""
-
-HALL = replace(
-    MIXED,
-    name="hall",
-    room=Room((-3.0, -1.0, -3.0), (3.0, 3.0, 3.0), (GRAY,) * 6),
-    lights=(Light((-0.5, 2.0, -0.5), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), GRAY, 1.0),),
-)
-"""The same shapes and a light in a room."""
-
-SCENES = {
-    "intersection.box": Scene("box", EYE, boxes=(BOX,)),
-    "intersection.turned_box": Scene("turned box", EYE, boxes=(replace(BOX, rotation=HALVES),)),
-    "intersection.room": Scene("room", EYE, Room((-2.0, -1.0, -3.0), (2.0, 1.5, 3.0), (GRAY,) * 6)),
-    "intersection.nearest": MIXED,
-}
+SCENES = {name: scene_module.from_json(json.dumps(scene)) for name, scene in ROWS["scenes"].items()}
 """What the rays of each kind meet; the titles say it too."""
 
+BOX = SCENES["intersection.box"].boxes[0]
+"""The box of all slabs."""
 
-def _met(scene: Scene) -> Any:
+
+def _met(name: str) -> Any:
     """Return the function from rays to distance, normal and number of the surface."""
 
     def call(given: Numbers, dtype: Any) -> dict[str, Any]:
-        geometry = intersection.build(scene, dtype)
+        geometry = intersection.build(SCENES[name], dtype)
         hit = intersection.closest_hit(geometry, given["origin"], given["direction"])
         surface = intersection.surface_at(geometry, hit, given["origin"], given["direction"])
         return {"t": hit.t, "normal": surface.normal, "surface": hit.surface.astype(dtype)}
@@ -202,7 +168,7 @@ def _slabs(given: Numbers, dtype: Any) -> dict[str, Any]:
 
 def _occluded(given: Numbers, dtype: Any) -> dict[str, Any]:
     """Return 1 where something is nearer than a distance."""
-    geometry = intersection.build(HALL, dtype)
+    geometry = intersection.build(SCENES["intersection.occluded"], dtype)
     found = intersection.occluded(geometry, given["origin"], given["direction"], given["distance"])
     one = np.ones_like(given["distance"])
     return {"occluded": np.where(found, one, 0.0 * one)}
@@ -310,7 +276,7 @@ FUNCTIONS = (
     function("intersection.sphere", _sphere),
     function("intersection.quad", _quad),
     function("intersection.slabs", _slabs),
-    *(function(name, _met(scene)) for name, scene in SCENES.items()),
+    *(function(name, _met(name)) for name in SCENES if name != "intersection.occluded"),
     function("intersection.occluded", _occluded),
     direct("material.ggx", distribution),
     direct("material.schlick", schlick),

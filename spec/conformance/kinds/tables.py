@@ -3,6 +3,7 @@
 1. `functions.json` has the title and the fields of each function of numbers: text, and perhaps components,
    least and largest value; a row of Python adds the call [`function`], [`direct`].
 2. `kinds.json` has those of every other kind; a row of Python adds answer and bound [`kind`].
+3. `scenes.json` has the scenes that rays meet, by the kind.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from ..functions import Field, Function, Numbers
 
 ROWS: Mapping[str, Mapping[str, Any]] = {
     name: json.loads((Path(__file__).parent / f"{name}.json").read_text(encoding="utf-8"))
-    for name in ("functions", "kinds")
+    for name in ("functions", "kinds", "scenes")
 }
-"""The functions of numbers by name, and the other kinds."""
+"""The functions of numbers by name, the other kinds, and the scenes of rays."""
 
 
 def function(name: str, call: Callable[[Numbers, Any], Numbers]) -> Function:

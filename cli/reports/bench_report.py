@@ -3,11 +3,12 @@
 The data are those of spec/bench.md; here they are only written down and drawn.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ...compiler.schedules.names import split
 from . import plots
+from .pages import NONE, filled, number
 
 Data = Mapping[str, Any]
 
@@ -16,24 +17,6 @@ PRINTED = plots.PAPER
 
 NO_CACHE = "nothing is kept"
 """What a contender's `caches` says that leaves no compiled code on disk; equal to that of kernels."""
-
-NONE = "–"
-"""What is printed where there is no number."""
-
-LEGEND = """\
-Sorted by time. A star is on the Pareto front of time and error: nothing here is faster and nearer. Times are
-medians of interleaved frames, copies included. Errors are the largest difference from the full network
-in float64: what a form leaves out counts. Predictions come from operations, sines and bytes
-(spec/bench.md)."""
-"""What a reader of the first table should know."""
-
-
-def number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as it is printed, a dash where there is none; a sign only if a digit is not 0."""
-    if value is None:
-        return NONE
-    text = f"{value:,.0f}" if form.endswith("g") and abs(value) >= 1000 else format(value, form)
-    return text[1:] if form.startswith("+") and not float(text) else text
 
 
 def part(row: Data, name: str, key: str) -> float | None:
@@ -121,25 +104,6 @@ def growth(data: Data) -> dict[int, dict[str, Data]]:
     return {size: {row["name"]: row for row in found[size] if row["ms"]} for size in sorted(found)}
 
 
-def limits_text(data: Data) -> str:
-    """Return the machine's limits as a sentence."""
-    limits = data["limits"]
-    if limits is None:
-        return "The machine's limits were not measured."
-    return (
-        f"Measured in the same run: sgemm {number(1e-9 * limits['flops_per_s'])} GFLOP/s, memory (triad) "
-        f"{number(1e-9 * limits['bytes_per_s'])} GB/s, NumPy's sine {number(1e-9 * limits['sines_per_s'])} "
-        "thousand million a second."
-    )
-
-
-def network_text(data: Data) -> str:
-    """Return the network and the picture."""
-    network = data["network"]
-    widths = "-".join(map(str, network["widths"]))
-    return f"{data['size_px']}x{data['size_px']}, {widths} on {', '.join(network['features'])}"
-
-
 def notes(data: Data) -> list[str]:
     """Return a line for all that was left out, or that took fewer turns, and for what readers should know."""
     lines = []
@@ -168,39 +132,25 @@ def notes(data: Data) -> list[str]:
 
 def markdown(data: Data, pictures: Sequence[str]) -> str:
     """Return the result as a Markdown text."""
-    return "\n".join(_lines(data, pictures)) + "\n"
+    return filled("bench.md.jinja", **_shown(data), plots=pictures)
 
 
-def _lines(data: Data, pictures: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of the text."""
-    yield from ("# Speed against error", "", network_text(data) + f" (`{data['command']}`).", "")
-    facts = [f"{name} {value}" for of in ("machine", "versions") for name, value in data[of].items()]
-    yield from (", ".join(facts) + ".", "", limits_text(data), "")
-    yield from _table(*speed_table(data))
-    yield LEGEND
-    yield ""
-    yield from ("## Speed, loss and bounds", "", frames_text(data), "")
-    yield from _table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])
-    yield from (TABLE_LEGEND, "", "## Details", "")
-    known = [each for each in DETAILS if any(cells(row, (each,)) != (NONE,) for row in measured(data))]
-    heads = ("contender", *(head for head, *_ in known))
-    yield from _table(heads, [(row["name"], *cells(row, known)) for row in measured(data)])
-    if data["sizes"]:
-        yield from ("## How cost grows", "")
-        yield from _table(*growth_table(data))
-    if lines := notes(data):
-        yield from ("## Left out, and why", "", *(f"* {line}" for line in lines), "")
-    if caches := sorted({row["caches"] for row in measured(data) if row["caches"] != NO_CACHE}):
-        yield from ("## Code that stays compiled", "", *(f"* {text}" for text in caches), "")
-    yield from (f"![{name}]({name})" for name in pictures)
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield the lines of a table and an empty one."""
-    yield f"| {' | '.join(heads)} |"
-    yield f"|{'---|' * len(heads)}"
-    yield from (f"| {' | '.join(row)} |" for row in rows)
-    yield ""
+def _shown(data: Data) -> dict[str, Any]:
+    """Return what reports show of a benchmark: the data, tables as heads and rows, and lines."""
+    rows = measured(data)
+    known = [each for each in DETAILS if any(cells(row, (each,)) != (NONE,) for row in rows)]
+    return {
+        "data": {"frames": None, **data},
+        "speed": speed_table(data),
+        "trade": trade_table(data),
+        "details": (
+            ("contender", *(head for head, *_ in known)),
+            [(row["name"], *cells(row, known)) for row in rows],
+        ),
+        "growth": growth_table(data),
+        "notes": notes(data),
+        "caches": sorted({row["caches"] for row in rows if row["caches"] != NO_CACHE}),
+    }
 
 
 # ---- speed against error -----------------------------------------------------------------------------------
@@ -268,9 +218,14 @@ TABLE_HEADS = ("variant", "executor, schedule", "profile, degree of sine", *(hea
 """Columns of the table of speed against error."""
 
 
+def trade_table(data: Data) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heads and rows of speed, quality, errors and bounds."""
+    return TABLE_HEADS, [_full_row(data, row) for row in measured(data)]
+
+
 def table(data: Data) -> str:
     """Return the rows of a benchmark's data as a Markdown table of speed, quality, errors and bounds."""
-    return "\n".join(_table(TABLE_HEADS, [_full_row(data, row) for row in measured(data)])).rstrip() + "\n"
+    return filled("table.md.jinja", shown=trade_table(data))
 
 
 def _full_row(data: Data, row: Data) -> tuple[str, ...]:
@@ -286,28 +241,6 @@ def _full_row(data: Data, row: Data) -> tuple[str, ...]:
         f"{row.get('profile')}, {degree or 'its own'}" if kernel else NONE,
         *numbers,
         bound_all + (" †" if part(row, "rounding", "certified") else ""),
-    )
-
-
-TABLE_LEGEND = """\
-Sorted by time: median of interleaved frames, copies included; the spread is (longest - shortest) / median.
-A star is on the Pareto front of time and loss. PSNR is against the references, the mean over the frames; lost
-is that of the full network less it. The error is the largest difference from the form's own network in
-float64; its bound is computed for this frame, and for all frames; a dagger marks a certificate. `further` is
-the whole network after as many more steps as the trained forms."""
-"""What a reader of the table should know."""
-
-
-def frames_text(data: Data) -> str:
-    """Return what was denoised as a sentence."""
-    frames = data.get("frames")
-    if not frames:
-        return "Noise was denoised: there is no quality."
-    times = ", ".join(f"{draw['time_s']:.4g} s" for draw in frames["draws"])
-    return (
-        f"{len(frames['draws'])} frames of {frames['scene']} ({times}), {frames['frame_px']} pixels wide, "
-        f"features of {frames['feature_spp']} camera rays, references of {frames['reference_spp']} paths "
-        "a pixel."
     )
 
 
@@ -333,18 +266,8 @@ def draw(data: Data, theme: plots.Theme) -> dict[str, bytes]:
 
 def section(data: Data, embed: Callable[[bytes], str]) -> dict[str, Any]:
     """Return what the demo's report shows of a benchmark: texts, tables, and plots for both kinds of page."""
-    heads, rows = speed_table(data)
     light, dark = draw(data, plots.LIGHT), draw(data, plots.DARK)
     return {
-        "data": data,
-        "network": network_text(data),
-        "limits": limits_text(data),
-        "heads": heads,
-        "rows": rows,
-        "frames": frames_text(data),
-        "trade_heads": TABLE_HEADS,
-        "trade_rows": [_full_row(data, row) for row in measured(data)],
-        "trade_legend": TABLE_LEGEND,
-        "notes": notes(data),
+        **_shown(data),
         "plots": {name: {"light": embed(light[name]), "dark": embed(dark[name])} for name in light},
     }

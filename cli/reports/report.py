@@ -9,11 +9,8 @@ import base64
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-import jinja2
 
 from ...refimpl.encoding import to_display
 from ...refimpl.frame import Frame
@@ -22,6 +19,7 @@ from ...refimpl.network.denoise import Model
 from ...refimpl.network.train import TrainState
 from ..files.outputs import write_text
 from . import bench_report, machine, plots, scores
+from .pages import filled
 from .runs import Run
 from .scores import Score
 
@@ -176,11 +174,8 @@ def draw(results: Results) -> dict[str, Any]:
 
 def page(data: dict[str, Any], pictures: list[dict[str, str]], drawn: dict[str, Any]) -> str:
     """Return the report as one HTML page."""
-    text = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters["number"] = bench_report.number
     bench = bench_report.section(data["bench"], _embedded) if data.get("bench") else None
-    return environment.from_string(text).render(**{**data, "bench": bench}, pictures=pictures, plots=drawn)
+    return filled("report.html.jinja", **{**data, "bench": bench}, pictures=pictures, plots=drawn)
 
 
 def _embedded(png: bytes) -> str:

@@ -10,11 +10,8 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-import jinja2
 
 from ...kernels.run.page import Animation, networks_of, page_data
 from ...kernels.run.webassembly import compiler
@@ -24,6 +21,7 @@ from ...refimpl.network.denoise import Model
 from ..common import options
 from ..common.inputs import learned_scene, load_model, load_scene
 from ..common.packages import need
+from .pages import TEMPLATES, filled
 
 SCRIPTS = (
     "page.scene.js",
@@ -76,13 +74,13 @@ def render_page(data: dict[str, Any]) -> str:
     """Return the page that shows such data."""
 
     def part(name: str) -> str:
-        return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
+        return (TEMPLATES / name).read_text(encoding="utf-8")
 
     # In a script element nothing but its end tag and <!-- mean anything: JSON can do without the sign.
     # The indentation of sources would be a twelfth of a page.
     text = re.sub(r"\\n +", r"\\n", json.dumps(data, allow_nan=False)).replace("<", "\\u003c")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    return environment.from_string(part("page.html.jinja")).render(
+    return filled(
+        "page.html.jinja",
         title=f"{data['scene'].replace('_', ' ').capitalize()}, path-traced and denoised live",
         style=part("page.css"),
         script="\n".join(part(name) for name in SCRIPTS),

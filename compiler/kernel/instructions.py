@@ -7,6 +7,9 @@ a word; `wamnet_floats` makes sums floats; `wamnet_numbers` reads four words of 
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
+
 PORTABLE = "WAMNET_PORTABLE"
 """What to define where a kernel may use nothing beyond its language's own standard."""
 
@@ -77,71 +80,86 @@ float4 wamnet_numbers(int4 bits)
 """
 """Words of bytes: no sum is near the ends of 32 bits, where the instruction would saturate."""
 
-C_TILE = """\
+Calls = Sequence[tuple[str, str, str, str]]
+"""Functions of C: name, arguments, what is done by operators or instructions, and for each lane `i`."""
+
+VECTOR_CALLS: Calls = (
+    ("clear", "VECTOR *to", "*to = (VECTOR){0};", "to->lane[i] = 0.0f;"),
+    ("load", "VECTOR *to, const float *from", "*to = *(const VECTOR *)from;", "to->lane[i] = from[i];"),
+    ("store", "float *to, const VECTOR *from", "*(VECTOR *)to = *from;", "to[i] = from->lane[i];"),
+    ("add", "VECTOR *sum, const VECTOR *term", "*sum += *term;", "sum->lane[i] += term->lane[i];"),
+    (
+        "add_product",
+        "VECTOR *sum, const VECTOR *weight, float value",
+        "*sum += *weight * value;",
+        "sum->lane[i] += weight->lane[i] * value;",
+    ),
+)
+"""What is done with vectors."""
+
+BYTE_CALLS: Calls = (
+    (
+        "start",
+        "wamnet_sums *to, const float *from",
+        "*to = _mm512_loadu_si512(from);",
+        "memcpy(to->lane, from, sizeof to->lane);",
+    ),
+    (
+        "weights",
+        "wamnet_bytes *to, const float *from",
+        "*to = _mm512_loadu_si512(from);",
+        "memcpy(to->byte, from, sizeof to->byte);",
+    ),
+    (
+        "dot",
+        "wamnet_sums *sum, const wamnet_bytes *weight, const uint8_t *four",
+        "int32_t word;\nmemcpy(&word, four, 4);\n"
+        "*sum = _mm512_dpbusd_epi32(*sum, _mm512_set1_epi32(word), *weight);",
+        "const int8_t *w = weight->byte + 4 * i;\n"
+        "sum->lane[i] += four[0] * w[0] + four[1] * w[1] + four[2] * w[2] + four[3] * w[3];",
+    ),
+    (
+        "floats",
+        "float *to, const wamnet_sums *from",
+        "_mm512_storeu_ps(to, _mm512_cvtepi32_ps(*from));",
+        "to[i] = (float)from->lane[i];",
+    ),
+)
+"""What is done with vectors of bytes, and of their sums."""
+
+
+def functions(calls: Calls, loops: bool) -> str:
+    """Return functions of C; those in loops may take for granted that several vectors are apart."""
+    found = []
+    for name, takes, at_once, each in calls:
+        body = each if loops else at_once
+        if loops and "[i]" in each:
+            lines = textwrap.indent(each, "    ")
+            body = f"WAMNET_ROLLED\nfor (int i = 0; i < LANES; ++i) {{\n{lines}\n}}"
+        if loops and takes.count("VECTOR") + takes.count("wamnet_") > 1:
+            takes = takes.replace("*", "*restrict ")
+        head = f"static inline void wamnet_{name}({takes})".replace("VECTOR", "wamnet_vector")
+        if len(head) > 100:
+            head = head.replace(", ", ",\n    ").replace("(", "(\n    ", 1)
+        found.append(f"{head}\n{{\n{textwrap.indent(body, '    ')}\n}}\n".replace("VECTOR", "wamnet_vector"))
+    return "\n".join(found)
+
+
+C_TILE = f"""\
 #if LANES == 16 && defined(__AVX512VNNI__) && defined(__AVX512BW__) && !defined(WAMNET_PORTABLE)
 #include <immintrin.h>
 typedef __m512i wamnet_sums;
 typedef __m512i wamnet_bytes;
 
-static inline void wamnet_start(wamnet_sums *to, const float *from)
-{
-    *to = _mm512_loadu_si512(from);
-}
-
-static inline void wamnet_weights(wamnet_bytes *to, const float *from)
-{
-    *to = _mm512_loadu_si512(from);
-}
-
-static inline void wamnet_dot(wamnet_sums *sum, const wamnet_bytes *weight, const uint8_t *four)
-{
-    int32_t word;
-    memcpy(&word, four, 4);
-    *sum = _mm512_dpbusd_epi32(*sum, _mm512_set1_epi32(word), *weight);
-}
-
-static inline void wamnet_floats(float *to, const wamnet_sums *from)
-{
-    _mm512_storeu_ps(to, _mm512_cvtepi32_ps(*from));
-}
-#else
-typedef struct {
+{functions(BYTE_CALLS, False)}#else
+typedef struct {{
     int32_t lane[LANES];
-} wamnet_sums;
-typedef struct {
+}} wamnet_sums;
+typedef struct {{
     int8_t byte[4 * LANES];
-} wamnet_bytes;
+}} wamnet_bytes;
 
-static inline void wamnet_start(wamnet_sums *to, const float *from)
-{
-    memcpy(to->lane, from, sizeof to->lane);
-}
-
-static inline void wamnet_weights(wamnet_bytes *to, const float *from)
-{
-    memcpy(to->byte, from, sizeof to->byte);
-}
-
-static inline void wamnet_dot(
-    wamnet_sums *restrict sum,
-    const wamnet_bytes *restrict weight,
-    const uint8_t *restrict four)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        const int8_t *w = weight->byte + 4 * i;
-        sum->lane[i] += four[0] * w[0] + four[1] * w[1] + four[2] * w[2] + four[3] * w[3];
-    }
-}
-
-static inline void wamnet_floats(float *to, const wamnet_sums *from)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to[i] = (float)from->lane[i];
-    }
-}
-#endif
+{functions(BYTE_CALLS, True)}#endif
 """
 """The types of vectors of sums and of bytes, and what is done with them."""
 
@@ -281,89 +299,11 @@ STRAIGHT = """\
 
 GCC would make straight code of the loops over lanes too, instead of vectors."""
 
-OPERATORS = """\
-static inline void wamnet_clear(wamnet_vector *to)
-{
-    *to = (wamnet_vector){0};
-}
-
-static inline void wamnet_load(wamnet_vector *to, const float *from)
-{
-    *to = *(const wamnet_vector *)from;
-}
-
-static inline void wamnet_store(float *to, const wamnet_vector *from)
-{
-    *(wamnet_vector *)to = *from;
-}
-
-static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
-{
-    *sum += *term;
-}
-
-static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
-{
-    *sum += *weight * value;
-}
-"""
-"""What is done with vectors of GCC's type."""
-
-LOOPS = """\
-typedef struct {
-    float lane[LANES];
-} wamnet_vector;
-
-static inline void wamnet_clear(wamnet_vector *to)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = 0.0f;
-    }
-}
-
-static inline void wamnet_load(wamnet_vector *to, const float *from)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = from[i];
-    }
-}
-
-static inline void wamnet_store(float *to, const wamnet_vector *from)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to[i] = from->lane[i];
-    }
-}
-
-static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += term->lane[i];
-    }
-}
-
-static inline void wamnet_add_product(
-    wamnet_vector *restrict sum,
-    const wamnet_vector *restrict weight,
-    float value)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += weight->lane[i] * value;
-    }
-}
-"""
-"""The type of vectors of other compilers, and what is done with it."""
-
 
 def gnu_vectors(lanes: str) -> str:
     """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
     kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
-    return f"typedef float wamnet_vector {kind};\n\n{OPERATORS}"
+    return f"typedef float wamnet_vector {kind};\n\n{functions(VECTOR_CALLS, False)}"
 
 
 VECTORS = f"""\
@@ -376,7 +316,11 @@ VECTORS = f"""\
 #if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \\
     defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
 {gnu_vectors("LANES")}#else
-{LOOPS}#endif
+typedef struct {{
+    float lane[LANES];
+}} wamnet_vector;
+
+{functions(VECTOR_CALLS, True)}#endif
 #if defined(WAMNET_CLONES)
 WAMNET_CLONES
 #endif

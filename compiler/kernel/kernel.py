@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 from .interface import BATCH as BATCH
-from .interface import READ, Interface
+from .interface import READ, RESULT, Interface
 
 Index = tuple["Expr", ...]
 
@@ -41,6 +41,19 @@ class Type:
 FLOAT, INT, WORD, BOOL, BYTE = Type(), Type("int32"), Type("uint32"), Type("bool"), Type("uint8")
 
 
+Operator = Callable[["Expr", "Expr | int"], "Expr"]
+
+
+def _binary(what: str) -> Operator:
+    """Return the method of an operator."""
+    return lambda self, other: apply(what, self, other)
+
+
+def _reflected(what: str) -> Operator:
+    """Return the method of an operator whose left operand is a Python number."""
+    return lambda self, other: apply(what, other, self)
+
+
 @dataclass(frozen=True)
 class Expr:
     """A value without effect.
@@ -56,41 +69,12 @@ class Expr:
     type: Type = INT
     value: Any = None
 
-    def __add__(self, other: Expr | int) -> Expr:
-        return apply("add", self, other)
-
-    def __radd__(self, other: int) -> Expr:
-        return apply("add", other, self)
-
-    def __sub__(self, other: Expr | int) -> Expr:
-        return apply("subtract", self, other)
-
-    def __rsub__(self, other: int) -> Expr:
-        return apply("subtract", other, self)
-
-    def __mul__(self, other: Expr | int) -> Expr:
-        return apply("multiply", self, other)
-
-    def __rmul__(self, other: int) -> Expr:
-        return apply("multiply", other, self)
-
-    def __floordiv__(self, other: Expr | int) -> Expr:
-        return apply("divide", self, other)
-
-    def __mod__(self, other: Expr | int) -> Expr:
-        return apply("remainder", self, other)
-
-    def __lt__(self, other: Expr | int) -> Expr:
-        return apply("less", self, other)
-
-    def __le__(self, other: Expr | int) -> Expr:
-        return apply("less_equal", self, other)
-
-    def __ge__(self, other: Expr | int) -> Expr:
-        return apply("greater_equal", self, other)
-
-    def __and__(self, other: Expr) -> Expr:
-        return apply("logical_and", self, other)
+    __add__, __radd__ = _binary("add"), _reflected("add")
+    __sub__, __rsub__ = _binary("subtract"), _reflected("subtract")
+    __mul__, __rmul__ = _binary("multiply"), _reflected("multiply")
+    __floordiv__, __mod__ = _binary("divide"), _binary("remainder")
+    __lt__, __le__, __ge__ = _binary("less"), _binary("less_equal"), _binary("greater_equal")
+    __and__ = _binary("logical_and")
 
     def lane(self, lane: int) -> Expr:
         """Return one component of a vector."""
@@ -216,7 +200,7 @@ class View:
 
     array: str
     index: Index
-    step: Expr
+    step: Expr = field(default_factory=lambda: const(1))
 
 
 @dataclass(frozen=True)
@@ -440,6 +424,15 @@ def parts(value: Expr) -> list[Expr]:
     for each in value.args:
         found += parts(each)
     return found
+
+
+def accesses(body: Body) -> list[tuple[str, Type]]:
+    """Return the arrays that statements read and write, and the types of what is read and written."""
+    statements = walk(body)
+    found = [(s.array, s.value.type) for s in statements if isinstance(s, Store)]
+    found += [(RESULT, FLOAT) for s in statements if isinstance(s, Write)]
+    every = (each for s in statements for v in values(s) for each in parts(v))
+    return found + [(each.value, each.type) for each in every if each.op == "load"]
 
 
 def operations(kernel: Kernel) -> set[str]:

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -87,15 +87,10 @@ class Runner:
             shape = [size if isinstance(size, int) else integers[size] for size in each.shape]
             self.results[each.name] = Memory.of(each.name, np.zeros(shape, domain.dtype), "result")
         self.memory |= self.results
-        self.evaluators = self._evaluators()
+        methods = (key for key in dir(self) if key.startswith("_value_"))
+        self.evaluators = {key.removeprefix("_value_"): getattr(self, key) for key in methods}
         if kernel.batch is not None:
             self.names |= dict(zip(tree.BATCH, (0, self.value(kernel.batch)), strict=True))
-
-    def _evaluators(self) -> dict[str, Callable[[tree.Expr], Values]]:
-        """Return the methods that evaluate expressions, by operation."""
-        return {
-            key.removeprefix("_value_"): getattr(self, key) for key in dir(self) if key.startswith("_value_")
-        }
 
     def _items(self, width: int, height: int) -> tuple[Items, dict[str, Values]]:
         """Return the work items, and names of their places; only groups reach beyond the image."""

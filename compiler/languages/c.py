@@ -29,7 +29,7 @@ from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Array,
 from ..kernel.kernel import Kernel, operations
 from ..kernel.sizes import integer, item_bytes
 from .c_path import HELPERS, MASKS, NUMBERS_OF_PATHS, OPERATIONS, PATHS, TYPES
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 from .openings import Arguments
 
 POPPED = """\
@@ -125,10 +125,6 @@ class C(Arguments):
     reads = "const float *restrict {name}"
     writes = "float *restrict {name}"
     long = "size_t"
-    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
-    weight = "weights[{index}]"
-    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    max_output_channels = 2**16
     native_sine = SineContract("sinf() of C99, which promises nothing", None)
     calls_vectors = True
     casts = True
@@ -194,13 +190,13 @@ class C(Arguments):
         """Return the text of an integer that the kernel is given: a path's are in one structure."""
         return f"part->{name}" if kernel.role == PATH else name
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
-        """Return the lines above the functions."""
-        head = [*includes(kernel.role, "float", "math", "stdbool", "stddef", "stdint"), PRAGMAS]
-        fields = [f"    {self.typed(name)};" for name in kernel.integers]
+    def top(self, kernel: Kernel, top: str) -> list[str]:
+        """Return the lines above the functions of a path kernel."""
+        head = [*includes(PATH, "float", "math", "stdbool", "stddef", "stdint"), PRAGMAS]
+        fields = [f"    {self.typed(name)};" for name in kernel.interface.integers]
         said = "/* What all pixels of a launch share. */"
         part = [said, "typedef struct {", *fields, "} wamnet_part;", ""]
-        return [*head, IGNORED, PATHS + NUMBERS_OF_PATHS + parts.top, *part]
+        return [*head, IGNORED, PATHS + NUMBERS_OF_PATHS + top, *part]
 
     def typed(self, name: str) -> str:
         """Return the declaration of an integer, without what ends it."""
@@ -211,21 +207,23 @@ class C(Arguments):
         said = "Pixels of row first_row + `row` from column `column` on: WAMNET_PATHS, or fewer at its end."
         return self.functions(kernel, said, kernel.place, ("column += WAMNET_PATHS", "++row"))
 
-    def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
-        """Return the lines of a kernel that is data, up to its first statement."""
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
+        """Return the text of a kernel up to its first statement."""
+        interface = kernel.interface
+        if interface.role == PATH:
+            return super().begin(kernel, top, bounded)
         names = ("float", "math", "stdbool", *(["stddef"] if interface.role != DENOISE else []), "stdint")
-        head = [*includes(interface.role, *names), self.unordered[parts.bounded]]
-        sizes, functions = parts.top.split("\nstatic void", 1) if kernel.functions else (parts.top, "")
-        functions = f"static void{functions}" if functions else ""
+        head = [*includes(interface.role, *names), self.unordered[bounded]]
         if kernel.weights.dtype == "int32":
-            top = [*includes(DENOISE, *names, "string"), FUSED, sizes, STRAIGHT, C_TILE]
+            above = [*includes(DENOISE, *names, "string"), FUSED, top, STRAIGHT, C_TILE]
         elif kernel.weights.lanes == 1:
-            top = [*head, UNFUSED, parts.top]
+            above = [*head, UNFUSED, top]
         elif kernel.functions:
+            sizes, functions = top.split("\nstatic void", 1)
             vectors = gnu_vectors(str(kernel.weights.lanes))
-            top = [*head, REFUSED, FUSED, STRAIGHT, vectors, sizes, functions]
+            above = [*head, REFUSED, FUSED, STRAIGHT, vectors, sizes, f"static void{functions}"]
         else:
-            top = [*head, FUSED, sizes, STRAIGHT, VECTORS]
+            above = [*head, FUSED, top, STRAIGHT, VECTORS]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
         said = said if interface.role == DENOISE else "One pixel (x, y)."
         if kernel.step[0].value != 1:
@@ -239,7 +237,7 @@ class C(Arguments):
         clamps = interface.role == DENOISE or "clamp" in operations(kernel)
         limit = CLAMP.replace(C.clamp, self.clamp) if clamps else ""
         functions_of = self.functions(interface, said, kernel.place, steps, limit)
-        return [*top, *functions_of, unused, *self.strides(interface)]
+        return "\n".join([*above, *functions_of, unused, *self.strides(interface)])
 
     def listed(self, kernel: Interface) -> list[str]:
         """Return all arguments: the integers of a path kernel are in one structure."""
@@ -251,8 +249,15 @@ class C(Arguments):
         """Return the function of all pixels, and the head of that of a work item's, which has its place."""
         name, listed = f"{self.entries[kernel.role].removesuffix('_pixel')}_pixel", self.listed(kernel)
         given = ", ".join([*(each.split()[-1].lstrip("*") for each in listed), *kernel.place])
-        ends = self.integer(kernel, "width"), self.integer(kernel, kernel.rows)
-        call = loops(kernel.place, ends, steps, f"{name}({given});")
+        width, rows = self.integer(kernel, "width"), self.integer(kernel, kernel.rows)
+        (column, row), (along, down) = kernel.place, steps
+        call = [
+            f"    for (int {row} = 0; {row} < {rows}; {down}) {{",
+            f"        for (int {column} = 0; {column} < {width}; {along}) {{",
+            f"            {name}({given});",
+            "        }",
+            "    }",
+        ]
         all_pixels = "wamnet_image" if kernel.role == DENOISE else name.removesuffix("_pixel")
         one = self.function(name, [*listed, *(f"int {place}" for place in item)])
         declared = [f"/* {said} */", *one[:-1], f"{one[-1]};", "", ALL_PIXELS]
@@ -309,15 +314,3 @@ class C(Arguments):
             return super().written(array, index, value, lanes)
         step = 1 if array.planes else array.shape[-1]
         return f"wamnet_write(&{self.read(array, index, lanes)}, {step}, {value}, left);"
-
-
-def loops(places: Two, ends: Two, steps: Two, call: str) -> list[str]:
-    """Return the loops over all pixels around a call."""
-    (column, row), (columns, rows), (along, down) = places, ends, steps
-    return [
-        f"    for (int {row} = 0; {row} < {rows}; {down}) {{",
-        f"        for (int {column} = 0; {column} < {columns}; {along}) {{",
-        f"            {call}",
-        "        }",
-        "    }",
-    ]

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 from ..core.profiles import CUDA_SINE
 from ..kernel.instructions import CUDA_GROUP, CUDA_VECTOR
-from ..kernel.interface import DENOISE, Interface
+from ..kernel.interface import DENOISE
+from ..kernel.kernel import Kernel
 from .c import C
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 from .openings import Arguments
 
 CLAMP = """\
@@ -57,7 +58,6 @@ class CUDA(Arguments):
     item = ("blockIdx.x * blockDim.x + threadIdx.x", "blockIdx.y * blockDim.y + threadIdx.y")
     scalars = {**Dialect.scalars, "uint32": "unsigned int"}
     clamp = "wamnet_clamp"
-    max_output_channels = 2**16
     group = (16, 8)
     grouped = {"heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'}
     launches = (
@@ -82,19 +82,17 @@ class CUDA(Arguments):
             f"{op}imum.{kind}": f"{op}({{0}}, {{1}})" for op in ("min", "max") for kind in ("int32", "uint32")
         },
     }
-    pixel, weight, store = C.pixel, C.weight, C.store
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+    def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function."""
-        if kernel.role != DENOISE:
-            return super().top(kernel, parts)
-        weights = parts.kernel.weights
-        top = [
-            CLAMP,
-            CUDA_VECTOR if weights.lanes > 1 else "",
-            CUDA_GROUP if weights.dtype == "int32" else "",
-        ]
-        return ["".join(top) + "\n".join(super().top(kernel, parts))]
+        weights = kernel.weights
+        if kernel.interface.role == DENOISE:
+            vectors = (
+                CUDA_VECTOR if weights.lanes > 1 else "",
+                CUDA_GROUP if weights.dtype == "int32" else "",
+            )
+            top = "".join((CLAMP, *vectors, top))
+        return super().top(kernel, top)
 
     def vector_kind(self, dtype: str, lanes: int) -> str:
         """Return the name of a vector type, which has the operators that sums need: CUDA's own have none."""

@@ -18,7 +18,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -61,19 +60,6 @@ NOTHING: Mapping[str, str] = {}
 
 LONG_TABLE, TABLE_ROW = 200, 8
 """Length above which a constant table is written in rows, and the numbers of a row."""
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What a kernel's first lines hold in addition to its interface.
-
-    `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must keep
-    the order of operations.
-    """
-
-    top: str
-    bounded: bool
-    kernel: Kernel
 
 
 class Dialect:
@@ -193,12 +179,18 @@ class Dialect:
         "bitwise_and": "{0} & {1}",
         "bitwise_xor": "{0} ^ {1}",
         "right_shift": "{0} >> {1}",
+        "remainder": "{0} % {1}",
+        "take": "{table}[{0}]",
         "select": "{0} ? {1} : {2}",
         "any": "{0}",
     }
 
-    def begin(self, kernel: Interface, parts: Parts) -> str:
-        """Return the text of a kernel up to its first statement."""
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
+        """Return the text of a kernel up to its first statement.
+
+        `top`: definitions and constant tables; `bounded`: an error bound is stated, and the language must
+        keep the order of operations.
+        """
         raise NotImplementedError
 
     def placed(self, home: str, weight: str) -> Dialect:

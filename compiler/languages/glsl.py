@@ -29,7 +29,7 @@ from ..kernel.interface import (
 )
 from ..kernel.interface import Array as Given
 from ..kernel.kernel import BATCH, Array, Kernel, Launch
-from .dialect import NOTHING, Dialect, Parts
+from .dialect import NOTHING, Dialect
 
 SHADER_VERSION = 430
 """The version of GLSL, and of OpenGL, that has compute shaders."""
@@ -143,33 +143,36 @@ class GLSL(Dialect):
         "convert": "{type}({0})",
     }
 
-    def begin(self, kernel: Interface, parts: Parts) -> str:
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
         """Return the text of a shader up to its first statement."""
-        weights = kernel.named(WEIGHTS)
-        read = [array for array in kernel.arrays if array.access != WRITE and array.name != SCENE_NUMBERS]
+        role, interface = kernel.interface.role, kernel.interface
+        weights = interface.named(WEIGHTS)
+        read = [array for array in interface.arrays if array.access != WRITE and array.name != SCENE_NUMBERS]
         samplers = [name for array in read if array is not weights for name in self.textures(array)]
-        colours = [name for array in kernel.written for name in self.textures(array)]
+        colours = [name for array in interface.written for name in self.textures(array)]
         names = [*samplers, *(["weight_texture"] if is_texture(weights) else [])]
-        lines = [self.preamble.format(unordered=self.unordered[parts.bounded]), parts.top]
+        lines = [self.preamble.format(unordered=self.unordered[bounded]), top]
         lines += [self.sampler.format(name=name, number=number) for number, name in enumerate(names)]
         if weights is not None and weights.home == BLOCK:
             lines.append(f"layout(std140) uniform Weights {{ vec4 weights[{weights.quads}]; }};")
         lines += [self.colour.format(name=name, number=number) for number, name in enumerate(colours)]
-        lines = [*filter(None, [*lines, *self.uniforms(kernel)]), ""]
+        lines = [*filter(None, [*lines, *self.uniforms(interface)]), ""]
         if is_texture(weights):
-            whole = self.vectors is not None and self.vectors.lanes > 1
+            whole = kernel.weights.lanes > 1
             lines += fetch("vec4", "texel", "place", "") if whole else fetch("float", "index", "texel", ".r")
             lines.append("")
         lines += [*self.above, self.main, "{"]
-        if kernel.role == DENOISE:
+        if role == DENOISE:
             first = samplers[0]
             lines += [
                 f"    int width = textureSize({first}, 0).x;",
                 f"    int height = textureSize({first}, 0).y;",
             ]
-        lines += [f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)]
-        start = "vec4(0.0, 0.0, 0.0, 1.0)" if kernel.role == DENOISE else "vec4(0.0)"
-        starts = colours if kernel.role != PATH else []
+        lines += [
+            f"    int {name} = {text};" for name, text in zip(interface.place, self.fragment, strict=True)
+        ]
+        start = "vec4(0.0, 0.0, 0.0, 1.0)" if role == DENOISE else "vec4(0.0)"
+        starts = colours if role != PATH else []
         return "\n".join([*lines, *(f"    {self.started}{name} = {start};" for name in starts)])
 
     def uniforms(self, kernel: Interface) -> list[str]:
@@ -261,17 +264,17 @@ class GLSLCompute(GLSL):
         "items. Row 0 is the TOP row of all images; half floats in them void the bound",
     )
 
-    def begin(self, kernel: Interface, parts: Parts) -> str:
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
         """Return the text of a shader up to its first statement."""
-        staged = bool(parts.kernel.launches)
+        staged = bool(kernel.launches)
         across, down = ("ITEMS", 1) if staged else ("GROUP_WIDTH", "GROUP_HEIGHT")
-        device = [s for s in parts.kernel.body if isinstance(s, Array) and s.space == "device"]
+        device = [s for s in kernel.body if isinstance(s, Array) and s.space == "device"]
         lines = [
             f"#version {SHADER_VERSION} core",
             "#define PRECISE precise",
-            parts.top,
+            top,
             f"layout(local_size_x = {across}, local_size_y = {down}) in;",
-            *(self.sampler.format(name=image.name) for image in kernel.images),
+            *(self.sampler.format(name=image.name) for image in kernel.interface.images),
             "layout(std430, binding = 0) restrict readonly buffer weight_buffer { vec4 w[]; };",
             "layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;",
         ]
@@ -283,7 +286,7 @@ class GLSLCompute(GLSL):
         if staged:
             return "\n".join([*lines, *(f"uniform int {each};" for each in BATCH), ""])
         return "\n".join(
-            [*lines, *self.group_memory(parts.kernel), "", *self.opened(kernel), *self.item_place()]
+            [*lines, *self.group_memory(kernel), "", *self.opened(kernel.interface), *self.item_place()]
         )
 
     def about(self, array: Given) -> str:

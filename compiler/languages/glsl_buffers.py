@@ -23,9 +23,7 @@ from ..kernel.interface import (
     Interface,
 )
 from ..kernel.kernel import Kernel
-from .c import C
 from .cuda import GROUPED
-from .dialect import Parts
 from .glsl import GLSL
 from .openings import Buffers
 
@@ -47,7 +45,7 @@ class Declared(Buffers):
     in a uniform block and any other; `accesses`: the words of one that is read, and of one that is written.
     """
 
-    numbered = True
+    numbered = declares_above = True
     group_size: Sequence[int | str] = GROUP
     integers_block: tuple[str, str, str]
     uniform: str
@@ -63,8 +61,6 @@ class Declared(Buffers):
     )
 
     entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
-    max_output_channels = 2**16
-    pixel, weight, store = C.pixel, C.weight, C.store
 
     def declared(self, kernel: Interface) -> list[str]:
         """Return the declarations of the integers and of all arrays; naga knows none that is only written."""
@@ -87,15 +83,11 @@ class Declared(Buffers):
             return "w", self.vector_kind(self.vectors.dtype, self.vectors.lanes)
         return array.name, self.scalars["float32"]
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+    def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function."""
-        above = [] if kernel.role == ENCODE else [parts.top]
-        words = [self.instructions] if parts.kernel.weights.dtype == "int32" else []
-        return [*above, *self.declared(kernel), *self.group_memory(parts.kernel), "", *words]
-
-    def in_function(self, kernel: Kernel) -> list[str]:
-        """Return nothing: a group's memory is declared above."""
-        return []
+        above = [] if kernel.interface.role == ENCODE else [top]
+        words = [self.instructions] if kernel.weights.dtype == "int32" else []
+        return [*above, *self.declared(kernel.interface), *self.group_memory(kernel), "", *words]
 
 
 class Vulkan(Declared):

@@ -1,7 +1,7 @@
 """Fragment shaders inside a host that owns the rest: Shadertoy's tabs and Godot's canvas items.
 
 1. A denoiser reads feature images, and writes the host's colour. Shadertoy can hold weights only
-   in constants [schedules/inlined.py]; Godot has a texture.
+   in constants [schedules/straight.py]; Godot has a texture.
 2. A noisy picture's features come from passes of their own, one feature each, since a pass of either host has
    one colour: a path kernel that encodes its sums [host_pass.py].
 

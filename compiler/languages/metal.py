@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 from ..core.profiles import SineContract
 from ..kernel.interface import BLOCK, READ, Array, Interface
+from ..kernel.kernel import Kernel
 from .c import C
 from .cuda import GROUPED
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 from .openings import Buffers
 
 ASSUMES = (
@@ -43,7 +44,6 @@ class Metal(Buffers):
     space = "device "
     linkage = "static inline "
     mixed_number = "((thread float *){name})[{index}]"
-    max_output_channels = 2**16
     group = (16, 8)
     grouped = {
         "threads": (
@@ -70,12 +70,16 @@ class Metal(Buffers):
         "minimum": "min({0}, {1})",
         "maximum": "max({0}, {1})",
     }
-    pixel, weight, store = C.pixel, C.weight, C.store
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+    def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function: the structure of the integers is a kernel's own."""
-        sizes = ["struct Size {", *(f"    {self.typed(name)};" for name in kernel.integers), "};", ""]
-        return [TOP, *super().top(kernel, parts), *sizes]
+        sizes = [
+            "struct Size {",
+            *(f"    {self.typed(name)};" for name in kernel.interface.integers),
+            "};",
+            "",
+        ]
+        return [TOP, *super().top(kernel, top), *sizes]
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

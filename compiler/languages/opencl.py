@@ -13,7 +13,7 @@ from ..kernel.instructions import BUILTINS, OPENCL_GROUP, OPENCL_ROW, OPENCL_TIL
 from ..kernel.interface import BLOCK, ENCODE, INTEGERS, PATH, TRAIN, Array, Interface
 from ..kernel.kernel import Kernel
 from .c_path import MASKS
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 from .openings import Arguments
 
 MASKED = """\
@@ -87,10 +87,6 @@ class OpenCL(Arguments):
     inside = ""
     paints = True
     item = ("get_global_id(0)", "get_global_id(1)")
-    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
-    weight = "weights[{index}]"
-    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
-    max_output_channels = 2**16
     native_sine = OPENCL_SINE
     table = "__constant {type} {name}[{count}] = {{{values}}};"
     operations = {
@@ -154,15 +150,15 @@ class OpenCL(Arguments):
             return f"__constant float *restrict {array.name} {size}"
         return super().array_argument(array)
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+    def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function."""
-        named, weights = super().top(kernel, parts), parts.kernel.weights
-        if kernel.role == PATH:
-            painter = [PAINTER.format(lanes=self.lanes)] if kernel.images and self.lanes > 1 else []
+        named, weights, interface = super().top(kernel, top), kernel.weights, kernel.interface
+        if interface.role == PATH:
+            painter = [PAINTER.format(lanes=self.lanes)] if interface.images and self.lanes > 1 else []
             return [f"#define LANES {self.lanes}", *named, *painter]
         if weights.lanes == 1:
             return named
-        if weights.dtype != "int32" or parts.kernel.group:
+        if weights.dtype != "int32" or kernel.group:
             return [BUILTINS, *([OPENCL_GROUP] if weights.dtype == "int32" else []), *named]
         # Which instruction there is depends on LANES.
         return [BUILTINS, *named, OPENCL_TILE.replace("int16", f"int{weights.lanes}")]

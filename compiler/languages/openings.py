@@ -12,7 +12,7 @@ from copy import copy
 
 from ..kernel.interface import BLOCK, DENOISE, PATH, READ, RESULT, UNSIGNED, WEIGHTS, Array, Interface
 from ..kernel.kernel import Expr, Kernel, Launch, Type
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 
 OWN = (("y", "x"), ("row", "column"))
 """Texts of an item's own row and column [`Interface.place`]."""
@@ -23,37 +23,37 @@ class Buffers(Dialect):
 
     `size`: what is before the name of an integer. `long`: the type of a place in memory, if it is not that
     of other integers. `space`: what is before the type of weights in memory, where pointers have types.
+    `declares_above`: a group's memory is declared above the function.
     """
 
     item: tuple[str, str]
+    pixel = "image_{image}[({row} * width + {column}) * {channels} + {c}]"
+    weight = "weights[{index}]"
+    store = "result[({row} * width + {column}) * {channels} + {i}] = {value};"
+    max_output_channels = 2**16
     declares_memory = True
     size: str = ""
     long: str = ""
     space: str | None = None
     are_aligned = True
+    declares_above = False
 
-    def begin(self, kernel: Interface, parts: Parts) -> str:
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
         """Return the text of a kernel up to its first statement."""
-        if kernel.role != PATH:
-            return "\n".join(self.of_kernel(kernel, parts, parts.kernel))
-        return "\n".join([*self.top(kernel, parts), *self.head(kernel), *self.opening(kernel)])
-
-    def of_kernel(self, interface: Interface, parts: Parts, kernel: Kernel) -> list[str]:
-        """Return the lines of a kernel that is data, up to its first statement."""
+        interface, above = kernel.interface, self.top(kernel, top)
         if kernel.launches:
-            return self.top(interface, parts)
+            return "\n".join(above)
         sizes = [f"    {self.index(n, f'{self.size}{n}')}" for n in interface.integers if self.size]
         vectors = self.weights_as_vectors(kernel.weights)
-        if kernel.group is None:
+        if interface.role == PATH:
+            opening = self.opening(interface)
+        elif kernel.group is None:
             guard = self.guard(kernel.place, ("width", "height"), [self.step(each) for each in kernel.step])
             opening = [*sizes, *guard, *vectors, *self.strides(interface)]
         else:
-            opening = [*self.in_function(kernel), *vectors, *sizes, *self.item_place()]
-        return [*self.top(interface, parts), *self.head(interface), *opening]
-
-    def in_function(self, kernel: Kernel) -> list[str]:
-        """Return the declarations of a group's memory, where they are inside the function."""
-        return [f"    {line}" for line in self.group_memory(kernel)]
+            memory = [] if self.declares_above else [f"    {line}" for line in self.group_memory(kernel)]
+            opening = [*memory, *vectors, *sizes, *self.item_place()]
+        return "\n".join([*above, *self.head(interface), *opening])
 
     def launched(self, kernel: Kernel, launch: Launch, counts: Sequence[str]) -> list[str]:
         """Return the first lines of a launch of a denoiser, of which no item is beyond the grid."""
@@ -77,9 +77,9 @@ class Buffers(Dialect):
         vector = f"{self.space}const {self.vector_kind(kind.dtype, kind.lanes)}"
         return [f"    {vector} *w = ({vector} *)weights;"]
 
-    def top(self, kernel: Interface, parts: Parts) -> list[str]:
+    def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function."""
-        return [parts.top] if parts.top or kernel.role == DENOISE else []
+        return [top] if top or kernel.interface.role == DENOISE else []
 
     def head(self, kernel: Interface) -> list[str]:
         """Return the lines of the function up to its brace."""

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,7 +32,7 @@ from ..kernel.interface import (
 )
 from ..kernel.interface import Array as Memory
 from ..kernel.sizes import handed_on
-from .dialect import Dialect, Parts
+from .dialect import Dialect
 
 BINDING: Mapping[str, int] = {
     "||": 2, "&&": 3, "|": 4, "^": 5, "&": 6, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8,
@@ -46,8 +46,8 @@ CHOICE, UNARY, ATOM = 1, 12, 13
 INFIX = re.compile(r"^\{\d\} (\S+) \{\d\}$|^1\.0f (/) \{0\}$")
 """A template of an operator of two operands."""
 
-SIMPLE = re.compile(r"[^(]*\((\{\d\})(, \{\w+\})*\)")
-"""A template of a function whose arguments stand alone."""
+SIMPLE = re.compile(r"[^([]*[([](\{\d\})(, \{\w+\})*[)\]]")
+"""A template of a function or a table whose arguments stand alone."""
 
 
 def binding(template: str) -> int:
@@ -57,15 +57,6 @@ def binding(template: str) -> int:
     if " ? " in template and not template.endswith(")"):
         return CHOICE
     return UNARY if template[0] in "-!" else ATOM
-
-
-def _accesses(body: tree.Body) -> Iterator[tuple[str, tree.Type]]:
-    """Yield the arrays that statements read and write, and the types of what is read and written."""
-    for statement in tree.walk(body):
-        if isinstance(statement, tree.Store):
-            yield statement.array, statement.value.type
-        for value in tree.values(statement):
-            yield from ((each.value, each.type) for each in tree.parts(value) if each.op == "load")
 
 
 NO_WEIGHTS = np.zeros(0, np.float32)
@@ -101,17 +92,14 @@ class Renderer:
         self.readers: dict[str, None] = {}
         bound, path = kernel.interface, kernel.interface.role == PATH
         self.integers = {each: self.dialect.integer(bound, each) for each in bound.integers if path}
-        everything = [*kernel.body, *(s for f in kernel.functions for s in f.body)]
-        self.arrays = {s.name: s for s in tree.walk(tuple(everything)) if isinstance(s, tree.Array)}
+        everything = (*kernel.body, *(s for f in kernel.functions for s in f.body))
+        self.arrays = {s.name: s for s in tree.walk(everything) if isinstance(s, tree.Array)}
         if bound.role == TRAIN:
             self.arrays |= {
                 a.name: tree.Array(a.name, tree.Type(a.dtype, a.lanes), (1,), "device") for a in bound.arrays
             }
-        self.mixed = {name for name, kind in _accesses(tuple(everything)) if self._narrower(name, kind)}
-
-    def _narrower(self, array: str, kind: tree.Type) -> bool:
-        """Return whether an access is to a component of an array of vectors by its own index."""
-        return array in self.arrays and kind.lanes < self.arrays[array].type.lanes
+        widths = {name: array.type.lanes for name, array in self.arrays.items()}
+        self.mixed = {a for a, kind in tree.accesses(everything) if kind.lanes < widths.get(a, 0)}
 
     def source(self, header: Sequence[str]) -> str:
         """Return the whole source, under the lines of a comment."""
@@ -122,9 +110,10 @@ class Renderer:
         if kernel.launches:
             self.depth = 0
         self.body(kernel.body)
-        above = [*map(self.constant, kernel.constants), *self.tables(), *self.readers, *self.helpers()]
+        tables = [dialect.table_declaration(name, array) for name, array in kernel.tables]
+        above = [*map(self.constant, kernel.constants), *tables, *self.readers, *self.helpers()]
         top = "\n".join([*above, *functions])
-        begin = dialect.begin(kernel.interface, Parts(top, self.bounded, kernel))
+        begin = dialect.begin(kernel, top, self.bounded)
         comment = ["/*", *(f" * {line}".rstrip() for line in header), " */"]
         end = ["#endif"] if dialect.staged else []
         end = end if kernel.launches else [dialect.ends[kernel.interface.role]]
@@ -137,10 +126,6 @@ class Renderer:
         value = f"({value})" if constant.value.args else value
         line = self.dialect.define.format(name=constant.name, value=value)
         return f"{line} /* {constant.comment} */" if constant.comment else line
-
-    def tables(self) -> list[str]:
-        """Return the declarations of constant tables."""
-        return [self.dialect.table_declaration(name, array) for name, array in self.kernel.tables]
 
     def helpers(self) -> list[str]:
         """Return the functions that operations on vectors call."""
@@ -227,16 +212,6 @@ class Renderer:
     def _clamp(self, value: tree.Expr) -> tuple[str, int]:
         """Return an index within limits."""
         return f"{self.dialect.clamp}({', '.join(self.text(each) for each in value.args)})", ATOM
-
-    def _remainder(self, value: tree.Expr) -> tuple[str, int]:
-        """Return the remainder of indices."""
-        return self._filled("{0} % {1}", value)
-
-    def _take(self, value: tree.Expr) -> tuple[str, int]:
-        """Return an entry of a table."""
-        if value.type.lanes > 1:
-            return self._filled(self.dialect.vector_operations["take"], value)
-        return f"{value.value}[{self.text(value.args[0])}]", ATOM
 
     def _lanes(self, value: tree.Expr) -> tuple[str, int]:
         """Return the numbers of the lanes."""

@@ -28,7 +28,8 @@ from ..core import ir, profiles
 from ..core.passes import pipeline
 from ..core.profiles import Profile
 from ..kernel import interface
-from ..languages.dialect import Dialect, Parts
+from ..kernel.kernel import Kernel
+from ..languages.dialect import Dialect
 from ..languages.glsl_es import GLSLES
 from ..languages.hosts import NO_PRECISE, GodotDenoise
 from ..languages.listing import Listing
@@ -225,18 +226,19 @@ void mainImage(out vec4 fragColor, in vec2 fragCoord)
     takes = "ivec2 at, int width, int height, uint seed_number"
     uniforms_of_host: tuple[str, ...] = ()
 
-    def begin(self, kernel: interface.Interface, parts: Parts) -> str:
+    def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
         """Return the text of a shader up to its first statement."""
+        places = zip(kernel.interface.place, self.fragment, strict=True)
         lines = [
             *([self.preamble] if self.preamble else []),
-            parts.top,
+            top,
             *self.uniforms_of_host,
             "",
             f"vec4 wamnet_trace({self.takes})",
             "{",
             "    vec4 image = vec4(0.0, 0.0, 0.0, 1.0);",
             *ONE_SAMPLE,
-            *(f"    int {name} = {text};" for name, text in zip(kernel.place, self.fragment, strict=True)),
+            *(f"    int {name} = {text};" for name, text in places),
         ]
         return "\n".join(lines)
 

@@ -25,20 +25,15 @@ from .languages.listing import Listing
 from .languages.metal import Metal
 from .languages.opencl import LANES, OpenCL
 from .languages.wgsl import WGSL
+from .schedules.bytes import Dot, GroupDot
+from .schedules.fft import Fourier
+from .schedules.group import Grouped
 from .schedules.names import parse
 from .schedules.passes import FourierPasses
-from .schedules.schedules import (
-    Dot,
-    Fourier,
-    GroupDot,
-    Grouped,
-    Inline,
-    Packed,
-    Plain,
-    Printed,
-    Schedule,
-    Tile,
-)
+from .schedules.plain import Packed, Plain, Printed
+from .schedules.schedules import Schedule
+from .schedules.straight import Inline
+from .schedules.tile import Tile
 
 HERE, SHOWN = "here", "shown"
 """Whether an executor runs a target's kernels, and one that the demo and the benchmark show."""
@@ -96,51 +91,18 @@ TILES = {
 FFT_IDEA = "the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {}"
 """What an FFT schedule says of itself."""
 
+DOT_IDEA = "products of bytes, four at a time, of a network of integers"
+"""What the schedule of bytes for processors says of itself."""
+
 PASSES_IDEA = (
     "the sums over the window by FFT, in passes: an item is a line, a frequency or a pixel of a tile"
 )
 """What the FFT schedule in passes says of itself."""
 
 
-def tiles(dialect: Dialect) -> tuple[Schedule, ...]:
-    """Return the schedules for processors: register tiles in each width of vector that the language has."""
-    return tuple(
-        Tile(dialect, name, idea, lanes=lanes, pixels=pixels)
-        for name, (pixels, idea) in TILES.items()
-        if (lanes := parse(name)[1]) in dialect.tiles and (pixels > 1 or dialect.wide)
-    )
-
-
-def ffts(dialect: Dialect) -> tuple[Schedule, ...]:
-    """Return the schedules of transforms, for languages whose functions take places in arrays.
-
-    Two tiles of 32 points side by side are as fast as four and take half the memory; one takes a third more
-    time: the weights pass by twice as often. The other layers have the register tiles of the tiled schedules.
-    """
-    return tuple(
-        Fourier(
-            dialect,
-            f"fft:{lanes}",
-            FFT_IDEA.format(lanes),
-            instead=f"tile:{lanes}",
-            lanes=lanes,
-            pixels=TILES[f"tile:{lanes}"][0],
-            points=32,
-            tiles=2,
-        )
-        for lanes in ((16, 8, 4) if dialect.transforms else ())
-    )
-
-
 def passes(dialect: Dialect, instead: str = "group:4") -> tuple[Schedule, ...]:
     """Return the schedule of transforms for languages whose functions do not take such places."""
     return (FourierPasses(dialect, "fftpasses:32", PASSES_IDEA, instead=instead, points=32),)
-
-
-def dots(dialect: Dialect) -> tuple[Schedule, ...]:
-    """Return the schedule of bytes for processors."""
-    idea = "products of bytes, four at a time, of a network of integers"
-    return (Dot(dialect, "dot:16", idea, lanes=16, pixels=14),) if dialect.dot_of_bytes else ()
 
 
 def groups(dialect: Dialect) -> tuple[Schedule, ...]:
@@ -152,7 +114,7 @@ def groups(dialect: Dialect) -> tuple[Schedule, ...]:
         idea = f"the same with {pixels} pixels an item, which share each weight"
         found.append(Grouped(dialect, f"group:{pixels}", idea, pixels=pixels, instead="group:1", **of))
     if dialect.words:
-        idea = f"group:4 with products of bytes, four at a time, of a network of integers: {dialect.words}"
+        idea = f"group:4 with {DOT_IDEA}: {dialect.words}"
         found.append(GroupDot(dialect, "groupdot:4", idea, pixels=4, instead="group:4", **of))
     return tuple(found)
 
@@ -164,10 +126,25 @@ def _of(dialect: Dialect, *ladder: Schedule) -> Language:
 
 
 def processor(dialect: Dialect) -> Language:
-    """Return the target of a language for processors, and for graphics processors where it has groups."""
-    shared = groups(dialect) if dialect.group else ()
-    spectra = ffts(dialect) if dialect.transforms else passes(dialect)
-    return _of(dialect, *tiles(dialect), *spectra, *dots(dialect), *shared)
+    """Return the target of a language for processors, and for graphics processors where it has groups.
+
+    There are register tiles in each width of vector that the language has, transforms where its functions
+    take places in arrays, and bytes. Two tiles of 32 points side by side are as fast as four and take half
+    the memory; one takes a third more time: the weights pass by twice as often.
+    """
+    found: list[Schedule] = []
+    for name, (pixels, idea) in TILES.items():
+        lanes = parse(name)[1]
+        if lanes in dialect.tiles and (pixels > 1 or dialect.wide):
+            found.append(Tile(dialect, name, idea, lanes=lanes, pixels=pixels))
+    for lanes in dialect.tiles if dialect.transforms else ():
+        tile = f"tile:{lanes}"
+        sizes = {"lanes": lanes, "pixels": TILES[tile][0], "points": 32, "tiles": 2}
+        found.append(Fourier(dialect, f"fft:{lanes}", FFT_IDEA.format(lanes), instead=tile, **sizes))
+    found += () if dialect.transforms else passes(dialect)
+    if dialect.dot_of_bytes:
+        found.append(Dot(dialect, "dot:16", DOT_IDEA, lanes=16, pixels=14))
+    return _of(dialect, *found, *(groups(dialect) if dialect.group else ()))
 
 
 QUAD, PLAIN_INDEX = "weights[({index}) / 4][({index}) % 4]", "weights[{index}]"

@@ -14,7 +14,7 @@ counts four bytes as one number.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,21 +27,20 @@ from ..kernel import kernel as tree
 from ..kernel.interface import WEIGHTS
 from ..kernel.kernel import apply, const, load, name, splat
 from ..proof import whole
-from .common import kernel_gather, loop, weight
-from .group import MOST_CHANNELS, Group
+from .common import kernel_gather, loop, readers_of_window, weight
+from .group import MOST_CHANNELS, Group, Grouped
 from .straight import VECTOR
 from .tile import (
     COUNTER,
-    DY,
     LANES,
     PATCH_WIDTH,
     PIXELS,
     Blocks,
     P,
+    Tile,
     Tiled,
     blocks_of,
     matrices,
-    readers_of_window,
     stored,
 )
 
@@ -79,12 +78,6 @@ def refused_by_bytes(program: Program) -> str:
     return ""
 
 
-def matrix_twice(program: Program) -> str:
-    """Return a refusal where a matrix is applied twice."""
-    names = [node["weight"] for node in program.nodes if node.op == "affine"]
-    return "a matrix is applied twice" if len(set(names)) < len(names) else ""
-
-
 def dot4(weights: tree.Expr, four: tree.Expr) -> tree.Expr:
     """Return the four products of bytes in each lane of words of weights, added up."""
     return tree.Expr("dot4", (weights, four), weights.type)
@@ -110,41 +103,19 @@ def runs_of(program: Program, parameter: str) -> list[list[int]]:
     ]
 
 
-def bytes_stored(program: Program, lanes: int, vectors: int) -> Mapping[str, NDArray[np.float32]]:
-    """Return all weights as they are stored, bit by bit, and where each matrix' sums begin."""
-    found: dict[str, NDArray[np.float32]] = {}
-    for key, array in weights.weights(program).items():
-        blocks = blocks_of(len(array), lanes, vectors)
-        filled = np.zeros((blocks.total * lanes, *array.shape[1:]), np.float32)
-        filled[: len(array)] = array
-        if array.ndim != 2:
-            found[key] = filled
-            continue
-        runs = [np.pad(filled[:, run], [(0, 0), (0, -len(run) % FOUR)]) for run in runs_of(program, key)]
-        fours = np.concatenate(runs, axis=1).reshape(len(filled), -1, FOUR).astype(np.int8)
-        ordered = fours.reshape(blocks.count, -1, fours.shape[1], FOUR).transpose(0, 2, 1, 3)
-        found[key] = np.ascontiguousarray(ordered).view("<f4")[..., 0]
-        found[key + START] = (-MIDDLE * filled.astype(np.int64).sum(axis=1)).astype("<i4").view("<f4")
-    return found
-
-
 class Bytes(Tiled):
     """Builds the tiled kernel of bytes."""
 
     def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
         super().__init__(program, slots, **parameters)
-        self.sum_type = tree.INT.of(self.lanes)
-
-    def weight_type(self) -> tree.Type:
-        """Return the type of an element of the weights."""
-        return self.sum_type
+        self.weights, self.part = tree.INT.of(self.lanes), ""
 
     def read(self, index: int) -> tree.Expr:
         """Return element `i` of another group's value; the weights are words, whose bits may be floats."""
         found = super().read(index)
         if found.value != WEIGHTS or not self.wide:
             return found
-        return tree.Expr("bits", (weight(found.args[0], self.sum_type),), self.vector)
+        return tree.Expr("bits", (weight(found.args[0], self.weights),), self.vector)
 
     def patch(self, image: Image, size: tree.Expr) -> tree.Array:
         """Return the declaration of an image's patch; a last step may read three bytes beyond."""
@@ -166,7 +137,7 @@ class Bytes(Tiled):
 
     def start(self, node: Node, vector: tree.Expr) -> tree.Expr:
         """Return what a sum starts with."""
-        return weight(self.offset(f"{node['weight']}{START}") // self.lanes + vector, self.sum_type)
+        return weight(self.offset(f"{node['weight']}{START}") // self.lanes + vector, self.weights)
 
     def ended(self, total: tree.Expr) -> tree.Expr:
         """Return a sum as a value of the layer."""
@@ -176,43 +147,65 @@ class Bytes(Tiled):
         """Return the rows of weights of an affine map: fours of inputs."""
         return sum(-(-len(run) // FOUR) for run in runs_of(self.program, str(node["weight"])))
 
-    def layer(self, blocks: Blocks, first: tree.Expr, source: int, numbers: int) -> list[tree.Statement]:
+    def layer(self, blocks: Blocks, first: tree.Expr, source: int, count: int) -> list[tree.Statement]:
         """Return the bytes of a layer's values, and their products."""
-        count, held = PIXELS * self.total(source) * LANES, self.total(source)
+        size, array = PIXELS * self.total(source) * LANES, f"bytes{source}"
         byte = self.copied(load(f"v{source}", COUNTER))
-        copy = loop("i", count, tree.Store(f"bytes{source}", (COUNTER,), byte))
-        place = P * held * LANES
+        place = P * self.total(source) * LANES
         return [
-            tree.Array(f"bytes{source}", tree.BYTE, (count,)),
-            copy,
-            self.of_fours(blocks, -(-numbers // FOUR), first, f"bytes{source}", place),
+            tree.Array(array, tree.BYTE, (size,)),
+            loop("i", size, tree.Store(array, (COUNTER,), byte)),
+            self.multiplied(blocks, const(-(-count // FOUR)), first, "sum", array, place),
         ]
 
-    def windowed(self, blocks: Blocks, first: tree.Expr) -> list[tree.Statement]:
-        """Return the sums over the window, row by row of an image's taps."""
-        found: list[tree.Statement] = []
-        rows = 0
-        for image in self.gather.images:
-            count = -(-self.gather.columns * image.channels // FOUR)
-            place = (DY * PATCH_WIDTH + P) * image.channels
-            at = first + (DY * count + rows) * blocks.vectors
-            found.append(
-                loop("dy", self.rows, self.of_fours(blocks, count, at, f"patch_{image.name}", place))
-            )
-            rows += self.gather.rows * count
+    def steps(self, channels: int) -> tuple[int, tree.Expr]:
+        """Return the fours of a row of an image's taps."""
+        count = -(-self.gather.columns * channels // FOUR)
+        return count, const(count)
+
+    def factor(self, array: str, place: tree.Expr) -> tuple[list[tree.Let], tree.Expr]:
+        """Return the four bytes of step `i` at a pixel."""
+        return [], load(array, place + FOUR * COUNTER, kind=tree.BYTE.of(FOUR))
+
+    def product(self, weights: tree.Expr, factor: tree.Expr) -> tree.Expr:
+        """Return what words of weights add to a sum."""
+        return dot4(weights, factor)
+
+
+class Dot(Tile):
+    """A tile whose products are of bytes."""
+
+    order = (
+        "matrices block by block of neurons: blocks x fours of inputs x neurons x 4 bytes with a sign; "
+        "inputs that are the window go image by image, then row of taps by row, each filled up to fours; "
+        f"{START}: where a matrix' sums begin, integers of 32 bits"
+    )
+    bytewise = True
+    instead = "tile:16"
+    builder = Bytes
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        names = [node["weight"] for node in program.nodes if node.op == "affine"]
+        twice = "a matrix is applied twice" if len(set(names)) < len(names) else ""
+        return refused_by_bytes(program) or twice or super().refusal(program)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        found: dict[str, NDArray[np.float32]] = {}
+        for key, array in weights.weights(program).items():
+            blocks = blocks_of(len(array), self.lanes, self.vectors)
+            filled = np.zeros((blocks.total * self.lanes, *array.shape[1:]), np.float32)
+            filled[: len(array)] = array
+            if array.ndim != 2:
+                found[key] = filled
+                continue
+            runs = [np.pad(filled[:, run], [(0, 0), (0, -len(run) % FOUR)]) for run in runs_of(program, key)]
+            fours = np.concatenate(runs, axis=1).reshape(len(filled), -1, FOUR).astype(np.int8)
+            ordered = fours.reshape(blocks.count, -1, fours.shape[1], FOUR).transpose(0, 2, 1, 3)
+            found[key] = np.ascontiguousarray(ordered).view("<f4")[..., 0]
+            found[key + START] = (-MIDDLE * filled.astype(np.int64).sum(axis=1)).astype("<i4").view("<f4")
         return found
-
-    def of_fours(
-        self, blocks: Blocks, count: int, first: tree.Expr, array: str, place: tree.Expr
-    ) -> tree.Statement:
-        """Return the loop over fours of inputs: each one's weights, times the bytes at each pixel."""
-        each = range(blocks.vectors)
-        row = [tree.Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.sum_type)) for j in each]
-        four = load(array, place + FOUR * COUNTER, kind=tree.BYTE.of(FOUR))
-        adds = [
-            tree.Store("sum", (P, const(j)), dot4(name(f"w{j}", self.sum_type), four), add=True) for j in each
-        ]
-        return loop("i", count, *row, self.each_pixel(*adds))
 
 
 # ---- graphics processors ---------------------------------------------------------------------------------
@@ -231,85 +224,44 @@ def words_of(program: Program, parameter: str) -> NDArray[np.intp]:
     return np.concatenate([np.where(held < 0, -1, held + taps).reshape(-1, FOUR) for held in chunks])
 
 
-def words_stored(program: Program) -> Mapping[str, NDArray[np.float32]]:
-    """Return all weights as they are stored; the bytes of a matrix are there bit by bit."""
-    found: dict[str, NDArray[np.float32]] = {}
-    for key, array in weights.weights(program).items():
-        if array.ndim != 2:
-            found[key] = stored(program, key, FOUR, len(array))
-            continue
-        filled = np.zeros((-(-len(array) // FOUR) * FOUR, array.shape[1] + 1), np.int8)
-        filled[: len(array), :-1] = array  # the last column, which -1 means, is of zeros
-        words = filled[:, words_of(program, key)].transpose(1, 0, 2)
-        found[key] = np.ascontiguousarray(words).view("<f4")[None, ..., 0]
-    return found
-
-
-def planes_of(program: Program) -> int:
-    """Return the most words of a pixel that are in the tile at once."""
-    return min(MOST_CHANNELS, -(-kernel_gather(program).channels // FOUR))
-
-
-def words_at_once(program: Program) -> list[int]:
-    """Return the rows of words of each affine map that are in straight code."""
-    sources = [program.nodes[node.args[0]] for node in program.nodes if node.op == "affine"]
-    return [planes_of(program) if s.op == "input" else -(-s.type.shape[0] // FOUR) for s in sources]
-
-
 class GroupBytes(Group):
     """Builds the grouped kernel of bytes."""
 
     element = tree.INT
     weights = tree.INT.of(FOUR)
+    part = ""
 
-    def planes(self) -> int:
-        """Return the most words of a pixel that are in the tile at once."""
-        return planes_of(self.program)
-
-    def parameter(self, node: Node, vector: int) -> tree.Expr:
-        """Return four values of a parameter that is a vector."""
-        return tree.Expr("bits", (weight(self.offset(node["name"]) // 4 + vector, self.weights),), VECTOR)
+    def tiles(self) -> list[list[tree.Expr]]:
+        """Return the words of a pixel that are in the tile at once, one tile after another."""
+        values = [value for tile in super().tiles() for value in tile]
+        values += [const(0.0)] * (-len(values) % FOUR)
+        words = [packed(values[i : i + FOUR]) for i in range(0, len(values), FOUR)]
+        return [words[begin : begin + MOST_CHANNELS] for begin in range(0, len(words), MOST_CHANNELS)]
 
     def affine(self, index: int, node: Node) -> list[tree.Statement]:
         """Return v = W x for all pixels: sums of integers, which become floats at the end."""
-        source, first = node.args[0], self.offset(node["weight"]) // 4
-        zero = splat(const(0), FOUR)
         found: list[tree.Statement] = [self.mapped(index, node)]
-        found += [
-            tree.Array(f"s{index}_{p}_{j}", self.weights, value=zero, register=True)
-            for p, j in self.places(index)
-        ]
-        if self.program.nodes[source].op == "input":
-            found += self.of_window(index, first)
-        else:
-            for k in range(-(-self.program.nodes[source].type.shape[0] // FOUR)):
-                names = [f"b{index}_{p}_{k}" for p in range(self.pixels)]
-                for p, each in enumerate(names):
-                    found.append(tree.Let(each, packed([self.at(source, p, k).lane(c) for c in range(FOUR)])))
-                sums = self.names(f"s{index}", index)
-                found += self.multiplied(
-                    self.weights_row(index, const(first), k), sums, list(map(name, names))
-                )
-        for p, j in self.places(index):
-            total = apply("convert", name(f"s{index}_{p}_{j}", self.weights), value="float32")
-            found.append(tree.Array(self.variable(index, p, j), VECTOR, value=total))
+        names = [(self.variable(self.total(index), p, j), p, j) for p, j in self.places(index)]
+        zero = splat(const(0), FOUR)
+        found += [tree.Array(each, self.weights, value=zero, register=True) for each, _, _ in names]
+        found += self.additions(index, node)
+        for each, p, j in names:
+            value = apply("convert", name(each, self.weights), value="float32")
+            found.append(tree.Array(self.variable(f"v{index}", p, j), VECTOR, value=value))
         return found
 
-    def of_window(self, index: int, first: int) -> list[tree.Statement]:
-        """Return the products of all taps with the weights from vector `first` on."""
-        values = [self.pixel(image, c) for image in self.gather.images for c in range(image.channels)]
-        values += [const(0.0)] * (-len(values) % FOUR)
-        words = [packed(values[i : i + FOUR]) for i in range(0, len(values), FOUR)]
-        found: list[tree.Statement] = []
-        for begin in range(0, len(words), MOST_CHANNELS):
-            held = words[begin : begin + MOST_CHANNELS]
-            found += self.staged(held)
-            sums = self.names(f"s{index}", index)
-            found.append(loop("dy", self.rows, self.row_of_taps(index, first, len(held), sums)))
-            first += self.gather.rows * self.gather.columns * len(held) * self.vectors(index)
-        return found
+    def total(self, index: int) -> str:
+        """Return what the sums of a layer are called."""
+        return f"s{index}"
 
-    def product(self, weight: tree.Expr, factor: tree.Expr, total: str) -> tree.Expr:
+    def inputs(self, index: int, source: int) -> Iterator[tuple[list[tree.Let], list[tree.Expr]]]:
+        """Yield the words of a layer's values, at each pixel, and what makes them."""
+        for k in range(self.vectors(source)):
+            names = [f"b{index}_{p}_{k}" for p in range(self.pixels)]
+            fours = [packed([self.at(source, p, k).lane(c) for c in range(FOUR)]) for p in range(self.pixels)]
+            yield list(map(tree.Let, names, fours)), list(map(name, names))
+
+    def product(self, weight: tree.Expr, factor: tree.Expr) -> tree.Expr:
         """Return what a word of weights adds to a sum."""
         return dot4(weight, factor)
 
@@ -317,3 +269,43 @@ class GroupBytes(Group):
 def packed(values: Sequence[tree.Expr]) -> tree.Expr:
     """Return four values as the bytes of a word, the first one the lowest."""
     return tree.Expr("pack4", tuple(values), tree.INT)
+
+
+class GroupDot(Grouped):
+    """A tile of words for each group of items."""
+
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices words x neurons, a word being four inputs "
+        "as bytes with a sign, the first one the lowest; of a matrix that reads the window the channels of "
+        f"all images make words that are filled up with zeros, at most {MOST_CHANNELS} of them at a time tap "
+        "by tap in rows, then word by word"
+    )
+    bytewise = True
+    builder = GroupBytes
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        return refused_by_bytes(program) or super().refusal(program)
+
+    def beyond_tile(self, program: Program) -> str:
+        """Return nothing: the words of all channels are in tiles, some after others."""
+        return ""
+
+    def at_once(self, program: Program, inputs: int | None) -> int:
+        """Return the rows of words that are in straight code: for so many inputs, or of a tap."""
+        if inputs is None:
+            return min(MOST_CHANNELS, -(-kernel_gather(program).channels // FOUR))
+        return -(-inputs // FOUR)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        found: dict[str, NDArray[np.float32]] = {}
+        for key, array in weights.weights(program).items():
+            if array.ndim != 2:
+                found[key] = stored(program, key, FOUR, len(array))
+                continue
+            filled = np.zeros((-(-len(array) // FOUR) * FOUR, array.shape[1] + 1), np.int8)
+            filled[: len(array), :-1] = array  # the last column, which -1 means, is of zeros
+            words = filled[:, words_of(program, key)].transpose(1, 0, 2)
+            found[key] = np.ascontiguousarray(words).view("<f4")[None, ..., 0]
+        return found

@@ -17,14 +17,11 @@ from ..core.ir import Gather, Image, Node, Program, users
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
 from ..kernel import kernel as tree
-from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
+from ..kernel.interface import IMAGE, WEIGHTS, denoiser
 from ..kernel.kernel import apply, const, expr, load, name, splat
 
 X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
 """An item's first pixel, and the size of the images."""
-
-ROWS, COLUMNS = name("WINDOW_ROWS"), name("WINDOW_COLUMNS")
-"""Taps of a window along both axes: one name where it is square [`Nest.window`]."""
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -46,6 +43,12 @@ def output_channels(program: Program) -> int:
     """Return the number of channels of the only output."""
     shape = program.nodes[program.outputs[0][1]].type.shape
     return shape[0] if shape else 1
+
+
+def readers_of_window(program: Program) -> list[Node]:
+    """Return the nodes that read the window."""
+    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
+    return [node for node in program.nodes if inputs & set(node.args)]
 
 
 def groups_of(program: Program) -> list[tuple[int, ...]]:
@@ -124,6 +127,29 @@ class Nest:
         """Return the kernel of the program."""
         raise NotImplementedError
 
+    def all_groups(self) -> list[tree.Statement]:
+        """Return the statements of all groups of nodes, in order."""
+        found: list[tree.Statement] = []
+        for group in self.groups:
+            index, node = group[0], self.program.nodes[group[0]]
+            if node.op == "input":
+                found += self.materialised(index)
+            else:
+                found += self.affine(index, node) if node.op == "affine" else self.elementwise(group)
+        return found
+
+    def materialised(self, index: int) -> list[tree.Statement]:
+        """Return the copy of the window into an array, if something else than affine maps reads it."""
+        return []
+
+    def affine(self, index: int, node: Node) -> list[tree.Statement]:
+        """Return v = W x + b, x being the images around the pixels, or a layer."""
+        raise NotImplementedError
+
+    def elementwise(self, group: tuple[int, ...]) -> list[tree.Statement]:
+        """Return the statements of any other group."""
+        raise NotImplementedError
+
     @cached_property
     def gather(self) -> Gather:
         """Return how the window is filled."""
@@ -132,16 +158,13 @@ class Nest:
     def window(self) -> list[tree.Constant]:
         """Return the constants of the window."""
         gather, pixel = self.gather, "the tap that lies on the pixel itself"
+        names = ("WINDOW_ROWS", "WINDOW_COLUMNS", "CENTRE_ROW", "CENTRE_COLUMN")
         if gather.axes == (0, 1):
-            self.rows = self.columns = name("WINDOW_SIZE")
-            self.row = self.column = name("WINDOW_CENTRE")
-        else:
-            self.rows, self.columns = ROWS, COLUMNS
-            self.row, self.column = name("CENTRE_ROW"), name("CENTRE_COLUMN")
-        found = {self.rows.value: (gather.rows, ""), self.columns.value: (gather.columns, "")}
-        found |= {self.row.value: (gather.rows // 2, pixel)}
-        found.setdefault(self.column.value, (gather.columns // 2, ""))
-        return [tree.Constant(name, const(value), text) for name, (value, text) in found.items()]
+            names = ("WINDOW_SIZE", "WINDOW_SIZE", "WINDOW_CENTRE", "WINDOW_CENTRE")
+        self.rows, self.columns, self.row, self.middle = map(name, names)
+        found = {names[0]: gather.rows, names[1]: gather.columns, names[2]: (gather.rows // 2, pixel)}
+        found.setdefault(names[3], gather.columns // 2)
+        return named(**found)
 
     def kernel(
         self, body: Sequence[tree.Statement], constants: Sequence[tree.Constant], **more: object
@@ -177,6 +200,22 @@ class Nest:
             found[index] = value if self.fuses(index) else name(f"t{index}", value.type)
             lines += [] if self.fuses(index) else [tree.Let(f"t{index}", value, kept=True)]
         return lines
+
+    def array(self, index: int) -> tree.Array:
+        """Return the declaration of a value's array."""
+        raise NotImplementedError
+
+    def of_elements(
+        self, group: Sequence[int], count: tree.Expr | int, read: Read, lanes: int
+    ) -> list[tree.Statement]:
+        """Return the loop of a group over the elements of its values, and the arrays that keep them."""
+        kept = {f"t{k}": f"v{k}" for k in group if self.is_array(k)}
+        lines: list[tree.Statement] = []
+        for let in self.statements(group, read, lanes):
+            lines.append(let)
+            if let.name in kept:
+                lines.append(tree.Store(kept[let.name], (name("i"),), name(let.name, let.value.type)))
+        return [self.span(group), *(self.array(int(t[1:])) for t in kept), loop("i", count, *lines)]
 
     def fuses(self, index: int) -> bool:
         """Return whether a value has no name: its expression is part of the only one that reads it."""
@@ -217,37 +256,29 @@ class Nest:
 
     # ---- the window --------------------------------------------------------------------------------------
 
-    def tap_row(self) -> tree.Let:
-        """Return the row of a tap, inside the image."""
-        return tree.Let("row", clamp(Y + name("dy") - self.row, HEIGHT))
-
-    def tap_column(self) -> list[tree.Let]:
-        """Return the column of a tap, and whether the tap is inside the image where that matters."""
-        column = X + name("dx") - self.column
-        return [tree.Let("column", clamp(column, WIDTH)), *self.inside(Y + name("dy") - self.row, column)]
-
-    def inside(self, row: tree.Expr, column: tree.Expr) -> list[tree.Let]:
-        """Return whether a tap at this row and column is inside the image, where that matters."""
+    def column(self, row: tree.Expr, column: tree.Expr) -> list[tree.Let]:
+        """Return the nearest column in the image to a tap's, and whether it is inside where that matters."""
+        nearest = [tree.Let("column", clamp(column, WIDTH))]
         if self.gather.window.border == "clamp":
-            return []
+            return nearest
         same, along = apply("equal", name("row"), row), apply("equal", name("column"), column)
-        return [tree.Let("inside", same & along)]
+        return [*nearest, tree.Let("inside", same & along)]
 
-    def pixel(self, image: Image, channel: tree.Expr | int) -> tree.Expr:
-        """Return a channel at `row` and `column` under the border rule; no read leaves the image."""
-        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), channel)
+    def pixel(self, image: Image, channel: tree.Expr | int | None = None) -> tree.Expr:
+        """Return a channel, or all of them, at `row` and `column` under the border rule.
+
+        No read leaves the image.
+        """
+        lanes = image.channels if channel is None else 1
+        index = [] if lanes > 1 else [channel or 0]
+        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), *index, kind=tree.FLOAT.of(lanes))
         if self.gather.window.border == "clamp":
             return value
-        return apply("select", name("inside", tree.Type("bool")), value, const(0.0))
+        return apply("select", name("inside", tree.BOOL), value, splat(const(0.0), lanes))
 
-    def texel(self, image: Image) -> tree.Expr:
-        """Return all channels at `row` and `column` under the border rule."""
-        value = load(f"{IMAGE}{image.name}", name("row"), name("column"), kind=tree.FLOAT.of(image.channels))
-        if image.channels == 1:
-            return self.pixel(image, 0)
-        if self.gather.window.border == "clamp":
-            return value
-        return apply("select", name("inside", tree.Type("bool")), value, splat(const(0.0), image.channels))
+    def output_comment(self) -> tree.Comment:
+        """Return the comment above the output."""
+        return tree.Comment(f"output {self.program.outputs[0][0]}")
 
 
 def clamp(value: tree.Expr, count: tree.Expr) -> tree.Expr:
@@ -255,13 +286,7 @@ def clamp(value: tree.Expr, count: tree.Expr) -> tree.Expr:
     return tree.Expr("clamp", (value, const(0), count - 1), tree.INT)
 
 
-def output(
-    program: Program, row: tree.Expr, column: tree.Expr, read: Callable[[tree.Expr], tree.Expr]
-) -> tree.Body:
-    """Return the statements that write the only output of a pixel; `read`: a channel of it."""
-    name_of, index = program.outputs[0]
-    if not program.nodes[index].type.shape:
-        return tree.Comment(f"output {name_of}"), tree.Store(RESULT, (row, column, const(0)), read(const(0)))
-    i = name("i")
-    write = loop("i", output_channels(program), tree.Store(RESULT, (row, column, i), read(i)))
-    return tree.Comment(f"output {name_of}"), write
+def named(**sizes: Any) -> list[tree.Constant]:
+    """Return named integers: values, or (value, comment)."""
+    both = {key: size if isinstance(size, tuple) else (size, "") for key, size in sizes.items()}
+    return [tree.Constant(key, expr(value), text) for key, (value, text) in both.items()]

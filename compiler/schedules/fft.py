@@ -19,20 +19,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ir import Node, Program
+from ..core.profiles import SineContract
 from ..core.weights import Slot
 from ..kernel import kernel as tree
-from ..kernel.interface import RESULT
 from ..kernel.kernel import apply, const, load, name, splat
+from ..proof import bounds
+from ..proof.bounds import Enclosure
+from ..proof.spectra import Spectra
 from . import fourier
-from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, weight
-from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored, readers_of_window
+from .common import HEIGHT, WIDTH, Nest, clamp, kernel_gather, loop, named, readers_of_window, weight
+from .schedules import ALL, Images, Stored, windows
+from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored
 
 PARTS = 2
 """Values of a complex one: its real and its imaginary part."""
@@ -47,6 +51,12 @@ TILE, TILE_X, TILE_Y, K, F, G, Q, T, APART, LINE = map(
     name, ("tile", "tile_x", "tile_y", "k", "f", "g", "q", "t", "apart", "line")
 )
 STEP, LEAP = name("step"), name("leap")
+
+REACH = "rows and columns of a tile with what its windows reach"
+"""What kernels say of the points of a transform."""
+
+SUMMED = "pairs whose products are added up by themselves"
+"""The same of the pairs of a block."""
 
 PRODUCTS = {
     "real": (("+", 0, "a"), ("-", 1, "b"), ("+", 2, "c"), ("-", 3, "d")),
@@ -144,14 +154,13 @@ class Number:
     traced: Traced
 
     def __add__(self, other: Number) -> Number:
-        return self.traced.add(apply("add", self.value, other.value))
+        return self.traced.add(self.value + other.value)
 
     def __sub__(self, other: Number) -> Number:
-        return self.traced.add(apply("subtract", self.value, other.value))
+        return self.traced.add(self.value - other.value)
 
     def __mul__(self, factor: float) -> Number:
-        wide = splat(const(factor), self.value.type.lanes)
-        return self.traced.add(apply("multiply", self.value, wide))
+        return self.traced.add(self.value * splat(const(factor), self.value.type.lanes))
 
 
 def line(
@@ -181,6 +190,12 @@ def codelet(title: str, points: int, kept: int, sign: int, kind: tree.Type) -> t
 # ---- statements ------------------------------------------------------------------------------------------
 
 
+def centred(nest: Nest, centres: Sequence[float]) -> list[tree.Expr]:
+    """Return the channels of a pixel of all images, each without its centre."""
+    values = [nest.pixel(image, c) for image in nest.gather.images for c in range(image.channels)]
+    return [value - const(middle) if middle else value for value, middle in zip(values, centres, strict=True)]
+
+
 class Spectral(Tiled):
     """Builds the kernel with Fourier transforms of `points` in `tiles` tiles."""
 
@@ -195,25 +210,18 @@ class Spectral(Tiled):
     def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
         s = self.sizes
-        return [
-            *self.window(),
-            tree.Constant(
-                "POINTS", const(self.points), "rows and columns of a tile with what its windows reach"
-            ),
-            tree.Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
-            tree.Constant("TILES", const(self.tiles), "neighbours in a row that a work item computes"),
-            tree.Constant(
-                "PIXELS", const(self.pixels), "pixels of a row that go through the layers together"
-            ),
-            tree.Constant("LANES", const(self.lanes), "components of a vector"),
-            tree.Constant("PAIRS", const(s.pairs), "of channels"),
-            tree.Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
-            tree.Constant("INPUTS", const(s.inputs), "vectors that hold the pairs of all tiles"),
-            tree.Constant("NEURONS", const(s.neurons), "pairs of vectors of neurons"),
-            tree.Constant(
-                "STRIDE", 2 * (POINTS + 1), "vectors from row to row: not a multiple of 4096 bytes"
-            ),
-        ]
+        return self.window() + named(
+            POINTS=(self.points, REACH),
+            OUT=(POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            TILES=(self.tiles, "neighbours in a row that a work item computes"),
+            PIXELS=(self.pixels, "pixels of a row that go through the layers together"),
+            LANES=(self.lanes, "components of a vector"),
+            PAIRS=(s.pairs, "of channels"),
+            BLOCK=(s.block, SUMMED),
+            INPUTS=(s.inputs, "vectors that hold the pairs of all tiles"),
+            NEURONS=(s.neurons, "pairs of vectors of neurons"),
+            STRIDE=(2 * (POINTS + 1), "vectors from row to row: not a multiple of 4096 bytes"),
+        )
 
     def built(self) -> tree.Kernel:
         """Return the kernel."""
@@ -223,41 +231,24 @@ class Spectral(Tiled):
             codelet("forward", self.points, self.points, -1, self.vector),
             codelet("backward", self.points, self.sizes.out, 1, self.vector),
         )
-        return self.kernel(
-            body,
-            constants,
-            functions=functions,
-            step=(TILES * OUT, OUT),
-            place=("tile_x", "tile_y"),
-            weights=self.vector,
-        )
-
-    def transform(self, function: str, source: tree.View, into: tree.View) -> tree.Call:
-        """Return a call of a transform."""
-        return tree.Call(function, (source, into))
+        more = {"functions": functions, "step": (TILES * OUT, OUT), "place": ("tile_x", "tile_y")}
+        return self.kernel(body, constants, **more, weights=self.vector)
 
     def rows_forward(self) -> list[tree.Statement]:
         """Return the gathering and transformation of rows."""
         top, left = map(name, ("top", "left"))
         lines: list[tree.Statement] = [
-            tree.Let("left", TILE_X + TILE * OUT + name("dx") - self.column),
-            tree.Let("column", clamp(left, WIDTH)),
-            *self.inside(top, left),
+            tree.Let("left", TILE_X + TILE * OUT + name("dx") - self.middle),
+            *self.column(top, left),
         ]
-        first = 0
-        for image in self.gather.images:
-            for c in range(image.channels):
-                part, pair = divmod(first + c, self.sizes.pairs)
-                value = self.pixel(image, c)
-                if centre := self.centres[first + c]:
-                    value = apply("subtract", value, const(centre))
-                lane, at = TILE * PAIRS + pair, name("dx") * 2 + part
-                place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
-                lines.append(tree.Store("gathered", (place,), value))
-            first += image.channels
+        for number, value in enumerate(centred(self, self.centres)):
+            part, pair = divmod(number, self.sizes.pairs)
+            lane, at = TILE * PAIRS + pair, name("dx") * 2 + part
+            place = (lane // LANES * POINTS * 2 + at) * LANES + lane % LANES
+            lines.append(tree.Store("gathered", (place,), value))
         start, count = COUNTER * POINTS * 2, INPUTS * POINTS * 2
-        to = tree.View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,), const(1))
-        call = self.transform("forward", tree.View("gathered", (start,), const(1)), to)
+        to = tree.View("rows", ((COUNTER * POINTS + name("dy")) * STRIDE,))
+        call = tree.Call("forward", (tree.View("gathered", (start,)), to))
         gather = loop("tile", TILES, loop("dx", POINTS, *lines))
         return [
             tree.Comment("rows of the images around the tiles, transformed"),
@@ -277,33 +268,22 @@ class Spectral(Tiled):
     def columns_of_frequencies(self) -> list[tree.Statement]:
         """Return the loop over columns of frequencies: forward, products with the weights, back."""
         vector, opposite = self.vector, name("opposite")
-        row, one = COUNTER * POINTS * STRIDE, const(1)
-        forward = [
-            self.transform(
-                "forward",
-                tree.View("rows", (row + 2 * k,), POINTS + 1),
-                tree.View("columns", (const(n), const(0)), one),
-            )
-            for n, k in enumerate((K, opposite))
-        ]
+        row, back = COUNTER * POINTS * STRIDE, (TILE * NEURONS + Q) * OUT * STRIDE
+        forward, backward = [], []
+        for n, k in enumerate((K, opposite)):
+            source = tree.View("rows", (row + 2 * k,), POINTS + 1)
+            forward.append(tree.Call("forward", (source, tree.View("columns", (const(n), const(0))))))
+            into = tree.View("back", (back + 2 * k,), POINTS + 1)
+            backward.append(tree.Call("backward", (tree.View("product", (TILE * 2 + n, const(0))), into)))
         a, b = (load("columns", const(0), 2 * F + part, kind=vector) for part in (0, 1))
         c, d = (load("columns", APART, 2 * G + part, kind=vector) for part in (0, 1))
         lets = [tree.Let(n, value) for n, value in zip("abcd", (a, b, c, d), strict=True)]
         a, b, c, d = (name(n, vector) for n in "abcd")
-        both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
+        both = (a + c, b - d, b + d, c - a)
         place = (COUNTER * POINTS + F) * 4
         stores = [tree.Store("spectra", (place + n,), value) for n, value in enumerate(both)]
         unpack = loop("f", POINTS, tree.Let("g", (POINTS - F) % POINTS), *lets, *stores)
         mirrored = apply("not_equal", opposite, K)
-        back = (TILE * NEURONS + Q) * OUT * STRIDE
-        backward = [
-            self.transform(
-                "backward",
-                tree.View("product", (TILE * 2 + n, const(0)), one),
-                tree.View("back", (back + 2 * k,), POINTS + 1),
-            )
-            for n, k in enumerate((K, opposite))
-        ]
         # A column that is its own mirror image is mirrored, not computed twice: both parts of each complex
         # image stay apart to the bit.
         return [
@@ -344,8 +324,7 @@ class Spectral(Tiled):
         for v in range(2):
             for part, terms in PRODUCTS.items():
                 for sign, number, value in terms:
-                    factor = splat(name(value, tree.FLOAT), self.lanes)
-                    product = apply("multiply", name(f"w{2 * number + v}", self.vector), factor)
+                    product = self.product(name(f"w{2 * number + v}", self.vector), name(value, tree.FLOAT))
                     product = product if sign == "+" else apply("negative", product)
                     lines.append(tree.Store(part, (T, const(v)), product, add=True))
         names = ("real", "imaginary")
@@ -361,25 +340,21 @@ class Spectral(Tiled):
             sums = [loop("block", PAIRS // OF_BLOCK, *self.zeros(names), *sums, self.each_tile(adds))]
         (a, c), (b, d) = ([load(part, T, const(v), kind=self.vector) for v in range(2)] for part in whole)
         ends = (
-            (T * 2, 2 * F, apply("subtract", a, d)),
-            (T * 2, 2 * F + 1, apply("add", b, c)),
-            (T * 2 + APART, 2 * G, apply("add", a, d)),
-            (T * 2 + APART, 2 * G + 1, apply("subtract", c, b)),
+            (T * 2, 2 * F, a - d),
+            (T * 2, 2 * F + 1, b + c),
+            (T * 2 + APART, 2 * G, a + d),
+            (T * 2 + APART, 2 * G + 1, c - b),
         )
-        stores = self.each_tile(
-            [tree.Store("product", (image, place), value) for image, place, value in ends]
-        )
+        stores = self.each_tile([tree.Store("product", (image, at), value) for image, at, value in ends])
         return [*self.zeros(whole), *sums, tree.Let("g", (POINTS - F) % POINTS), stores]
 
     def zeros(self, names: tuple[str, ...]) -> list[tree.Statement]:
         """Return the sums of all tiles, which start with zeros."""
-        arrays = [tree.Array(part, self.vector, (TILES, 2), register=True) for part in names]
-        return [
-            *arrays,
-            self.each_tile([tree.Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]),
-        ]
+        zeros = [tree.Store(part, (T, const(v)), self.zero) for part in names for v in range(2)]
+        arrays = (tree.Array(part, self.vector, (TILES, 2), register=True) for part in names)
+        return [*arrays, self.each_tile(zeros)]
 
-    def each_tile(self, lines: list[tree.Statement]) -> tree.For:
+    def each_tile(self, lines: Sequence[tree.Statement]) -> tree.For:
         """Return a loop over tiles that keeps each tile's sums in registers of their own."""
         return tree.For("t", TILES, tuple(lines), "unroll")
 
@@ -398,17 +373,13 @@ class Spectral(Tiled):
                 loop("i", beyond, tree.Store("sums", (TILES * OUT * NEURONS * 2 + COUNTER,), self.zero))
             )
         at = (TILE // NEURONS * OUT * NEURONS + TILE % NEURONS) * 2
-        source = tree.View("back", ((TILE * OUT + LINE) * STRIDE,), const(1))
-        rows = loop(
-            "tile", TILES * NEURONS, self.transform("backward", source, tree.View("sums", (at,), NEURONS))
-        )
+        views = tree.View("back", ((TILE * OUT + LINE) * STRIDE,)), tree.View("sums", (at,), NEURONS)
+        rows = loop("tile", TILES * NEURONS, tree.Call("backward", views))
         lines: list[tree.Statement] = [
             tree.Let("x", TILE_X + PIXEL_BLOCK * PIXELS),
             tree.Let("last", apply("minimum", TILE_X + TILES * OUT, WIDTH)),
         ]
-        for group in self.groups:
-            lines += self.of_group(group)
-        lines += self.outputs()
+        lines += [*self.all_groups(), *self.outputs(name("last"))]
         body = (rows, tree.Let("y", TILE_Y + LINE), loop("b", blocks, *lines))
         return [*found, tree.For("line", OUT, body, until=TILE_Y + LINE < HEIGHT)]
 
@@ -421,19 +392,116 @@ class Spectral(Tiled):
         for j in range(total):
             value = load("sums", (PIXEL_BLOCK * PIXELS + P) * NEURONS * 2 + j, kind=self.vector)
             if bias:
-                value = apply("add", value, weight(self.offset(bias) // self.lanes + j, self.vector))
+                value = value + weight(self.offset(bias) // self.lanes + j, self.vector)
             lines.append(tree.Store(f"v{index}", (P * total + j,), value))
-        return [
-            tree.Comment(f"%{index}: the sums, and their bias"),
-            self.array(index),
-            loop("p", PIXELS, *lines),
-        ]
+        said = tree.Comment(f"%{index}: the sums, and their bias")
+        return [said, self.array(index), loop("p", PIXELS, *lines)]
 
-    def outputs(self) -> tree.Body:
-        """Return the statements that write the output of each pixel of the block in tiles and image."""
-        output, index = self.program.outputs[0]
-        value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
-        write = loop(
-            "i", self.program.nodes[index].type.shape[0], tree.Store(RESULT, (Y, X + P, COUNTER), value)
+
+COST = 3.0
+"""Times that an operation of a transform takes of one of the direct sum: 2.6, as measured on an AMD EPYC with
+tiles of 32; most of its operands are loaded and stored."""
+
+
+class Fourier(Stored):
+    """Tiles of `points` x `points` pixels, `tiles` side by side."""
+
+    order = (
+        "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
+        "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
+        "(real, imaginary) of the first and of the second channel, two vectors of neurons; other "
+        "matrices block by block of neurons: blocks x D_in x neurons"
+    )
+
+    builder: type[Nest] = Spectral
+    takes: tuple[str, ...] = ("lanes", "pixels", "points", "tiles")
+    lanes: int
+    points: int
+    tiles: int
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return spectra_stored(program, self.lanes, self.points, self.tiles)
+
+    def held(self, program: Program) -> Program:
+        """Return the program whose parameters are what the kernel holds, before transforms."""
+        found = fourier.arrangement(program, self.lanes)
+        return found.centred(found.moved(program))
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them, the neurons of the first layer in order."""
+        return super().pack(self.held(program))
+
+    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return other numbers in the places of the weights; 0 for those that the kernel does not hold."""
+        found = fourier.arrangement(program, self.lanes)
+        own = [found.weight, *([found.bias] if found.bias and any(found.centres) else [])]
+        lost = {name: np.zeros_like(parameters[name]) for name in own}
+        return super().pack(found.moved(replace(program, parameters={**parameters, **lost})))
+
+    def spectra(self, program: Program) -> Spectra:
+        """Return how the sums over the window are computed, for their bound."""
+        (layer,), found = readers_of_window(program), fourier.arrangement(program, self.lanes)
+        gather, count = kernel_gather(program), layer.type.shape[0]
+        held = found.centred(found.moved(program))
+        # Columns, groups, rows, pairs, halves, parts and places of neurons.
+        stored = self.stored(held)[found.weight].astype(np.float64)
+        placed = stored[..., 0, :] + 1j * stored[..., 1, :]
+        placed = placed.transpose(1, 5, 2, 0, 4, 3).reshape(
+            -1, self.points, self.points // 2 + 1, *placed.shape[3:5]
         )
-        return tree.Comment(f"output {output}"), tree.For("p", PIXELS, (write,), until=name("last") > X + P)
+        placed = placed.reshape(*placed.shape[:3], -1)[:count, ..., : gather.channels]
+        table, bias = np.empty_like(placed), np.zeros(count)
+        table[found.order] = 2 * self.points * placed
+        if found.bias is not None:
+            bias[found.order] = held.parameters[found.bias]
+        block, centres = self.sizes(program).block, np.array(found.centres)
+        return Spectra(self.points, gather.rows, found.order, self.lanes, block, centres, table, bias)
+
+    def sizes(self, program: Program) -> Sizes:
+        """Return the sizes of a program's kernel."""
+        return sizes_of(program, self.lanes, self.points, self.tiles)
+
+    def enclosures(
+        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node: the sums over the window are those of spectra."""
+        gather, of = kernel_gather(program), self.spectra(program)
+        if images is None:
+            norm = np.array(self.points * np.linalg.norm(fourier.radius(gather, of.centres)))
+            return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
+        found = windows(gather, images, rows)
+        joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
+        norms = fourier.tile_norms(joined, gather.window, self.points, of.centres)[rows]
+        return fourier.enclose(program, sine, (found, found), norms, of)
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        gather, readers = kernel_gather(program), readers_of_window(program)
+        if gather.whole:
+            return "sums from spectra are rounded, those of integers are not"
+        if reason := super().refusal(program):
+            return reason
+        if len(readers) != 1:
+            return f"{len(readers)} affine maps read the window, not one"
+        if gather.axes != (0, 1) or gather.rows >= self.points:
+            return f"a window of {gather.rows} x {gather.columns} pixels in a tile of {self.points}"
+        names = [node["weight"] for node in program.nodes if node.op == "affine"]
+        if names.count(readers[0]["weight"]) != 1:
+            return "a matrix is applied to the window and to a layer"
+        if reason := self.beyond_stack(program):
+            return reason
+        direct, spectra = self.operations(program)
+        if COST * spectra > direct:
+            return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"
+        return ""
+
+    def operations(self, program: Program) -> tuple[float, float]:
+        """Return the operations on vectors, per pixel, of the direct sum over the window and of this one."""
+        (layer,), s, n = readers_of_window(program), self.sizes(program), self.points
+        direct = kernel_gather(program).n_inputs * -(-layer.type.shape[0] // self.lanes)
+        products = (n // 2 + 1) * n * s.pairs * 16 * self.tiles * s.neurons
+        # The split-radix algorithm takes 4 n log2(n) - 6 n + 8 operations.
+        one = 4 * n * (n.bit_length() - 1) - 6 * n + 8
+        transforms = s.inputs * (2 * n + 2) + self.tiles * s.neurons * (n + s.out)
+        return direct, (products + one * transforms) / (self.tiles * s.out**2)

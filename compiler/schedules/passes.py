@@ -8,7 +8,7 @@
 2. What is computed, and in which order, is as in the FFT schedule [fft.py] with vectors of `HALF` neurons:
    neurons j and j + HALF share a complex image. The bits are the same, and the bound is that of fourier.py.
 3. Frequencies in the columns that are their own mirror images, 0 and POINTS / 2, are computed once for both.
-4. Weights of the layers after the first are constants of the source [inlined.py]; its spectra are in memory.
+4. Weights of the layers after the first are constants of the source [straight.py]; its spectra are in memory.
 5. Tiles are computed in batches: a launch sees `tile_count` of them, from `first_tile` on. Those behind the
    last one are computed like others, and write no pixel: no item needs a branch around its work, which costs
    llvmpipe a check for each item and access.
@@ -24,19 +24,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import Program
+from ..core.ir import Node, Program
 from ..core.weights import Slot, weights
 from ..kernel import kernel as tree
-from ..kernel.interface import ITEMS, RESULT
-from ..kernel.kernel import BATCH, apply, const, load, name, parts, splat, stack, values, walk
+from ..kernel.interface import ITEMS
+from ..kernel.kernel import BATCH, apply, const, load, name, stack
 from ..kernel.sizes import handed_on, of_tile
 from . import fourier
-from .common import HEIGHT, WIDTH, clamp, loop, weight
-from .fft import OUT, PAIRS, POINTS, PRODUCTS, TILE, line, sizes_of, spectra_stored
-from .inlined import LARGEST_WEIGHTS, Inlined
-from .schedules import Fourier
-from .straight import VECTOR, ZERO, variables
-from .tile import readers_of_window
+from .common import HEIGHT, WIDTH, clamp, loop, named, readers_of_window, weight
+from .fft import (
+    OUT,
+    PAIRS,
+    POINTS,
+    PRODUCTS,
+    REACH,
+    SUMMED,
+    TILE,
+    Fourier,
+    centred,
+    line,
+    sizes_of,
+    spectra_stored,
+)
+from .straight import LARGEST_WEIGHTS, VECTOR, ZERO, Inlined, variables
 
 HALF = 16
 """Neurons that share complex images with as many others."""
@@ -64,13 +74,9 @@ def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
 
 def used(kernel: tree.Kernel, launch: tree.Launch) -> list[str]:
     """Return the arrays that a launch reads or writes, those of the kernel first."""
-    statements = walk(launch.body)
-    found = {s.array for s in statements if isinstance(s, tree.Store)}
-    found |= {RESULT for s in statements if isinstance(s, tree.Write)}
-    found |= {e.value for s in statements for v in values(s) for e in parts(v) if e.op == "load"}
-    return [
-        name for name in (*(a.name for a in kernel.interface.arrays), *handed_on(kernel)) if name in found
-    ]
+    found = {name for name, _ in tree.accesses(launch.body)}
+    arrays = (*(array.name for array in kernel.interface.arrays), *handed_on(kernel))
+    return [name for name in arrays if name in found]
 
 
 class Passes(Inlined):
@@ -86,20 +92,15 @@ class Passes(Inlined):
     def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
         s = self.sizes
-        return [
-            *self.window(),
-            tree.Constant(
-                "POINTS", const(self.points), "rows and columns of a tile with what its windows reach"
-            ),
-            tree.Constant("OUT", POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
-            tree.Constant("PAIRS", const(s.pairs), "of channels"),
-            tree.Constant("BLOCK", const(s.block), "pairs whose products are added up by themselves"),
-            tree.Constant("IMAGES", const(s.neurons * HALF), "complex ones, of two neurons each"),
-            tree.Constant(
-                "FREQUENCIES", (POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"
-            ),
-            tree.Constant("MIRRORED", POINTS // 2 + 1, "in each of the two columns that are"),
-        ]
+        return self.window() + named(
+            POINTS=(self.points, REACH),
+            OUT=(POINTS - self.rows + 1, "rows and columns of a tile's pixels"),
+            PAIRS=(s.pairs, "of channels"),
+            BLOCK=(s.block, SUMMED),
+            IMAGES=(s.neurons * HALF, "complex ones, of two neurons each"),
+            FREQUENCIES=((POINTS // 2 - 1) * POINTS, "in columns that are not their own mirror images"),
+            MIRRORED=(POINTS // 2 + 1, "in each of the two columns that are"),
+        )
 
     def built(self) -> tree.Kernel:
         """Return the kernel."""
@@ -134,8 +135,8 @@ class Passes(Inlined):
         ]
         across, down = ((size + OUT - 1) // OUT for size in (WIDTH, HEIGHT))
         tiles = (across * down + (TILES - 1)) // TILES * TILES
-        functions = tuple(self.functions())
-        return self.kernel(body, constants, functions=functions, step=(OUT, OUT), weights=VECTOR, batch=tiles)
+        more = {"functions": self.functions(), "step": (OUT, OUT), "batch": tiles}
+        return self.kernel(body, constants, **more, weights=VECTOR)
 
     def launch(self, count: tree.Expr, *body: tree.Statement) -> tree.Launch:
         """Return a launch of so many items for each tile."""
@@ -159,16 +160,13 @@ class Passes(Inlined):
     def forward_rows(self) -> list[tree.Statement]:
         """Return the gathering of a row of all channels, and its transformation pair by pair."""
         lines: list[tree.Statement] = [
-            tree.Let("left", name("tile_x") + name("dx") - self.column),
-            tree.Let("column", clamp(name("left"), WIDTH)),
-            *self.inside(name("top"), name("left")),
+            tree.Let("left", name("tile_x") + name("dx") - self.middle),
+            *self.column(name("top"), name("left")),
         ]
-        values = [self.pixel(image, c) for image in self.gather.images for c in range(image.channels)]
-        for channel in range(2 * self.sizes.pairs):
+        values = centred(self, self.centres)
+        values += [const(0.0)] * (2 * self.sizes.pairs - len(values))
+        for channel, value in enumerate(values):
             part, pair = divmod(channel, self.sizes.pairs)
-            value = values[channel] if channel < len(values) else const(0.0)
-            if channel < len(values) and (centre := self.centres[channel]):
-                value = apply("subtract", value, const(centre))
             lines.append(tree.Store("gathered", ((pair * POINTS + name("dx")) * 2 + part,), value))
         inputs = [
             tuple(load("gathered", (PAIR * POINTS + dx) * 2 + part) for part in (0, 1))
@@ -230,11 +228,7 @@ class Passes(Inlined):
                 for part in PRODUCTS
             )
             image = (name("group") * IMAGES + n) * (POINTS * POINTS)
-            both = {
-                "here": (apply("subtract", a, d), apply("add", b, c)),
-                "there": (apply("add", a, d), apply("subtract", c, b)),
-            }
-            for place, pair in both.items():
+            for place, pair in {"here": (a - d, b + c), "there": (a + d, c - b)}.items():
                 at = (image + name(place)) * TILE_COUNT + self.tile(t)
                 found.append(tree.Store("products", (at,), stack(pair)))
         return found
@@ -253,7 +247,7 @@ class Passes(Inlined):
                 found.append(tree.Let(f"{place}_{t}", load("columns", at, kind=COMPLEX)))
                 z.append(name(f"{place}_{t}", COMPLEX))
             (a, b), (c, d) = ([each.lane(0), each.lane(1)] for each in z)
-            both = (apply("add", a, c), apply("subtract", b, d), apply("add", b, d), apply("subtract", c, a))
+            both = (a + c, b - d, b + d, c - a)
             found += [tree.Let(f"{n}_{t}", value, kept=True) for n, value in zip("abcd", both, strict=True)]
         (layer,) = readers_of_window(self.program)
         first = self.offset(layer["weight"]) // 4
@@ -272,7 +266,7 @@ class Passes(Inlined):
         ]
         for t, (part, terms) in product(range(TILES), PRODUCTS.items()):
             for sign, j, value in terms:
-                found = apply("multiply", name(f"w{j}", VECTOR), splat(name(f"{value}_{t}", tree.FLOAT), 4))
+                found = self.product(name(f"w{j}", VECTOR), name(f"{value}_{t}", tree.FLOAT))
                 found = found if sign == "+" else apply("negative", found)
                 lines.append(tree.Store(f"{part}_{t}_{v}", (), found, add=True))
         return lines
@@ -287,13 +281,7 @@ class Passes(Inlined):
         inside = (name("column") < WIDTH) & (name("row") < HEIGHT)
         return [*found, *self.all_groups(), self.output_comment(), tree.If(inside, (write,))]
 
-    def start(self, bias: str, vector: int) -> tree.Expr:
-        """Return four values of a bias; that of the first layer, with the centres' sums, is in memory."""
-        if bias in self.slots:
-            return weight(self.offset(bias) // 4 + vector, VECTOR)
-        return super().start(bias, vector)
-
-    def of_window(self, index: int, matrix: NDArray[np.float32]) -> list[tree.Statement]:
+    def of_window(self, index: int, node: Node) -> list[tree.Statement]:
         """Return the sums over the window, which are in memory."""
         found: list[tree.Statement] = []
         start = ITEM * name("IMAGES")
@@ -302,7 +290,7 @@ class Passes(Inlined):
             part, vector = divmod(of, HALF // 4)
             numbers = [group * HALF + vector * 4 + n for n in range(4)]
             reads = [load("sums", (start + n) * TILE_COUNT + TILE, kind=COMPLEX).lane(part) for n in numbers]
-            found.append(tree.Store(self.variable(index, 0, j), (), stack(reads), add=True))
+            found.append(tree.Store(self.variable(f"v{index}", 0, j), (), stack(reads), add=True))
         return found
 
 

@@ -2,22 +2,40 @@
 
 An affine map that reads the window accumulates straight from the images, a partial sum for each row of taps
 of an image [core/sums.py]; the window is an array only if something else reads it.
+
+The packed schedule is the same with four weights per read: values are arrays of vectors of four, the weights
+a row of neurons for each input, filled up to a multiple of four. The source is short, so that it compiles at
+once however many weights there are (spec/webpage.md: in a browser without a graphics processor).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from ..core.ir import Image, Node
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import weights
+from ..core.ir import Image, Node, Program
 from ..core.sums import is_split
 from ..kernel import kernel as tree
-from ..kernel.kernel import const, load, name
-from .common import Nest, X, Y, loop, output, weight
+from ..kernel.interface import PLAIN, RESULT
+from ..kernel.kernel import apply, const, load, name, splat
+from .common import HEIGHT, Nest, X, Y, clamp, loop, output_channels, weight
+from .schedules import Schedule, Stored
+from .straight import VECTOR, ZERO
 
-J = name("j")
-"""The loop variable of outputs."""
+J, COUNTER = name("j"), name("i")
+"""The loop variables of outputs, and of inputs or copies."""
+
+VALUE = name("value", tree.FLOAT)
+"""An input of a map."""
+
+WEIGHTS_A_TEXEL = "weights_a_texel"
+"""Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""
 
 
 class Plainly(Nest):
@@ -26,19 +44,17 @@ class Plainly(Nest):
     def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.window()
-        body: list[tree.Statement] = []
-        for group in self.groups:
-            body += self.of_group(group)
-        body += self.outputs()
-        return self.kernel(body, constants, weights=self.weights)
+        return self.kernel([*self.all_groups(), *self.outputs()], constants, weights=self.weights)
 
     weights, zero = tree.Type(), const(0.0)
 
     def outputs(self) -> tree.Body:
         """Return the statements that write the output."""
-        index = self.program.outputs[0][1]
-        shaped = bool(self.program.nodes[index].type.shape)
-        return output(self.program, Y, X, lambda i: self.read(index, i) if shaped else self.read(index))
+        index, i = self.program.outputs[0][1], COUNTER
+        if not self.program.nodes[index].type.shape:
+            return self.output_comment(), tree.Store(RESULT, (Y, X, const(0)), self.read(index))
+        write = tree.Store(RESULT, (Y, X, i), self.read(index, i))
+        return self.output_comment(), loop("i", output_channels(self.program), write)
 
     def count(self, index: int) -> int:
         """Return the elements of a value's array."""
@@ -48,26 +64,14 @@ class Plainly(Nest):
         """Return one component of another group's vector."""
         return self.read(node.args[0], const(int(node["index"])))  # type: ignore[arg-type]
 
-    def of_group(self, group: tuple[int, ...]) -> list[tree.Statement]:
-        """Return the statements of one group: a window, an affine map, a stack, or elementwise operations."""
+    def elementwise(self, group: tuple[int, ...]) -> list[tree.Statement]:
+        """Return the statements of a stack, or of elementwise operations."""
         index, node = group[0], self.program.nodes[group[0]]
-        if node.op == "input":
-            return self.materialised(index) if self.is_array(index) else []
-        if node.op == "affine":
-            return self.affine(index, node)
         if node.op == "stack":
             return self.stacked(index, node)
         if not node.type.shape:
             return [*self.statements(group, self.read, 1)]
-        i, lane = name("i"), lambda k: self.read(k, name("i"))
-        kept = [k for k in group if self.is_array(k)]
-        lines: list[tree.Statement] = []
-        for let, k in zip(self.statements(group, lane, self.lanes), group, strict=True):
-            lines += [
-                let,
-                *([tree.Store(f"v{k}", (i,), name(let.name, let.value.type))] if k in kept else []),
-            ]
-        return [self.span(group), *map(self.array, kept), loop("i", self.count(index), *lines)]
+        return self.of_elements(group, self.count(index), lambda k: self.read(k, COUNTER), self.lanes)
 
     def read(self, index: int, lane: tree.Expr | None = None) -> tree.Expr:
         """Return a value, or one component of it."""
@@ -93,13 +97,11 @@ class Plainly(Nest):
         return [tree.Comment(f"%{index}: {len(node.args)} numbers side by side"), self.array(index), *stores]
 
     def materialised(self, index: int) -> list[tree.Statement]:
-        """Return the copy of the window into an array."""
-
-        def copied(tap: tree.Expr) -> tree.Statement:
-            """Return the copy of a value."""
-            return tree.Store(f"v{index}", (tap,), name("value", tree.Type()))
-
-        copy = self.over_window(partial(self.each_channel, copied))
+        """Return the copy of the window into an array, if something else than affine maps reads it."""
+        if not self.is_array(index):
+            return []
+        copied = partial(self.each_channel, lambda tap: tree.Store(f"v{index}", (tap,), VALUE))
+        copy = self.over_window(copied)
         return [tree.Comment(f"%{index}: the window"), self.array(index), *copy]
 
     # ---- affine maps -------------------------------------------------------------------------------------
@@ -126,20 +128,25 @@ class Plainly(Nest):
         """Return the loop over the elements of a value's array."""
         return loop("j", self.count(index), *body)
 
-    def accumulated(self, index: int, first: int, sums: str, row: tree.Expr) -> tree.Statement:
-        """Return the loop that adds `value` times one row of weights to all neurons' sums."""
-        product = weight(first + row * self.count(index) + J) * name("value", tree.Type())
-        return self.each(index, tree.Store(sums, (J,), product, add=True))
+    def products(
+        self, index: int, sums: str, first: int, row: tree.Expr, factors: Sequence[tree.Expr]
+    ) -> tree.Statement:
+        """Return the additions of rows of weights, from one on, times a factor each to all neurons' sums."""
+        lines: list[tree.Statement] = []
+        for c, factor in enumerate(factors):
+            own = weight(first + (row + c) * self.count(index) + J, self.weights)
+            product = apply("multiply", own, splat(factor, self.lanes))
+            lines.append(tree.Store(sums, (J,), product, add=True))
+        return self.each(index, *lines)
 
     def of_layer(self, index: int, first: int, source: int) -> list[tree.Statement]:
         """Return the products of a layer's values."""
-        i = name("i")
-        added = self.accumulated(index, first, f"v{index}", i)
-        return [loop("i", self.count(source), tree.Let("value", self.read(source, i)), added)]
+        added = self.products(index, f"v{index}", first, COUNTER, [VALUE])
+        return [loop("i", self.count(source), tree.Let("value", self.read(source, COUNTER)), added)]
 
     def channels(self, index: int, first: int, sums: str, image: Image, at: int) -> list[tree.Statement]:
         """Return the products of a tap's channels of an image."""
-        return self.each_channel(partial(self.accumulated, index, first, sums), image, at)
+        return self.each_channel(lambda row: self.products(index, sums, first, row, [VALUE]), image, at)
 
     def each_channel(
         self, body: Callable[[tree.Expr], tree.Statement], image: Image, at: int
@@ -154,9 +161,102 @@ class Plainly(Nest):
     ) -> list[tree.Statement]:
         """Return the loops over images, rows of taps and taps; `around` is before and after a row of taps."""
         found: list[tree.Statement] = []
+        y, x = Y + name("dy") - self.row, X + name("dx") - self.middle
         tap = (name("dy") * self.columns + name("dx")) * self.gather.channels
         for group in self.gather.groups:
             inner = [line for image, at in group for line in channels(image, at)]
-            row = loop("dx", self.columns, *self.tap_column(), tree.Let("tap", tap), *inner)
-            found.append(loop("dy", self.rows, self.tap_row(), *around[:1], row, *around[1:]))
+            taps = loop("dx", self.columns, *self.column(y, x), tree.Let("tap", tap), *inner)
+            row = tree.Let("row", clamp(y, HEIGHT))
+            found.append(loop("dy", self.rows, row, *around[:1], taps, *around[1:]))
         return found
+
+
+class InFours(Plainly):
+    """Builds the packed kernel: the plain one by vectors."""
+
+    lanes = 4
+    weights, zero = VECTOR, ZERO
+
+    def array(self, index: int) -> tree.Array:
+        """Return the declaration of a value's array."""
+        return tree.Array(f"v{index}", VECTOR, (self.count(index),))
+
+    def read(self, index: int, lane: tree.Expr | None = None) -> tree.Expr:
+        """Return vector `lane` of a value."""
+        node = self.program.nodes[index]
+        assert lane is not None
+        if node.op == "parameter":
+            return weight(self.offset(node["name"]) // 4 + lane, VECTOR)
+        return load(f"v{index}", lane, kind=VECTOR)
+
+    def outputs(self) -> tree.Body:
+        """Return the statements that write the output."""
+        index = self.program.outputs[0][1]
+        values = [
+            self.read(index, const(i // 4)).lane(i % 4)
+            for i in range(self.program.nodes[index].type.shape[0])
+        ]
+        return tree.Comment(f"output {self.program.outputs[0][0]}"), tree.Write(Y, X, tuple(values))
+
+    def count(self, index: int) -> int:
+        """Return the vectors of four that hold a value."""
+        return -(-self.program.nodes[index].type.shape[0] // 4)
+
+    def of_layer(self, index: int, first: int, source: int) -> list[tree.Statement]:
+        """Return the products of a layer's values."""
+        whole, rest = divmod(self.program.nodes[source].type.shape[0], 4)
+        v, found = f"v{index}", list[tree.Statement]()
+        if whole:
+            fours = lanes(self.read(source, COUNTER), 4)
+            found.append(loop("i", whole, self.products(index, v, first, COUNTER * 4, fours)))
+        if rest:
+            last = lanes(self.read(source, const(whole)), rest)
+            found.append(self.products(index, v, first, const(4 * whole), last))
+        return found
+
+    def channels(self, index: int, first: int, sums: str, image: Image, at: int) -> list[tree.Statement]:
+        """Return the products of a tap's channels of an image."""
+        value = self.pixel(image)
+        factors = lanes(name(image.name, value.type), image.channels)
+        added = self.products(index, sums, first, name("tap") + at, factors)
+        return [tree.Let(image.name, value), added]
+
+
+def lanes(value: tree.Expr, count: int) -> list[tree.Expr]:
+    """Return the first components of a vector, or a single value."""
+    return [value.lane(c) for c in range(count)] if value.type.lanes > 1 else [value]
+
+
+class Plain(Schedule):
+    """One pixel a work item, loops over taps and neurons."""
+
+    name = PLAIN
+    idea = "one pixel after another, loops over taps and neurons"
+    builder = Plainly
+
+
+class Printed(Plain):
+    """The program as text, which is all that the interpreter needs."""
+
+    idea = "one operation after another, all pixels at once"
+
+
+class Packed(Stored):
+    """Loops, and four weights a read [py]."""
+
+    name = "packed"
+    idea = "four weights a texel, four neurons a `vec4`"
+    order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
+    builder = InFours
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        found = {}
+        for key, array in weights.weights(program).items():
+            missing = [(0, -len(array) % 4), *[(0, 0)] * (array.ndim - 1)]
+            found[key] = np.ascontiguousarray(np.pad(array, missing).T)
+        return found
+
+    def details(self, program: Program) -> Mapping[str, Any]:
+        """Return the form of the texture."""
+        return {WEIGHTS_A_TEXEL: 4}

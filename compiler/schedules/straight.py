@@ -1,27 +1,57 @@
 """Straight code: layers as variables of four neurons, every statement written out; no array, so no index.
 
 A compiler keeps all of a layer in registers. Elementwise groups are functions of vectors where a language has
-arithmetic on vectors; elsewhere of single values, called for each component.
+arithmetic on vectors; elsewhere of single values, called for each component. Parameters are read from memory,
+or are constants of the source where they have no slot there.
+
+The inlined schedule has all weights as constants. For a renderer on a processor (Mesa's llvmpipe) a constant
+is an operand, while every other read of a weight is a chain of checks and gathers: measured, a weight in a
+texture costs 23 times as much, one in a uniform block 5 times. The price is paid once, when the driver
+compiles, in proportion to the number of weights.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from ..core.ir import Node
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import weights
+from ..core.ir import Image, Node, Program
+from ..core.sums import is_split
 from ..kernel import kernel as tree
 from ..kernel.kernel import apply, call, const, name, splat, stack
-from .common import Nest
+from .common import HEIGHT, Nest, X, Y, clamp, weight
+from .schedules import Stored
 
 VECTOR = tree.FLOAT.of(4)
 """Four neurons side by side."""
 
+ZERO = splat(const(0.0), 4)
+"""What a sum starts with."""
+
+LARGEST_WEIGHTS = 2**16
+"""Most weights that are constants of a kernel: llvmpipe compiles some two thousand a second."""
+
+
+def numbers(array: NDArray[np.float32], vector: int) -> tree.Expr:
+    """Return four values of a vector (n,) from 4 * vector on, 0 behind the end, as a constant."""
+    held = array[4 * vector : 4 * vector + 4].tolist()
+    return stack([const(float(value)) for value in held + [0.0] * (4 - len(held))])
+
+
+def variables(names: Sequence[str], value: tree.Expr, kind: tree.Type = VECTOR) -> list[tree.Array]:
+    """Return variables with one first value."""
+    return [tree.Array(each, kind, kept=True, value=value, register=True) for each in names]
+
 
 class Straight(Nest):
-    """Builds straight code of one or several pixels."""
+    """Builds straight code of one or several pixels; with several, names of variables say which."""
 
     lanes = 4
-    pixels = 1
+    pixels = 0
+    weights = VECTOR
 
     def vectors(self, index: int) -> int:
         """Return the vectors of four that hold a value."""
@@ -29,35 +59,106 @@ class Straight(Nest):
 
     def places(self, index: int) -> list[tuple[int, int]]:
         """Return all (pixel, vector) of a value."""
-        return [(p, j) for p in range(self.pixels) for j in range(self.vectors(index))]
+        return [(p, j) for p in range(self.pixels or 1) for j in range(self.vectors(index))]
 
-    def variable(self, index: int, p: int, j: int) -> str:
+    def variable(self, value: str, p: int, j: int) -> str:
         """Return the name of a vector of a value at a pixel."""
-        return f"v{index}_{p}_{j}" if self.pixels > 1 or self.pixel_names else f"v{index}_{j}"
+        return f"{value}_{p}_{j}" if self.pixels else f"{value}_{j}"
 
-    pixel_names = False
+    def names(self, value: str, index: int) -> list[list[str]]:
+        """Return the names of sums, by vector and pixel."""
+        pixels = range(self.pixels or 1)
+        return [[self.variable(value, p, j) for p in pixels] for j in range(self.vectors(index))]
 
     def at(self, index: int, p: int, j: int) -> tree.Expr:
         """Return a vector of a value at a pixel: a variable, or part of a parameter."""
         node = self.program.nodes[index]
-        return self.parameter(node, j) if node.op == "parameter" else name(self.variable(index, p, j), VECTOR)
+        return (
+            self.four(node["name"], j)
+            if node.op == "parameter"
+            else name(self.variable(f"v{index}", p, j), VECTOR)
+        )
 
-    def parameter(self, node: Node, vector: int) -> tree.Expr:
+    def four(self, parameter: object, vector: int) -> tree.Expr:
         """Return four values of a parameter that is a vector."""
-        raise NotImplementedError
+        if str(parameter) not in self.slots:
+            return numbers(self.program.parameters[str(parameter)], vector)
+        found = weight(self.offset(parameter) // 4 + vector, self.weights)
+        return found if self.weights == VECTOR else tree.Expr("bits", (found,), VECTOR)
 
-    def all_groups(self) -> list[tree.Statement]:
-        """Return the statements of all layers."""
-        found: list[tree.Statement] = []
-        for nodes in self.groups:
-            node = self.program.nodes[nodes[0]]
-            if node.op != "input":
-                found += self.affine(nodes[0], node) if node.op == "affine" else self.elementwise(nodes)
-        return found
+    # ---- affine maps -------------------------------------------------------------------------------------
 
     def affine(self, index: int, node: Node) -> list[tree.Statement]:
-        """Return v = W x + b."""
+        """Return v = W x + b for all pixels."""
+        bias, windowed = node.get("bias"), self.program.nodes[node.args[0]].op == "input"
+        starts = [(p, j, self.four(bias, j) if bias else ZERO) for p, j in self.places(index)]
+        sums = [
+            tree.Array(self.variable(f"v{index}", p, j), VECTOR, kept=windowed, value=start)
+            for p, j, start in starts
+        ]
+        return [self.mapped(index, node), *sums, *self.additions(index, node)]
+
+    def additions(self, index: int, node: Node) -> list[tree.Statement]:
+        """Return the additions of all products to the sums."""
+        source = node.args[0]
+        if self.program.nodes[source].op == "input":
+            return self.of_window(index, node)
+        found: list[tree.Statement] = []
+        for i, (lets, factors) in enumerate(self.inputs(index, source)):
+            sums = self.names(self.total(index), index)
+            found += [*lets, *self.multiplied(self.row_of(index, node, i), sums, factors)]
+        return found
+
+    def total(self, index: int) -> str:
+        """Return what the sums of a layer are called."""
+        return f"v{index}"
+
+    def inputs(self, index: int, source: int) -> Iterator[tuple[list[tree.Let], list[tree.Expr]]]:
+        """Yield the values of a layer one by one, at each pixel, and what makes them."""
+        for i in range(self.program.nodes[source].type.shape[0]):
+            yield [], [self.at(source, p, i // 4).lane(i % 4) for p in range(self.pixels or 1)]
+
+    def of_window(self, index: int, node: Node) -> list[tree.Statement]:
+        """Return the additions of the products of all taps."""
         raise NotImplementedError
+
+    def row_of(self, index: int, node: Node, row: int) -> list[tree.Expr]:
+        """Return the weights of one input of a layer."""
+        if (key := str(node["weight"])) in self.slots:
+            return self.weights_row(index, const(self.offset(key) // 4), row)
+        return fours(self.program.parameters[key][:, row])
+
+    def weights_row(self, index: int, first: tree.Expr, row: int) -> list[tree.Expr]:
+        """Return a row of weights in memory."""
+        count = self.vectors(index)
+        return [weight(first + (row * count + j), self.weights) for j in range(count)]
+
+    def multiplied(
+        self, weights: Sequence[tree.Expr], sums: Sequence[Sequence[str]], factors: Sequence[tree.Expr]
+    ) -> list[tree.Statement]:
+        """Return the additions of a row of weights times each pixel's value, each weight read once.
+
+        `sums`: names, by vector and pixel.
+        """
+        found: list[tree.Statement] = []
+        for own, names in zip(weights, sums, strict=True):
+            m = name("m", own.type) if own.op == "load" else own
+            adds = [
+                tree.Store(s, (), self.product(m, x), add=True) for s, x in zip(names, factors, strict=True)
+            ]
+            found += [tree.Block((tree.Let("m", own), *adds))] if own.op == "load" else adds
+        return found
+
+    def product(self, weight: tree.Expr, factor: tree.Expr) -> tree.Expr:
+        """Return what a weight adds to a sum."""
+        return apply("multiply", weight, splat(factor, 4))
+
+    def summed(self, index: int, part: str, body: Sequence[tree.Statement]) -> list[tree.Statement]:
+        """Return additions to partial sums, which start with 0 and are added to the sums."""
+        places = self.places(index)
+        total, names = ([self.variable(n, p, j) for p, j in places] for n in (f"v{index}", part))
+        adds = [tree.Store(t, (), name(n, VECTOR), add=True) for t, n in zip(total, names, strict=True)]
+        return [*variables(names, ZERO), *body, *adds]
 
     # ---- elementwise groups ------------------------------------------------------------------------------
 
@@ -70,12 +171,12 @@ class Straight(Nest):
         """Return the values of a group that others read."""
         return [index for index in group if self.is_array(index)]
 
-    def functions(self) -> list[tree.Function]:
+    def functions(self) -> tuple[tree.Function, ...]:
         """Return the functions of elementwise groups."""
         elementwise = [g for g in self.groups if self.program.nodes[g[0]].op not in ("input", "affine")]
-        return [
+        return tuple(
             f for group in elementwise for result in self.results(group) for f in self.function(group, result)
-        ]
+        )
 
     def function(self, group: Sequence[int], result: int) -> list[tree.Function]:
         """Return the function that computes one value of a group, and that of its components where needed."""
@@ -98,31 +199,10 @@ class Straight(Nest):
             for p, j in self.places(group[0]):
                 given = [self.at(k, p, j) for k in self.operands(group)]
                 value = call(f"elementwise_{result}", given, VECTOR)
-                found.append(tree.Array(self.variable(result, p, j), VECTOR, value=value))
+                found.append(tree.Array(self.variable(f"v{result}", p, j), VECTOR, value=value))
         return found
 
-    # ---- sums --------------------------------------------------------------------------------------------
-
-    def multiplied(
-        self, weights: Sequence[tree.Expr], sums: Sequence[Sequence[str]], factors: Sequence[tree.Expr]
-    ) -> list[tree.Statement]:
-        """Return the additions of a row of weights times each pixel's value, each weight read once.
-
-        `sums`: names, by vector and pixel.
-        """
-        found: list[tree.Statement] = []
-        for weight, names in zip(weights, sums, strict=True):
-            m = name("m", weight.type)
-            adds = [
-                tree.Store(s, (), self.product(m, x, s), add=True)
-                for s, x in zip(names, factors, strict=True)
-            ]
-            found.append(tree.Block((tree.Let("m", weight), *adds)))
-        return found
-
-    def product(self, weight: tree.Expr, factor: tree.Expr, total: str) -> tree.Expr:
-        """Return what a weight adds to a sum."""
-        return apply("multiply", weight, splat(factor, 4))
+    # ---- the output --------------------------------------------------------------------------------------
 
     def written(self, row: tree.Expr, column: tree.Expr, p: int) -> tree.Statement:
         """Return the statement that writes the output of a pixel."""
@@ -130,15 +210,84 @@ class Straight(Nest):
         channels = range(self.program.nodes[index].type.shape[0])
         return tree.Write(row, column, tuple(self.at(index, p, i // 4).lane(i % 4) for i in channels))
 
-    def output_comment(self) -> tree.Comment:
-        """Return the comment above the output."""
-        return tree.Comment(f"output {self.program.outputs[0][0]}")
+
+def fours(column: NDArray[np.float32]) -> list[tree.Expr]:
+    """Return the weights (D_out,) of one input as constants."""
+    return [numbers(column, j) for j in range(-(-len(column) // 4))]
 
 
-def variables(names: Sequence[str], value: tree.Expr, kind: tree.Type = VECTOR) -> list[tree.Array]:
-    """Return variables with one first value."""
-    return [tree.Array(each, kind, kept=True, value=value, register=True) for each in names]
+class Inlined(Straight):
+    """Builds the inlined kernel."""
+
+    def built(self) -> tree.Kernel:
+        """Return the kernel."""
+        constants = self.window()
+        body = [*self.all_groups(), self.output_comment(), self.written(Y, X, 0)]
+        return self.kernel(body, constants, functions=self.functions())
+
+    def of_window(self, index: int, node: Node) -> list[tree.Statement]:
+        """Return the products of all taps: a partial sum for each row of taps of an image."""
+        gather, split, matrix = (
+            self.gather,
+            is_split(self.gather),
+            self.program.parameters[str(node["weight"])],
+        )
+        part = f"part{index}" if split else f"v{index}"
+        found: list[tree.Statement] = []
+        for group in gather.groups:
+            for row in range(gather.rows):
+                lines = []
+                for column in range(gather.columns):
+                    tap = (row * gather.columns + column) * gather.channels
+                    images = [(image, matrix[:, tap + first :]) for image, first in group]
+                    lines.append(self.tap(row, column, images, self.names(part, index)))
+                found.append(tree.Block(tuple(self.summed(index, part, lines) if split else lines)))
+        return found
+
+    def tap(
+        self,
+        row: int,
+        column: int,
+        images: list[tuple[Image, NDArray[np.float32]]],
+        sums: Sequence[Sequence[str]],
+    ) -> tree.Statement:
+        """Return the products of a tap's channels with their columns of weights."""
+        at = Y + row - self.gather.rows // 2, X + column - self.gather.columns // 2
+        lines: list[tree.Statement] = [
+            tree.Let("row", clamp(at[0], HEIGHT)),
+            *self.column(*at),
+        ]
+        for image, columns in images:
+            value = self.pixel(image)
+            texel = name(image.name, value.type)
+            lines.append(tree.Let(image.name, value))
+            for c in range(image.channels):
+                factor = texel.lane(c) if image.channels > 1 else texel
+                lines += self.multiplied(fours(columns[:, c]), sums, [factor])
+        return tree.Block(tuple(lines))
 
 
-ZERO = splat(const(0.0), 4)
-"""What a sum starts with."""
+class Inline(Stored):
+    """Everything unrolled, weights in the source."""
+
+    name = "inlined"
+    idea = "all loops unrolled, every weight a constant of the source"
+    order = "every weight is a constant of the source"
+    builder = Inlined
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        count = sum(array.size for array in weights.weights(program).values())
+        if count > LARGEST_WEIGHTS:
+            return (
+                f"it has {count} weights, of at most {LARGEST_WEIGHTS}: more take a driver minutes to compile"
+            )
+        return self.impossible(program)
+
+    def impossible(self, program: Program) -> str:
+        """Return why there is no kernel of this program at all, or nothing."""
+        return super().refusal(program)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return nothing: no weight lies outside the source."""
+        return {}

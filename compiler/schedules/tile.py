@@ -23,61 +23,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import weights
-from ..core.ir import DTYPES, Image, Node, Program
+from ..core.ir import Image, Node, Program
 from ..core.sums import is_split
 from ..core.weights import Slot
 from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT
 from ..kernel.kernel import apply, const, load, name, splat
-from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, groups_of, kernel_gather, loop, output_channels, weight
+from .common import (
+    HEIGHT,
+    WIDTH,
+    Nest,
+    X,
+    Y,
+    clamp,
+    kernel_gather,
+    loop,
+    named,
+    output_channels,
+    readers_of_window,
+    weight,
+)
+from .schedules import Stored
 
 PIXELS, LANES, PATCH_WIDTH = map(name, ("PIXELS", "LANES", "PATCH_WIDTH"))
 COUNTER, J, P, DX, DY, LEFT, TOP, BLOCK = map(name, ("i", "j", "p", "dx", "dy", "left", "top", "block"))
-
-
-LARGEST_PRIVATE = 2**20
-"""Most bytes of arrays in a work item: half of the smallest stack that glibc gives a thread, which executors
-grant. A quarter kept spectra from layers of 64 neurons, which take a third of the time with them."""
-
-ON_VECTORS = (
-    *("add", "subtract", "multiply", "divide", "negative", "absolute", "minimum", "maximum", "floor"),
-    *("reciprocal", "sqrt", "sin", "cos", "less", "less_equal", "greater", "greater_equal", "select"),
-    *("bitwise_and", "bitwise_xor", "right_shift", "convert"),
-)
-"""Operations that languages have on vectors."""
-
-
-def refused_by_vectors(program: Program, most_channels: int) -> str:
-    """Return why the values of a program cannot all be vectors, or nothing."""
-    for index, node in enumerate(program.nodes):
-        if node.op in ("constant", "parameter", "input", "affine"):
-            continue
-        if node.op not in ON_VECTORS:
-            return f"%{index} is {node.op}, which has no form on vectors"
-        if not node.type.shape:
-            return f"%{index} is {node.type}: vectors hold {', '.join(f'{t}[n]' for t in DTYPES)}"
-    if reason := _others_between_loops(program):
-        return reason
-    output = program.nodes[program.outputs[0][1]]
-    if (channels := output_channels(program)) > most_channels:
-        return f"it writes {channels} channels, of at most {most_channels}"
-    if any(node.op != "affine" for node in readers_of_window(program)):
-        return "something besides an affine map reads the window"
-    if output.op in ("constant", "parameter", "input"):
-        return "the output is not computed"
-    return ""
-
-
-def _others_between_loops(program: Program) -> str:
-    """Return which value that is not a float another loop would have to read from an array, or nothing."""
-    group_of = {index: number for number, group in enumerate(groups_of(program)) for index in group}
-    for reader, node in enumerate(program.nodes):
-        for index in node.args:
-            known = program.nodes[index]
-            other = known.op != "constant" and known.type.dtype != "float32"
-            if other and group_of.get(index) != group_of[reader]:
-                return f"%{index} is {known.type}, which %{reader} in another loop reads"
-    return ""
 
 
 @dataclass(frozen=True)
@@ -101,12 +70,6 @@ def blocks_of(neurons: int, lanes: int, vectors: int) -> Blocks:
 
 
 # ---- weights ---------------------------------------------------------------------------------------------
-
-
-def readers_of_window(program: Program) -> list[Node]:
-    """Return the nodes that read the window."""
-    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
-    return [node for node in program.nodes if inputs & set(node.args)]
 
 
 def matrices(nodes: Iterable[Node]) -> set[str]:
@@ -137,16 +100,6 @@ def stored(program: Program, parameter: str, lanes: int, vectors: int) -> NDArra
     return found
 
 
-def placed(arrays: Mapping[str, NDArray[np.float32]]) -> Mapping[str, Slot]:
-    """Return the slots of arrays one after another."""
-    slots: dict[str, Slot] = {}
-    offset = 0
-    for key, array in arrays.items():
-        slots[key] = Slot(key, array.shape, offset)
-        offset += array.size
-    return slots
-
-
 def all_stored(program: Program, lanes: int, vectors: int) -> dict[str, NDArray[np.float32]]:
     """Return all weights as they are stored, by name."""
     return {key: stored(program, key, lanes, vectors) for key in weights.weights(program)}
@@ -156,15 +109,19 @@ def all_stored(program: Program, lanes: int, vectors: int) -> dict[str, NDArray[
 
 
 class Tiled(Nest):
-    """Builds the tiled kernel of `pixels` x `vectors` vectors of `lanes` neurons."""
+    """Builds the tiled kernel of `pixels` x `vectors` vectors of `lanes` neurons.
+
+    `part`: what partial sums are called, where there are some; `weights`: the type of weights, and of sums.
+    """
 
     pixels: int
     vectors = 2
 
     def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
         super().__init__(program, slots, **parameters)
-        self.vector = self.sum_type = tree.FLOAT.of(self.lanes)
+        self.vector = self.weights = tree.FLOAT.of(self.lanes)
         self.element = self.vector if self.wide else tree.FLOAT
+        self.part = "part" if is_split(self.gather) else ""
 
     def blocks(self, neurons: int) -> Blocks:
         """Return how neurons fill blocks."""
@@ -176,25 +133,17 @@ class Tiled(Nest):
 
     def constants(self) -> list[tree.Constant]:
         """Return the sizes of the window, the tile and the patch."""
-        return [
-            *self.window(),
-            tree.Constant("PIXELS", const(self.pixels), "neighbours in a row that a work item computes"),
-            tree.Constant("LANES", const(self.lanes), "components of a vector"),
-            tree.Constant("PATCH_WIDTH", self.columns + PIXELS - 1, "columns that all windows touch"),
-        ]
+        return self.window() + named(
+            PIXELS=(self.pixels, "neighbours in a row that a work item computes"),
+            LANES=(self.lanes, "components of a vector"),
+            PATCH_WIDTH=(self.columns + PIXELS - 1, "columns that all windows touch"),
+        )
 
     def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.constants()
-        body = self.patches()
-        for group in self.groups:
-            body += self.of_group(group)
-        body += self.outputs()
-        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weight_type())
-
-    def weight_type(self) -> tree.Type:
-        """Return the type of an element of the weights."""
-        return self.vector
+        body = [*self.patches(), *self.all_groups(), *self.outputs()]
+        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weights)
 
     # ---- the images around the pixels --------------------------------------------------------------------
 
@@ -209,7 +158,7 @@ class Tiled(Nest):
         return [
             tree.Comment("the images around the pixels: what lies beyond the border is filled in here"),
             *arrays,
-            tree.Let("left", X - self.column),
+            tree.Let("left", X - self.middle),
             tree.Let("top", Y - self.row),
             tree.Let("within", within),
             loop("dy", self.rows, row, *map(self.copy, images)),
@@ -229,7 +178,7 @@ class Tiled(Nest):
         first = DY * PATCH_WIDTH * channels
         at_once = load(f"{IMAGE}{image.name}", row, LEFT * channels + COUNTER)
         fast = loop("i", PATCH_WIDTH * channels, tree.Store(patch, (first + COUNTER,), self.copied(at_once)))
-        column = [tree.Let("column", clamp(LEFT + DX, WIDTH)), *self.inside(TOP + DY, LEFT + DX)]
+        column = self.column(TOP + DY, LEFT + DX)
         c = name("c")
         put = tree.Store(patch, (first + DX * channels + c,), self.copied(self.pixel(image, c)))
         slow = loop("dx", PATCH_WIDTH, *column, loop("c", channels, put))
@@ -237,31 +186,14 @@ class Tiled(Nest):
 
     # ---- groups ------------------------------------------------------------------------------------------
 
-    def of_group(self, group: tuple[int, ...]) -> list[tree.Statement]:
-        """Return the statements of an affine map, or of elementwise operations."""
-        index, node = group[0], self.program.nodes[group[0]]
-        if node.op == "input":
-            return []
-        return self.affine(index, node) if node.op == "affine" else self.elementwise(group)
+    def elementwise(self, group: tuple[int, ...]) -> list[tree.Statement]:
+        """Return the loop of a group over all pixels' vectors, or their components."""
+        count = PIXELS * self.total(group[0])
+        return self.of_elements(group, count if self.wide else count * LANES, self.read, self.element.lanes)
 
     def array(self, index: int) -> tree.Array:
         """Return the declaration of a value's array: vectors of all pixels."""
         return tree.Array(f"v{index}", self.vector, (PIXELS * self.total(index),))
-
-    def elementwise(self, group: tuple[int, ...]) -> list[tree.Statement]:
-        """Return the loop of a group over all pixels' vectors, or their components."""
-        kept = [k for k in group if self.is_array(k)]
-        count = PIXELS * self.total(group[0])
-        lines: list[tree.Statement] = []
-        for let in self.statements(group, self.read, self.element.lanes):
-            lines.append(let)
-            if int(let.name[1:]) in kept:
-                lines.append(tree.Store(f"v{let.name[1:]}", (COUNTER,), name(let.name, self.element)))
-        return [
-            self.span(group),
-            *map(self.array, kept),
-            loop("i", count if self.wide else count * LANES, *lines),
-        ]
 
     def read(self, index: int) -> tree.Expr:
         """Return element `i` of another group's value."""
@@ -289,32 +221,30 @@ class Tiled(Nest):
         block = BLOCK if blocks.count > 1 else const(0)
         at, n_in = block * blocks.vectors, source.type.shape[0]
         first = self.offset(node["weight"]) // self.lanes + block * (self.inputs(node) * blocks.vectors)
-        sums = [tree.Array("sum", self.sum_type, (PIXELS, blocks.vectors), kept=True, register=True)]
-        starts = [tree.Store("sum", (P, const(j)), self.start(node, at + j)) for j in range(blocks.vectors)]
+        each = range(blocks.vectors)
+        starts = [tree.Store("sum", (P, const(j)), self.start(node, at + j)) for j in each]
         if source.op == "input":
             products = self.windowed(blocks, first)
         else:
             products = self.layer(blocks, first, node.args[0], n_in)
-        ends = [
-            tree.Store(
-                f"v{index}",
-                (P * blocks.total + at + j,),
-                self.ended(load("sum", P, const(j), kind=self.sum_type)),
-            )
-            for j in range(blocks.vectors)
-        ]
-        body = (*sums, self.each_pixel(*starts), *products, self.each_pixel(*ends))
+        totals = [self.ended(load("sum", P, const(j), kind=self.weights)) for j in each]
+        ends = [tree.Store(f"v{index}", (P * blocks.total + at + j,), totals[j]) for j in each]
+        body = (self.sums("sum", blocks), self.each_pixel(*starts), *products, self.each_pixel(*ends))
         nest = loop("block", blocks.count, *body) if blocks.count > 1 else tree.Block(body)
         return [self.mapped(index, node), self.array(index), nest]
+
+    def sums(self, title: str, blocks: Blocks) -> tree.Array:
+        """Return the declaration of sums that stay in registers."""
+        return tree.Array(title, self.weights, (PIXELS, blocks.vectors), kept=True, register=True)
 
     def inputs(self, node: Node) -> int:
         """Return the rows of weights of an affine map."""
         return int(self.program.parameters[str(node["weight"])].shape[1])
 
-    def layer(self, blocks: Blocks, first: tree.Expr, source: int, numbers: int) -> list[tree.Statement]:
+    def layer(self, blocks: Blocks, first: tree.Expr, source: int, count: int) -> list[tree.Statement]:
         """Return the products of a layer's values."""
-        value = load(f"v{source}", P * self.total(source) * LANES + COUNTER)
-        return [self.multiplied(blocks, const(numbers), first, value, "sum")]
+        place = P * self.total(source) * LANES
+        return [self.multiplied(blocks, const(count), first, "sum", f"v{source}", place)]
 
     @property
     def zero(self) -> tree.Expr:
@@ -331,53 +261,81 @@ class Tiled(Nest):
         return total
 
     def windowed(self, blocks: Blocks, first: tree.Expr) -> list[tree.Statement]:
-        """Return the sums over the window: a partial sum for each image and row, which stays in registers."""
+        """Return the sums over the window, row by row of an image's taps."""
         found: list[tree.Statement] = []
-        split, rows = is_split(self.gather), 0
-        each = range(blocks.vectors)
+        rows = 0
         for image in self.gather.images:
-            inputs = self.gather.columns * image.channels
-            at = first + (DY * inputs + rows) * blocks.vectors
-            value = load(f"patch_{image.name}", (DY * PATCH_WIDTH + P) * image.channels + COUNTER)
-            sums = "part" if split else "sum"
-            lines: list[tree.Statement] = [
-                self.multiplied(blocks, self.columns * image.channels, at, value, sums)
-            ]
-            if split:
-                zero = self.each_pixel(*(tree.Store("part", (P, const(j)), self.zero) for j in each))
-                part = [load("part", P, const(j), kind=self.vector) for j in each]
-                add = self.each_pixel(*(tree.Store("sum", (P, const(j)), part[j], add=True) for j in each))
-                lines = [
-                    tree.Array("part", self.vector, (PIXELS, blocks.vectors), kept=True, register=True),
-                    zero,
-                    *lines,
-                    add,
-                ]
-            found.append(loop("dy", self.rows, *lines))
-            rows += self.gather.rows * inputs
+            count, steps = self.steps(image.channels)
+            at = first + (DY * count + rows) * blocks.vectors
+            place = (DY * PATCH_WIDTH + P) * image.channels
+            sums = self.part or "sum"
+            row = self.multiplied(blocks, steps, at, sums, f"patch_{image.name}", place)
+            found.append(loop("dy", self.rows, *(self.summed(blocks, row) if self.part else [row])))
+            rows += self.gather.rows * count
         return found
 
+    def steps(self, channels: int) -> tuple[int, tree.Expr]:
+        """Return the rows of weights of a row of an image's taps, and the same in names of the kernel."""
+        return self.gather.columns * channels, self.columns * channels
+
+    def summed(self, blocks: Blocks, row: tree.Statement) -> list[tree.Statement]:
+        """Return additions to partial sums, which start with 0 and are added to the sums."""
+        each = range(blocks.vectors)
+        zero = [tree.Store(self.part, (P, const(j)), self.zero) for j in each]
+        part = [load(self.part, P, const(j), kind=self.vector) for j in each]
+        add = [tree.Store("sum", (P, const(j)), part[j], add=True) for j in each]
+        return [self.sums(self.part, blocks), self.each_pixel(*zero), row, self.each_pixel(*add)]
+
     def multiplied(
-        self, blocks: Blocks, inputs: tree.Expr, first: tree.Expr, value: tree.Expr, sums: str
+        self, blocks: Blocks, inputs: tree.Expr, first: tree.Expr, sums: str, array: str, place: tree.Expr
     ) -> tree.Statement:
         """Return the loop over inputs: the row of weights of each, times its value at each pixel."""
         each = range(blocks.vectors)
-        row = [tree.Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.vector)) for j in each]
-        factor = splat(name("value", tree.FLOAT), self.lanes)
+        row = [tree.Let(f"w{j}", weight(first + COUNTER * blocks.vectors + j, self.weights)) for j in each]
+        lets, factor = self.factor(array, place)
         products = [
-            tree.Store(sums, (P, const(j)), apply("multiply", name(f"w{j}", self.vector), factor), add=True)
+            tree.Store(sums, (P, const(j)), self.product(name(f"w{j}", self.weights), factor), add=True)
             for j in each
         ]
-        return loop("i", inputs, *row, self.each_pixel(tree.Let("value", value), *products))
+        return loop("i", inputs, *row, self.each_pixel(*lets, *products))
+
+    def factor(self, array: str, place: tree.Expr) -> tuple[list[tree.Let], tree.Expr]:
+        """Return the value of input `i` at a pixel, and what makes it."""
+        return [tree.Let("value", load(array, place + COUNTER))], name("value", tree.FLOAT)
+
+    def product(self, weights: tree.Expr, factor: tree.Expr) -> tree.Expr:
+        """Return what a vector of weights adds to a sum."""
+        return apply("multiply", weights, splat(factor, self.lanes))
 
     def each_pixel(self, *body: tree.Statement) -> tree.For:
         """Return a loop over pixels that keeps each pixel's sums in registers of their own."""
         return tree.For("p", PIXELS, body, "unroll")
 
-    def outputs(self) -> tree.Body:
-        """Return the statements that write the output of each pixel that lies in the image."""
-        output, index = self.program.outputs[0]
-        channels = self.program.nodes[index].type.shape[0]
+    def outputs(self, end: tree.Expr = WIDTH) -> tree.Body:
+        """Return the statements that write the output of each pixel before the end of the row."""
+        index = self.program.outputs[0][1]
         value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
-        write = loop("i", channels, tree.Store(RESULT, (Y, X + P, COUNTER), value))
-        return tree.Comment(f"output {output}"), tree.For("p", PIXELS, (write,), until=X + P < WIDTH)
+        write = loop("i", output_channels(self.program), tree.Store(RESULT, (Y, X + P, COUNTER), value))
+        return self.output_comment(), tree.For("p", PIXELS, (write,), until=end > X + P)
+
+
+class Tile(Stored):
+    """A tile of `pixels` x `vectors` vectors of `lanes` neurons."""
+
+    order = (
+        "vectors filled up with zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows "
+        "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
+    )
+
+    builder: type[Nest] = Tiled
+    takes = ("lanes", "pixels", "vectors")
+    lanes: int
+    vectors = 2
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        return super().refusal(program) or shared_matrix(program) or self.beyond_stack(program)
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return all_stored(program, self.lanes, self.vectors)

@@ -28,8 +28,9 @@ from ...compiler.compile import compile_plan
 from ...compiler.core import profiles, sine
 from ...compiler.core.lower import lower
 from ...compiler.plan import Plan, plan_program
+from ...compiler.schedules.bytes import Dot
 from ...compiler.schedules.common import kernel_gather
-from ...compiler.schedules.schedules import PLAIN, Dot
+from ...compiler.schedules.schedules import PLAIN
 from ...compiler.targets import DENOISERS, TARGETS, Language, schedule_named
 from ...compiler.variants import parse, vary
 from ...refimpl.errors import ExecutorUnavailable, InputError

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import DENOISE, PLANES, READ, SCENE_NUMBERS, WEIGHTS, Interface
 from ...compiler.languages.glsl import ORDER_EXTENSION, SHADER_VERSION, WEIGHT_TEXTURE_WIDTH
-from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
+from ...compiler.schedules.plain import WEIGHTS_A_TEXEL
 from ...refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from . import llvmpipe, osmesa
 from .executor import GPU_SCHEDULE, Executor

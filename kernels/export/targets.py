@@ -15,8 +15,8 @@ from pathlib import Path
 
 from ...compiler.kernel.interface import BLOCK, TABLE, staged
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
-from ...compiler.schedules.inlined import LARGEST_WEIGHTS
 from ...compiler.schedules.schedules import PLAIN
+from ...compiler.schedules.straight import LARGEST_WEIGHTS
 from ..devices.executor import Executor
 from ..devices.registry import open_executor
 from . import tools

@@ -45,7 +45,7 @@ from ...compiler.scenes.lower_scene import FeatureRays, lower_scene
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, varying
 from ...compiler.schedules.common import kernel_gather, output_channels
-from ...compiler.schedules.packed import WEIGHTS_A_TEXEL
+from ...compiler.schedules.plain import WEIGHTS_A_TEXEL
 from ...compiler.variants import parse, vary
 from ...refimpl import rng
 from ...refimpl.errors import NO_VALUE, InputError

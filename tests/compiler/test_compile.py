@@ -22,8 +22,9 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.weights import layout, pack
+from wamnet.compiler.languages.hosts import ShadertoyDenoise
 from wamnet.compiler.plan import analysed
-from wamnet.compiler.schedules.tile import refused_by_vectors
+from wamnet.compiler.schedules.plain import Packed
 from wamnet.compiler.targets import DENOISERS
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
@@ -207,7 +208,7 @@ def test_too_many_output_channels_for_a_fragment():
 def test_a_schedule_that_writes_fewer_channels_gives_way():
     """A language may have one form with several results and one without; no target has both yet."""
     w = np.ones((5, 5), np.float32)
-    reason = refused_by_vectors(gathered(lambda x: x @ w, channels=5), 4)
+    reason = Packed(ShadertoyDenoise()).refusal(gathered(lambda x: x @ w, channels=5))
     assert "it writes 5 channels, of at most 4" in reason
 
 

@@ -20,8 +20,9 @@ from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds, spectra, spectra_checker
-from wamnet.compiler.schedules import fourier, schedules
-from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.schedules import fourier
+from wamnet.compiler.schedules.fft import Fourier
+from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
@@ -354,7 +355,7 @@ def test_golden_spectra(golden) -> None:
     traced = trace(function, {"window": Type(shape=(12,))}, gather)
     idea = "small tiles"
     for dialect in (OpenCL(), C()):
-        tiny = schedules.Fourier(dialect, "fft4", idea, lanes=4, pixels=2, points=4, tiles=1)
+        tiny = Fourier(dialect, "fft4", idea, lanes=4, pixels=2, points=4, tiles=1)
         golden(
             f"fft4.denoise{dialect.suffix}", tiny.renderer(analysed(traced), True).source(["a tiny kernel"])
         )

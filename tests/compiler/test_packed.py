@@ -7,8 +7,7 @@ import pytest
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.languages.glsl_es import GLSLES
-from wamnet.compiler.schedules.packed import WEIGHTS_A_TEXEL
-from wamnet.compiler.schedules.schedules import Packed
+from wamnet.compiler.schedules.plain import WEIGHTS_A_TEXEL, Packed
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,10 @@ from wamnet.compiler.artifact import schedule_text
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.schedules.inlined import LARGEST_WEIGHTS
 from wamnet.compiler.schedules.names import FORMER, parse, split
-from wamnet.compiler.schedules.schedules import Tile
-from wamnet.compiler.schedules.tile import LARGEST_PRIVATE
+from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
+from wamnet.compiler.schedules.straight import LARGEST_WEIGHTS
+from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import TARGETS, language_named, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren

@@ -20,7 +20,7 @@ from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
 from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
-from wamnet.compiler.schedules import schedules
+from wamnet.compiler.schedules import fft
 from wamnet.compiler.schedules.passes import FourierPasses
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -39,13 +39,13 @@ def model(border="zero", activation="sine", images=("color", "normal", "albedo",
 def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
-    tiny = schedules.Fourier(dialect, "fft8", "small tiles", lanes=4, pixels=6, points=points, tiles=tiles)
+    tiny = fft.Fourier(dialect, "fft8", "small tiles", lanes=4, pixels=6, points=points, tiles=tiles)
     if target in ("opengl", "glsl-vulkan"):
         words = GLSLCompute() if target == "opengl" else Vulkan()
         tiny = FourierPasses(words, "fftpasses:8", "small tiles", points=points)
     whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(schedules, "COST", 0.0)
+        patch.setattr(fft, "COST", 0.0)
         patch.setitem(targets.LANGUAGES, target, replace(whole, schedules=(*whole.schedules, tiny)))
         made = compile_program(lower(model(**kwargs)), target, schedule=tiny.name)
     assert made.manifest["schedule"]["name"] == tiny.name

@@ -20,7 +20,7 @@ from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import whole
-from wamnet.compiler.schedules.schedules import Dot, GroupDot
+from wamnet.compiler.schedules.bytes import Dot, GroupDot
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window

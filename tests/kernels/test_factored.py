@@ -14,7 +14,8 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
-from wamnet.compiler.schedules.schedules import Dot, Fourier, GroupDot
+from wamnet.compiler.schedules.bytes import Dot, GroupDot
+from wamnet.compiler.schedules.fft import Fourier
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on
 from wamnet.kernels.devices import opencl_executor

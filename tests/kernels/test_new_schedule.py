@@ -16,7 +16,7 @@ from wamnet.compiler.parsing.canonical import canonical
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import parse
 from wamnet.compiler.plan import plan_program
-from wamnet.compiler.schedules.schedules import Plain
+from wamnet.compiler.schedules.plain import Plain
 
 
 class Backwards(Plain):

@@ -12,7 +12,7 @@ from kit import LONG, trained_sizes
 
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.schedules import schedules
+from wamnet.compiler.schedules import fft
 from wamnet.compiler.targets import DENOISERS
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import denoise_on
@@ -84,7 +84,7 @@ def images_of(case):
 @pytest.fixture(autouse=True)
 def _spectra_of_small_windows(monkeypatch):
     """Let the Fourier schedule hold what is faster without it."""
-    monkeypatch.setattr(schedules, "COST", 0.0)
+    monkeypatch.setattr(fft, "COST", 0.0)
 
 
 def executor_of(executor_named, target):

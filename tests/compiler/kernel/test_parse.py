@@ -48,7 +48,8 @@ from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.plan import plan_program
 from wamnet.compiler.reading.check import passes_of
-from wamnet.compiler.schedules.schedules import Plain, Tile
+from wamnet.compiler.schedules.plain import Plain
+from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren

@@ -53,8 +53,13 @@ from wamnet.compiler.languages.glsl import GLSL, GLSLCompute
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.plan import plan_program
+from wamnet.compiler.schedules.bytes import Dot, GroupDot
+from wamnet.compiler.schedules.fft import Fourier
+from wamnet.compiler.schedules.group import Grouped
 from wamnet.compiler.schedules.passes import FourierPasses
-from wamnet.compiler.schedules.schedules import Dot, Fourier, GroupDot, Grouped, Inline, Packed, Plain, Tile
+from wamnet.compiler.schedules.plain import Packed, Plain
+from wamnet.compiler.schedules.straight import Inline
+from wamnet.compiler.schedules.tile import Tile
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Window

@@ -20,25 +20,28 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
-from ..refimpl.network.denoise import Model
 from .core import profiles
 from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
-from .proof import bounds, certificate, whole
+from .proof import bounds, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
 from .targets import Language, language_named
+
+if TYPE_CHECKING:
+    from ..refimpl.network.denoise import Model
+    from .proof.certificate import Proof
 
 BLOCK_NUMBERS = 2**20
 """Numbers in the windows of one block of rows: a bound holds some copies of them, 8 MiB each."""
@@ -54,7 +57,7 @@ class Bound:
 
     output: tuple[float, ...] | None
     sines: tuple[tuple[float, float], ...]
-    proof: certificate.Proof | None = None
+    proof: Proof | None = None
     exact: bool = False
 
 
@@ -168,6 +171,8 @@ class Plan:
             return Bound(None, tuple(ranges))
         proof = None
         if self.proves and not self.cut:
+            from .proof import certificate
+
             proof = certificate.prove(program, found, self.sine, self.schedule.spectra(program))
         return Bound(proof.bound if proof else tuple(float(e) for e in errors), tuple(ranges), proof)
 

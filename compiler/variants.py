@@ -23,7 +23,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -272,39 +272,31 @@ def _spread(varied: Varied, left: Indices, channels: int) -> Varied:
     return replace(varied, weights=(weight, *varied.weights[1:]), kept=(chosen, *varied.kept[1:]))
 
 
-NARROWER = ("without-", "window", "hidden", "rank", "sine", "half")
-"""Kinds that integers come after."""
+class Kind(NamedTuple):
+    """A kind of approximation: a sentence, its function, and the kinds that come before it."""
 
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of approximation: the beginning of its name, a sentence, its function, what comes before it."""
-
-    name: str
     text: str
     apply: Callable[[Varied, Any], Varied]
     before: tuple[str, ...] = ()
 
 
+NARROWER = ("without-", "window", "hidden")
+"""Kinds that a rank comes after: a first layer that is narrowed after the cut would not have it any more."""
+
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind
-    for kind in (
-        Kind("without-", "leave out a feature: without-normal", leave_out_feature),
-        Kind("window", "see N x N pixels: window8", narrow_window),
-        Kind("hidden", "keep N neurons in each hidden layer: hidden24", remove_neurons),
-        # A first layer that is narrowed after the cut would not have its rank any more.
-        Kind("rank", "a first layer of rank N: rank12", cut_rank, ("without-", "window", "hidden")),
-        Kind("sine", "sines of degree N: sine7", choose_sine),
-        # What is narrowed or cut after it would be sums of halves, not halves.
-        Kind(
-            "half",
-            "weights in half precision: half16",
-            halve_weights,
-            ("without-", "window", "hidden", "rank"),
-        ),
-        # What is rounded has no weights that could be spread, cut or counted.
-        Kind("whole", "integers of 8 or 10 bits, the same bits everywhere: whole8", make_whole, NARROWER),
-    )
+    "without-": Kind("leave out a feature: without-normal", leave_out_feature),
+    "window": Kind("see N x N pixels: window8", narrow_window),
+    "hidden": Kind("keep N neurons in each hidden layer: hidden24", remove_neurons),
+    "rank": Kind("a first layer of rank N: rank12", cut_rank, NARROWER),
+    "sine": Kind("sines of degree N: sine7", choose_sine),
+    # What is narrowed or cut after it would be sums of halves, not halves.
+    "half": Kind("weights in half precision: half16", halve_weights, (*NARROWER, "rank")),
+    # What is rounded has no weights that could be spread, cut or counted.
+    "whole": Kind(
+        "integers of 8 or 10 bits, the same bits everywhere: whole8",
+        make_whole,
+        (*NARROWER, "rank", "sine", "half"),
+    ),
 }
 """All approximations, by what their names begin with."""
 

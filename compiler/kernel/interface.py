@@ -9,8 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from ..core.ir import Image
+if TYPE_CHECKING:
+    from ..core.ir import Image
 
 DENOISE, PATH, ENCODE = "denoise", "path", "encode"
 """What a kernel does."""

@@ -25,6 +25,7 @@ from .interface import Array as Declared
 from .memory import Items, Memory, Part
 from .sizes import integer
 from .verify import STEPS, KernelError, verify
+from .walker import Walker
 
 Values = Any
 """A number for all items, an array (items,) or (lanes, items)."""
@@ -58,7 +59,7 @@ def run_on(
     return found | {key: memory.left() for key, memory in runner.both.items()}
 
 
-class Runner:
+class Runner(Walker):
     """One run: the items, what they name, and the memory that they see."""
 
     def __init__(
@@ -138,15 +139,6 @@ class Runner:
 
     # ---- statements --------------------------------------------------------------------------------------
 
-    def body(self, body: tree.Body) -> None:
-        """Run statements."""
-        for statement in body:
-            self.statement(statement)
-
-    def statement(self, statement: tree.Statement) -> None:
-        """Run a statement."""
-        getattr(self, f"_run_{type(statement).__name__.lower()}")(statement)
-
     def _under(self, mask: NDArray[np.bool_], body: tree.Body) -> NDArray[np.bool_]:
         """Run statements for some of the active items; return those that no break has stopped."""
         before = self.items.mask
@@ -156,13 +148,6 @@ class Runner:
             mask = self.items.mask
             self.items.only(before)
         return mask
-
-    def _run_comment(self, statement: tree.Statement) -> None:
-        """Skip a comment."""
-
-    def _run_let(self, statement: tree.Let) -> None:
-        """Name a value."""
-        self.names[statement.name] = self.value(statement.value)
 
     def _run_array(self, statement: tree.Array) -> None:
         """Make new memory, of which nothing is written."""
@@ -202,11 +187,6 @@ class Runner:
             store = tree.Store(statement.array, (*index[:axis], there, *index[axis + 1 :]), value)
             self._under(inside, (store,))
 
-    def _run_write(self, statement: tree.Write) -> None:
-        """Write all channels of a pixel."""
-        for channel, value in enumerate(statement.values):
-            self._run_store(tree.Store(RESULT, (statement.row, statement.column, tree.const(channel)), value))
-
     def _run_for(self, statement: tree.For) -> None:
         """Run a loop: at once for all items where its bounds are theirs, else while any is in it."""
         ends = (statement.start, statement.count, statement.step)
@@ -244,10 +224,6 @@ class Runner:
         self._under(mask & condition, statement.body)
         self._under(mask & ~condition, statement.otherwise)
 
-    def _run_block(self, statement: Any) -> None:
-        """Run statements whose names end with them."""
-        self.body(statement.body)
-
     def _run_barrier(self, statement: tree.Statement) -> None:
         """Let all items of each group wait for each other."""
         active = np.bincount(self.items.group[self.items.mask], minlength=self.items.groups)
@@ -280,25 +256,7 @@ class Runner:
             memory[array] = Part(*self._place(view.array, view.index, kind))
         self._inside(function, names, memory)
 
-    def _inside(
-        self, function: tree.Function, names: dict[str, Values], memory: dict[str, Memory | Part]
-    ) -> Values:
-        """Run a function, and return its result."""
-        outer = self.names, self.memory
-        self.names, self.memory = {**self.constants, **names}, memory
-        self.body(function.body)
-        result = None if function.result is None else self.value(function.result)
-        self.names, self.memory = outer
-        return result
-
     # ---- values ------------------------------------------------------------------------------------------
-
-    def value(self, value: tree.Expr) -> Values:
-        """Return the values of an expression."""
-        evaluate = self.evaluators.get(value.op)
-        return (
-            evaluate(value) if evaluate else self._operation(value, [self.value(each) for each in value.args])
-        )
 
     def _operation(self, value: tree.Expr, args: list[Values]) -> Values:
         """Return an operation on values."""
@@ -331,12 +289,6 @@ class Runner:
             self.numbers[key] = computed(np.asarray(value.value, STORED[kind]))
         return self.numbers[key]
 
-    def _value_name(self, value: tree.Expr) -> Values:
-        """Return a named value, or that of a variable."""
-        if value.value in self.names:
-            return self.names[value.value]
-        return self._value_load(tree.Expr("load", (), value.type, value.value))
-
     def _value_load(self, value: tree.Expr) -> Values:
         """Return an element of an array."""
         memory, place = self._place(value.value, value.args, value.type)
@@ -364,10 +316,6 @@ class Runner:
         """Return one component of a vector."""
         vector = self.value(value.args[0])
         return vector[value.value] if np.ndim(vector) == 2 else vector
-
-    def _value_splat(self, value: tree.Expr) -> Values:
-        """Return a value in all lanes: it is the same array, which NumPy repeats."""
-        return self.value(value.args[0])
 
     def _value_stack(self, value: tree.Expr) -> Values:
         """Return a vector of single values."""
@@ -399,12 +347,6 @@ class Runner:
         words, four = map(self.value, value.args)
         factors = four if value.args[1].type.lanes == 4 else [signed_byte(four, k) for k in range(4)]
         return sum(signed_byte(words, k) * factors[k] for k in range(4))
-
-    def _value_call(self, value: tree.Expr) -> Values:
-        """Return the result of a function of values."""
-        function = self.functions[value.value]
-        names = {key: self.value(each) for (key, _), each in zip(function.takes, value.args, strict=True)}
-        return self._inside(function, names, {})
 
 
 def signed_byte(word: Values, k: int) -> Values:

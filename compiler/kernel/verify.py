@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core import ir
-from ..core.ops import OPS, TypeRuleError
 from . import kernel as tree
 from .interface import BOTH, DENOISE, IMAGE, READ, RESULT, UNSIGNED, WEIGHTS, WRITE
 from .sizes import BYTES
@@ -35,6 +33,25 @@ SIGNATURES: Mapping[str, Callable[[tree.Expr], tuple[Sequence[tree.Type], tree.T
     "pack4": lambda value: ([tree.FLOAT] * 4, tree.INT),
 }
 """Operations of the kernel IR alone: the types of their operands, and of their result."""
+
+
+FLOATS, NUMBERS, TRUTHS = ("float32",), ("float32", "int32", "uint32"), ("bool",)
+"""Kinds of operands: floats, any numbers, and booleans."""
+
+OPERATIONS: Mapping[str, tuple[int, Sequence[str]]] = {
+    **dict.fromkeys(("add", "subtract", "multiply", "minimum", "maximum", *tree.COMPARISONS), (2, NUMBERS)),
+    **dict.fromkeys(("divide", "power"), (2, FLOATS)),
+    **dict.fromkeys(
+        ("reciprocal", "negative", "absolute", "floor", "sqrt", "exp", "sin", "cos"), (1, FLOATS)
+    ),
+    **dict.fromkeys(("logical_and", "logical_or"), (2, TRUTHS)),
+    "logical_not": (1, TRUTHS),
+    **dict.fromkeys(("bitwise_and", "bitwise_xor", "right_shift"), (2, ("uint32",))),
+    "select": (3, (*NUMBERS, *TRUTHS)),
+}
+"""Operations of core/ops.py on the components of values: how many operands, all of one of these kinds.
+
+The check of sources rests on this table, and on none of the compiler's own."""
 
 
 class KernelError(Exception):
@@ -446,17 +463,19 @@ class Verifier:
             args[0] = tree.BOOL.of(args[1].lanes)
         if value.op in ("divide", "remainder") and args == [tree.INT, tree.INT]:
             return tree.INT
-        rule = OPS.get(value.op)
-        if rule is None or not rule.elementwise or value.op == "convert":
+        if value.op not in OPERATIONS:
             raise KernelError(f"{value.op} is not an operation")
-        self.arity(value, rule.arity or 0)
+        count, kinds = OPERATIONS[value.op]
+        self.arity(value, count)
         if len({each.lanes for each in args}) != 1:
             raise KernelError(f"{value.op} of {', '.join(map(shown, args))}: lanes differ")
-        try:
-            kind = rule.type_rule([ir.Type(each.dtype) for each in args], {}, {})
-        except TypeRuleError as error:
-            raise KernelError(f"{value.op}: {error}") from None
-        return tree.Type(kind.dtype, args[0].lanes)
+        chosen = args[value.op == "select" :]
+        for some, allowed in ((args[: -len(chosen)], TRUTHS), (chosen, kinds)):
+            found = {each.dtype for each in some}
+            if len(found) > 1 or not found <= {*allowed}:
+                types = ", ".join(map(shown, some))
+                raise KernelError(f"{value.op}: operands must all be {' or all '.join(allowed)}, not {types}")
+        return chosen[0] if value.op not in tree.COMPARISONS else tree.BOOL.of(args[0].lanes)
 
     def arity(self, value: tree.Expr, count: int) -> None:
         """Refuse an operation with another number of operands."""

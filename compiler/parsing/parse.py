@@ -12,11 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from itertools import accumulate
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
 
-import numpy as np
-
-from ..core.ir import Image
 from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.verify import KernelError, verify
@@ -132,7 +130,9 @@ class Parser(Expressions):
         missing = [key for key in (*images, RESULT) if key not in self.channels]
         if missing:
             raise Unread(f"the channels of {missing[0]} are not stated")
-        declared = [Image(key.removeprefix(IMAGE), self.channels[key], -np.inf, np.inf) for key in images]
+        declared: list[Any] = [
+            SimpleNamespace(name=key.removeprefix(IMAGE), channels=self.channels[key]) for key in images
+        ]
         return tree.Kernel(
             denoiser(declared, self.channels[RESULT]),
             body,

@@ -1,4 +1,4 @@
-"""What operations of a kernel under test make of values: run.py's expressions on terms and coordinates.
+"""What operations of a kernel under test make of values: a kernel's expressions on terms and coordinates.
 
 1. A float, and an integer that is computed from an image, is a `Term` [terms.py]; an index is Python's
    integer, an array (1, turns), or a `Place` where it depends on coordinates; a truth is Python's, or one for
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel.kernel import Expr, Kernel
-from ..kernel.run import Runner
+from ..kernel.walker import Walker
 from . import integers
 from .cells import Tile, Turns
 from .claim import COMMUTE, Claim, renamed, word_of
@@ -31,7 +31,7 @@ EVALUATED = (
 """Expressions that are not operations on their operands' values."""
 
 
-class Values(Runner):
+class Values(Walker):
     """Values of one run of a kernel for a claim, for the lanes and turns that are active (`mask`)."""
 
     claim: Claim

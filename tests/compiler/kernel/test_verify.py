@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
-from wamnet.compiler.core.ir import Image
+from wamnet.compiler.core import ir
+from wamnet.compiler.core.ir import DTYPES, Image
+from wamnet.compiler.core.ops import OPS, TypeRuleError
 from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
@@ -36,7 +40,7 @@ from wamnet.compiler.kernel.kernel import (
     name,
     splat,
 )
-from wamnet.compiler.kernel.verify import KernelError, verify
+from wamnet.compiler.kernel.verify import OPERATIONS, KernelError, verify
 
 X, Y, TURN = map(name, ("x", "y", "i"))
 V, FOUR = Array("v", FLOAT, (2,)), FLOAT.of(4)
@@ -245,3 +249,24 @@ def test_names_of_scopes_side_by_side_may_be_equal_but_not_those_within():
     verify(small(V, looped(Let("t", TURN)), looped(Let("t", TURN)), WRITE))
     with pytest.raises(KernelError, match="t is declared twice"):
         verify(small(V, Let("t", X), looped(Let("t", TURN)), WRITE))
+
+
+def test_the_table_of_operations_is_that_of_the_compiler():
+    """Each elementwise operation takes the same kinds here and there, and makes the same of them."""
+    elementwise = {op.name: op for op in OPS.values() if op.elementwise and op.name != "convert"}
+    assert set(OPERATIONS) == set(elementwise)
+    for (what, op), lanes in product(elementwise.items(), (1, 4)):
+        for kinds in product(DTYPES, repeat=op.arity):
+            names = [name(f"a{i}", Type(kind, lanes)) for i, kind in enumerate(kinds)]
+            variables = [Array(each.value, each.type) for each in names]
+            try:
+                found = op.type_rule([ir.Type(kind) for kind in kinds], {}, {})
+            except TypeRuleError:
+                divides = what == "divide" and {*kinds} == {"int32"} and lanes == 1  # indices
+                found = ir.Type("int32" if divides else "none")
+            kernel = small(*variables, Let("t", Expr(what, tuple(names), Type(found.dtype, lanes))))
+            if found.dtype == "none":
+                with pytest.raises(KernelError, match=what):
+                    verify(kernel)
+            else:
+                verify(kernel)

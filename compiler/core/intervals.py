@@ -63,6 +63,11 @@ def divide(a: Ends, b: Ends) -> Ends:
     return np.where(safe, low, -np.inf), np.where(safe, high, np.inf)
 
 
+def reciprocal(a: Ends) -> Ends:
+    """1 / a."""
+    return divide((1.0, 1.0), a)
+
+
 def negative(a: Ends) -> Ends:
     """The ends change places."""
     return -a[1], -a[0]
@@ -91,10 +96,10 @@ def exponential(a: Ends) -> Ends:
         return np.exp(a[0]), np.exp(a[1])
 
 
-def sine_range(low: Any, high: Any) -> Ends:
-    """Return the least and largest sine on [low, high] (...): at the ends, or 1 and -1 at crests between."""
-    sure = np.maximum(np.abs(low), np.abs(high)) <= SURE_TURNS
-    low, high = np.where(sure, low, -np.pi), np.where(sure, high, np.pi)
+def sine(a: Ends) -> Ends:
+    """At the ends, or 1 and -1 at crests between."""
+    sure = np.maximum(np.abs(a[0]), np.abs(a[1])) <= SURE_TURNS
+    low, high = np.where(sure, a[0], -np.pi), np.where(sure, a[1], np.pi)
     turn = 2 * np.pi
     at_low, at_high = np.sin(low), np.sin(high)
     # A crest that rounding hides here is so near an end that the sine there is 1 up to RANGE_OUTWARD.
@@ -108,7 +113,7 @@ def sine_range(low: Any, high: Any) -> Ends:
 def cosine(a: Ends) -> Ends:
     """cos(a) = sin(a + pi/2); float64 rounds a + pi/2, which moves the sine by less than the slack."""
     slack = 2.0**-51 * (np.maximum(np.abs(a[0]), np.abs(a[1])) + 2.0)
-    return sine_range(a[0] + np.pi / 2 - slack, a[1] + np.pi / 2 + slack)
+    return sine((a[0] + np.pi / 2 - slack, a[1] + np.pi / 2 + slack))
 
 
 def less(a: Ends, b: Ends) -> Ends:

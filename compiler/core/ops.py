@@ -1,9 +1,10 @@
 """The operations of the IR, one row each: what the rest of the compiler knows about them in general.
 
 A row says how many operands an operation takes, which attributes, what type comes out, what it computes (a
-NumPy function: the definition, used by the interpreter), how the target may round it, and what it makes of
-intervals [intervals.py]. A new operation is a row here, a rule in bounds.py and an entry in each dialect's
-table; tests demand all three.
+NumPy function: the definition, used by the interpreter), how the target may round it, what it makes of
+intervals [intervals.py], and its slopes: traced they are the gradient pass, on intervals the sensitivities of
+adjoint.py. A new operation is a row here, a rule in bounds.py and an entry in each dialect's table; tests
+demand all three.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from . import intervals
+from . import intervals as ends
 from .intervals import Ends, Image, monotone
 from .ir import DTYPES, Attribute, Node, Parameters, Type
 
@@ -22,6 +23,9 @@ Rounding = Literal["exact", "nearest", "divide", "sqrt", "power", "exp", "sine",
 """How a target computes it: exactly, correctly rounded, or with its class's error (profiles.py)."""
 
 TypeRule = Callable[[Sequence[Type], Mapping[str, Attribute], Parameters], Type]
+
+Slopes = Callable[..., tuple[Any, ...]]
+"""(d, y, *x), d being a derivative by the value y -> those by each operand x, in functions of NumPy."""
 
 
 class TypeRuleError(Exception):
@@ -42,6 +46,7 @@ class Op:
     parameters: tuple[str, ...] = ()  # the attributes that name parameters
     elementwise: bool = False
     image: Image | None = None  # None: what it computes is not a matter of the operands' ends
+    slopes: Slopes | None = None
 
 
 FLOATS = ("float32",)
@@ -214,13 +219,25 @@ def _row(
     rounding: Rounding = "exact",
     kinds: Sequence[str] = FLOATS,
     image: Image | None = None,
+    slopes: Slopes | None = None,
 ) -> Op:
     """Return the row of an elementwise operation whose definition is a NumPy function.
 
     Without an image of its own it is monotone: its ends are those of its operands.
     """
-    ends = image or monotone(function)
-    return Op(name, arity, _elementwise(kinds), function, rounding, elementwise=True, image=ends)
+    image, rule = image or monotone(function), _elementwise(kinds)
+    return Op(name, arity, rule, function, rounding, elementwise=True, image=image, slopes=slopes)
+
+
+def _quotient(d: Any, y: Any, a: Any, b: Any) -> tuple[Any, ...]:
+    """d(a / b) = da / b - (a / b) db / b."""
+    over = d / b
+    return over, -(over * y)
+
+
+def _either(first: Any, d: Any) -> tuple[Any, ...]:
+    """The value is the first operand where `first` holds, else the second."""
+    return np.where(first, d, 0.0), np.where(first, 0.0, d)
 
 
 def _compare(name: str, function: Callable[..., Any], image: Image) -> Op:
@@ -244,35 +261,45 @@ OPS: Mapping[str, Op] = {
             optional=("bias",),
             parameters=("weight", "bias"),
         ),
-        _row("add", np.add, 2, "nearest", NUMBERS),
-        _row("subtract", np.subtract, 2, "nearest", NUMBERS, intervals.subtract),
-        _row("multiply", np.multiply, 2, "nearest", NUMBERS, intervals.multiply),
-        _row("divide", np.divide, 2, "divide", image=intervals.divide),
-        _row("reciprocal", np.reciprocal, 1, "divide", image=lambda a: intervals.divide((1.0, 1.0), a)),
-        _row("negative", np.negative, 1, image=intervals.negative),
-        _row("absolute", np.absolute, 1, image=intervals.absolute),
-        _row("minimum", np.minimum, 2, kinds=NUMBERS),
-        _row("maximum", np.maximum, 2, kinds=NUMBERS),
+        _row("add", np.add, 2, "nearest", NUMBERS, slopes=lambda d, y, a, b: (d, d)),
+        _row("subtract", np.subtract, 2, "nearest", NUMBERS, ends.subtract, lambda d, y, a, b: (d, -d)),
+        _row(
+            "multiply", np.multiply, 2, "nearest", NUMBERS, ends.multiply, lambda d, y, a, b: (d * b, d * a)
+        ),
+        _row("divide", np.divide, 2, "divide", image=ends.divide, slopes=_quotient),
+        _row(
+            "reciprocal", np.reciprocal, 1, "divide", FLOATS, ends.reciprocal, lambda d, y, x: (-(d * y * y),)
+        ),
+        _row("negative", np.negative, 1, image=ends.negative, slopes=lambda d, y, x: (-d,)),
+        _row(
+            "absolute",
+            np.absolute,
+            1,
+            image=ends.absolute,
+            slopes=lambda d, y, x: (np.where(x < 0.0, -d, d),),
+        ),
+        _row("minimum", np.minimum, 2, kinds=NUMBERS, slopes=lambda d, y, a, b: _either(a < b, d)),
+        _row("maximum", np.maximum, 2, kinds=NUMBERS, slopes=lambda d, y, a, b: _either(a > b, d)),
         _row("floor", np.floor, 1),
-        _row("sqrt", np.sqrt, 1, "sqrt", image=intervals.sqrt),
-        _row("power", np.power, 2, "power", image=intervals.power),
-        _row("exp", np.exp, 1, "exp", image=intervals.exponential),
-        _row("sin", np.sin, 1, "sine", image=lambda a: intervals.sine_range(*a)),
-        _row("cos", np.cos, 1, "cosine", image=intervals.cosine),
-        _compare("less", np.less, intervals.less),
-        _compare("less_equal", np.less_equal, intervals.opposite(intervals.greater)),
-        _compare("greater", np.greater, intervals.greater),
-        _compare("greater_equal", np.greater_equal, intervals.opposite(intervals.less)),
-        _compare("equal", np.equal, intervals.equal),
-        _compare("not_equal", np.not_equal, intervals.opposite(intervals.equal)),
+        _row("sqrt", np.sqrt, 1, "sqrt", image=ends.sqrt, slopes=lambda d, y, x: (0.5 * d / y,)),
+        _row("power", np.power, 2, "power", image=ends.power),
+        _row("exp", np.exp, 1, "exp", image=ends.exponential),
+        _row("sin", np.sin, 1, "sine", image=ends.sine, slopes=lambda d, y, x: (d * np.cos(x),)),
+        _row("cos", np.cos, 1, "cosine", image=ends.cosine, slopes=lambda d, y, x: (-(d * np.sin(x)),)),
+        _compare("less", np.less, ends.less),
+        _compare("less_equal", np.less_equal, ends.opposite(ends.greater)),
+        _compare("greater", np.greater, ends.greater),
+        _compare("greater_equal", np.greater_equal, ends.opposite(ends.less)),
+        _compare("equal", np.equal, ends.equal),
+        _compare("not_equal", np.not_equal, ends.opposite(ends.equal)),
         _row("logical_and", np.logical_and, 2, kinds=("bool",)),
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
-        _row("logical_not", np.logical_not, 1, kinds=("bool",), image=intervals.logical_not),
+        _row("logical_not", np.logical_not, 1, kinds=("bool",), image=ends.logical_not),
         *(
             Op(each.__name__, 2, _elementwise(("uint32",)), each, "exact", elementwise=True)
             for each in (np.bitwise_and, np.bitwise_xor, np.right_shift)
         ),
-        Op("select", 3, _select, np.where, "exact", elementwise=True, image=intervals.select),
+        Op("select", 3, _select, np.where, "exact", elementwise=True, image=ends.select),
         Op(
             "convert",
             1,
@@ -320,7 +347,7 @@ ELEMENTWISE = tuple(op for op in OPS.values() if op.elementwise)
 def image(node: Node, operands: Sequence[Ends]) -> Ends:
     """Return the ends of what an operation computes, exactly, of its operands between theirs."""
     if node.op == "multiply" and node.args[0] == node.args[1]:
-        return intervals.square(operands[0])
+        return ends.square(operands[0])
     rule = OPS[node.op].image
     if rule is None:
         raise TypeRuleError(f"what {node.op} computes is not a matter of its operands' ends")

@@ -3,7 +3,7 @@
 1. Let e be the errors of an operation's operands. Its own is
    f'(x') - f(x) = [f'(x') - f(x')] + [f(x') - f(x)]: what it makes itself of what the kernel gives it
    [`Enclosure.own`], and slopes times e, the slopes being those of f somewhere between x and x' (the mean
-   value theorem) [`SLOPES`].
+   value theorem) [`slopes`].
 2. So an output's error is, exactly, the sum over all operations of their own errors times a sensitivity: the
    product of all slopes on the way, added up over all ways. From the last operation to the first it is
    enclosed in [middle - radius, middle + radius] [`output_error`]: sums of products keep their signs, where
@@ -18,16 +18,18 @@ sums of sensitivities: Linnainmaa, "Taylor expansion of the accumulated rounding
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from ..core.enclosure import OUTWARD, Enclosure
-from ..core.intervals import RANGE_OUTWARD, sine_range
-from ..core.ir import Program
-from ..core.ops import OPS
+from ..core.intervals import RANGE_OUTWARD, Image
+from ..core.ir import Node, Program
+from ..core.ops import OPS, image
 
 Array = NDArray[np.float64]
 
@@ -51,48 +53,43 @@ def _within(low: Array, high: Array) -> Near:
     return Near((low + high) / 2, radius)
 
 
-def _always(value: float) -> Callable[[Sequence[Enclosure]], list[Near]]:
-    """Return the rule of one operand's slope that is the same everywhere."""
-    return lambda operands: [Near(np.full(1, value), np.zeros(1))]
+class Interval(NDArrayOperatorsMixin):
+    """Numbers (...) between two ends; NumPy's functions of them give their images [ops.py]."""
+
+    def __init__(self, low: Any, high: Any) -> None:
+        self.low, self.high = low, high
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *operands: Any) -> Interval:
+        ends = ((o.low, o.high) if isinstance(o, Interval) else (o, o) for o in operands)
+        return Interval(*IMAGES[ufunc](*ends))
+
+    def __array_function__(self, function: Any, types: Any, args: Any, options: Any) -> Interval:
+        return self.__array_ufunc__(function, "", *args)
 
 
-def _multiply(operands: Sequence[Enclosure]) -> list[Near]:
-    """a'b' - a b = b' (a' - a) + a (b' - b)."""
-    a, b = operands
-    return [_within(b.low - b.error, b.high + b.error), _within(a.low, a.high)]
+IMAGES: Mapping[Any, Image] = {op.definition: op.image for op in OPS.values() if op.image is not None}
+"""The images of operations, by the functions that define them."""
 
 
-def _minimum(operands: Sequence[Enclosure]) -> list[Near]:
-    """Between 0 and 1 for each; 0 for one that is chosen by neither side."""
-    a, b = operands
-    reach = a.read + b.read
-    halves = [np.where(never, 0.0, 0.5) for never in (a.low - reach > b.high, b.low - reach > a.high)]
-    return [Near(half, half) for half in halves]
+def slopes(node: Node, operands: Sequence[Enclosure], secant: bool = True) -> list[Near]:
+    """Return an operation's slopes (..., n) between its operands' two values; none if its row has none.
 
-
-def _maximum(operands: Sequence[Enclosure]) -> list[Near]:
-    """As the minimum of the negated."""
-    return _minimum([Enclosure(-o.high, -o.low, o.error) for o in operands])
-
-
-def sine_slope(a: Enclosure) -> Near:
-    """sin a' - sin a = 2 cos((a + a') / 2) sin(d / 2), d = a' - a; |2 sin(d / 2) - d| <= |d|^3 / 24."""
-    quarter, half = np.pi / 2, a.read / 2
-    cosine = _within(*sine_range(a.low - half + quarter, a.high + half + quarter))
-    return Near(cosine.middle, cosine.radius + np.minimum(half**2 / 6, 2.0))
-
-
-SLOPES: Mapping[str, Callable[[Sequence[Enclosure]], list[Near]]] = {
-    "add": lambda operands: [Near(np.ones(1), np.zeros(1))] * 2,
-    "subtract": lambda operands: [Near(np.full(1, sign), np.zeros(1)) for sign in (1.0, -1.0)],
-    "multiply": _multiply,
-    "negative": _always(-1.0),
-    "absolute": lambda operands: [Near(np.zeros(1), np.ones(1))],
-    "minimum": _minimum,
-    "maximum": _maximum,
-    "sin": lambda operands: [sine_slope(operands[0])],
-}
-"""The slopes (..., n) of an elementwise operation between its operands' two values, one for each operand."""
+    f(x') - f(x) is what each operand changes by itself, those before it being the reference's, those after it
+    the kernel's: of a product b' (a' - a) + a (b' - b). `secant`: of a sine it is the slope in the middle of
+    both values times 2 sin(d / 2), d = a' - a, and |2 sin(d / 2) - d| <= |d|^3 / 24.
+    """
+    rule, found, is_wave = OPS[node.op].slopes, list[Near](), secant and node.op in ("sin", "cos")
+    reach = [o.read / 2 if is_wave else o.read for o in operands]
+    both = [Interval(o.low - r, o.high + r) for o, r in zip(operands, reach, strict=True)]
+    for i in range(len(operands)) if rule else ():
+        x = [*(Interval(o.low, o.high) for o in operands[:i]), *both[i:]]
+        y = image(node, [(each.low, each.high) for each in x])
+        slope = rule(Interval(1.0, 1.0), Interval(*y), *x)[i]
+        near = _within(*(np.atleast_1d(end) for end in (slope.low, slope.high)))
+        found.append(
+            Near(near.middle, near.radius + (np.minimum(reach[i] ** 2 / 6, 2.0) if is_wave else 0.0))
+        )
+    return found
 
 
 def output_error(program: Program, found: Sequence[Enclosure], output: int) -> Array | None:
@@ -109,10 +106,9 @@ def output_error(program: Program, found: Sequence[Enclosure], output: int) -> A
         for index in range(output, -1, -1):
             if index not in waiting:
                 continue
-            sensitivity, passed = waiting.pop(index), _passed(program, found, index)
-            own = found[index].error if passed is None else found[index].own
-            total = total + np.sum(sensitivity.largest * _vector(program, index, own)[..., None, :], axis=-1)
-            for arg, slope in zip(program.nodes[index].args, passed or (), strict=False):
+            sensitivity, (own, passed) = waiting.pop(index), _passed(program, found, index)
+            total = total + np.sum(sensitivity.largest * own[..., None, :], axis=-1)
+            for arg, slope in zip(program.nodes[index].args, passed, strict=False):
                 more = _through(program, index, arg, sensitivity, slope)
                 waiting[arg] = _added(waiting.get(arg), more)
     total = total * (1 + OUTWARD)
@@ -132,20 +128,25 @@ def unclamped(program: Program, found: Sequence[Enclosure], index: int) -> int:
     return index
 
 
-def _passed(program: Program, found: Sequence[Enclosure], index: int) -> list[Near | None] | None:
-    """Return what an operation passes of its operands' errors; None for nothing: its own is the whole."""
-    node = program.nodes[index]
-    if found[index].own is None:
-        return None
-    if node.op in ("affine", "stack", "component"):
-        return [None] * len(node.args)
-    if node.op not in SLOPES:
-        return None
+def _passed(program: Program, found: Sequence[Enclosure], index: int) -> tuple[Array, Sequence[Near | None]]:
+    """Return the error (..., n) that an operation adds itself, and how it passes on that of its operands.
+
+    Where slopes have no end it is the whole error, and nothing is passed on.
+    """
+    node, (error, own) = program.nodes[index], (found[index].error, found[index].own)
+    whole = _vector(program, index, error)
+    if own is not None and node.op in ("affine", "stack", "component"):
+        return _vector(program, index, own), [None] * len(node.args)
     operands = []
-    for arg in node.args:
+    for arg in node.args if own is not None else ():
         e = found[arg]
         operands.append(Enclosure(*(_vector(program, arg, part) for part in (e.low, e.high, e.error))))
-    return list(SLOPES[node.op](operands))
+    passed = slopes(node, operands) if operands else []
+    if not passed:
+        return whole, ()
+    finite = np.isfinite(sum(each.largest for each in passed))
+    kept = [Near(*(np.where(finite, part, 0.0) for part in (each.middle, each.radius))) for each in passed]
+    return np.where(finite, _vector(program, index, own), whole), kept
 
 
 def _vector(program: Program, index: int, part: Array) -> Array:

@@ -32,7 +32,6 @@ from ..core.enclosure import OUTWARD as OUTWARD
 from ..core.enclosure import OVERFLOW
 from ..core.enclosure import Enclosure as Enclosure
 from ..core.intervals import RANGE_OUTWARD, Ends
-from ..core.intervals import sine_range as sine_range
 from ..core.ir import Gather, Node, Program
 from ..core.ops import LOOPS, OPS, image
 from ..core.profiles import (
@@ -238,32 +237,18 @@ def exp_error(argument: Array) -> Array:
     return 2 * UNIT_ROUNDOFF * (EXP_ULPS[0] + EXP_ULPS[1] * argument)
 
 
-def _sin(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """The mean value theorem, |cos| between the two arguments, and the contract's error on its domain."""
-    (a,) = operands
-    low, high = sine_range(a.low, a.high)
-    slopes = sine_range(a.low - a.read + np.pi / 2, a.high + a.read + np.pi / 2)
-    own = np.inf if context.sine.error is None else context.sine.error
-    moved = np.maximum(np.abs(slopes[0]), np.abs(slopes[1])) * a.read
-    # Both values lie in [-1, 1], up to the contract's error, for all finite arguments in its domain.
-    error = np.minimum(moved, 2.0) + own + FLUSH
-    reach = argument_reach(a)
-    safe = np.isfinite(reach) & (reach <= context.sine.domain)
-    return Enclosure(low, high, np.where(safe, error, np.inf))
-
-
-def _cos(context: Context, operands: list[Enclosure]) -> Enclosure:
-    """cos(a) = sin(a + pi/2), with the cosine's own contract; without one no bound."""
-    if context.cosine is None:
+def _wave(context: Context, operands: list[Enclosure]) -> Enclosure:
+    """The mean value theorem, and the contract's error on its domain; without a contract no bound."""
+    (a,), contract = operands, context.sine if context.node.op == "sin" else context.cosine
+    if contract is None:
         return _no_rule(context, operands)
-    (a,) = operands
-    # float64 rounds a + pi/2, which moves the sine by less than this.
-    slack = 2.0**-51 * (a.largest + 2.0)
-    quarter = np.pi / 2
-    shifted = Enclosure(a.low + quarter - slack, a.high + quarter + slack, a.error)
-    found = _sin(replace(context, sine=context.cosine), [shifted])
-    inside = argument_reach(a) <= context.cosine.domain
-    return replace(found, error=np.where(inside, found.error, np.inf))
+    (slope,) = adjoint.slopes(context.node, operands, secant=False)
+    moved = np.reshape(slope.largest, np.shape(a.low)) * a.read
+    # Both values lie in [-1, 1], up to the contract's error, for all finite arguments in its domain.
+    error = np.minimum(moved, 2.0) + (np.inf if contract.error is None else contract.error) + FLUSH
+    reach = argument_reach(a)
+    safe = np.isfinite(reach) & (reach <= contract.domain)
+    return Enclosure(*_image(context, operands), np.where(safe, error, np.inf))
 
 
 def argument_reach(a: Enclosure) -> Array:
@@ -336,14 +321,13 @@ RULES: Mapping[str, Rule] = {
     "sqrt": _sqrt,
     "power": _power,
     "exp": _exp,
-    "sin": _sin,
     "stack": _stack,
     "component": _component,
     "reciprocal": _divide,
     **dict.fromkeys(("less", "less_equal", "greater", "greater_equal"), _compare),
     "select": _select,
     **dict.fromkeys((*NO_BOUND, *LOOPS), _no_rule),
-    "cos": _cos,
+    **dict.fromkeys(("sin", "cos"), _wave),
 }
 """One rule an operation; inputs are given."""
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wamnet.compiler.core import ops
+from wamnet.compiler.core import intervals, ops
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.profiles import EMITTED_COSINE, EMITTED_SINE, SineContract
@@ -210,7 +210,7 @@ def test_affine_in_any_order_with_and_without_fma(data, n, m, seed, fused):
 
 @given(low=st.floats(-20, 20), width=st.floats(0, 8), at=st.floats(0, 1))
 def test_sine_range_holds_the_sine(low, width, at):
-    least, most = bounds.sine_range(np.float64(low), np.float64(low + width))
+    least, most = intervals.sine((np.float64(low), np.float64(low + width)))
     assert least <= np.sin(low + at * width) <= most
 
 
@@ -225,7 +225,7 @@ def test_sine_range_holds_the_sine(low, width, at):
 )
 def test_sine_range_is_tight(low, high, wanted):
     """The range is widened by 2^-40, no more."""
-    found = bounds.sine_range(np.float64(low), np.float64(high))
+    found = intervals.sine((np.float64(low), np.float64(high)))
     assert np.max(np.abs(np.array(found) - wanted)) <= 2.0**-39
 
 
@@ -298,7 +298,7 @@ def test_sine_of_what_has_no_bound_has_none():
 )
 def test_sine_range_does_not_trust_float64_with_many_turns(low, high):
     """The first range holds a crest that float64 does not find: it gave 0.9993."""
-    assert bounds.sine_range(np.float64(low), np.float64(high)) == (-1, 1)
+    assert intervals.sine((np.float64(low), np.float64(high))) == (-1, 1)
 
 
 def test_range_of_a_long_sum_is_wide_enough():

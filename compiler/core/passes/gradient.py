@@ -1,4 +1,4 @@
-"""The derivative of a program by its parameters: reverse mode, one rule an operation [`RULES`].
+"""The derivative of a program by its parameters: reverse mode, by the slopes of each operation [ops.py].
 
 1. Walk from the output to the inputs [`gradient`]. A value's slope is the derivative of the loss by the
    value: the output's is given, those of operands follow by the chain rule. Slopes of a value with several
@@ -14,7 +14,6 @@ refimpl/network/siren.py, and each rule with central differences.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,40 +34,6 @@ class Sum:
     parameter: str
     left: str
     right: str | None = None
-
-
-Slopes = tuple[Traced, ...]
-"""The slope of each operand."""
-
-Rule = Callable[[Traced, Traced, tuple[Traced, ...]], Slopes]
-"""(the slope of the value, the value, its operands) -> their slopes."""
-
-
-def _divide(d: Traced, y: Traced, x: tuple[Traced, ...]) -> Slopes:
-    """d(a / b) = da / b - (a / b) db / b."""
-    over = d / x[1]
-    return over, -(over * y)
-
-
-def _chosen(first: Traced, d: Traced) -> Slopes:
-    """Return the slopes of two operands: the value is the first where `first` holds, else the second."""
-    return emit(d.builder, "select", first, d, 0.0), emit(d.builder, "select", first, 0.0, d)
-
-
-RULES: Mapping[str, Rule] = {
-    "add": lambda d, y, x: (d, d),
-    "subtract": lambda d, y, x: (d, -d),
-    "multiply": lambda d, y, x: (d * x[1], d * x[0]),
-    "divide": _divide,
-    "negative": lambda d, y, x: (-d,),
-    "reciprocal": lambda d, y, x: (-(d * y * y),),
-    "sqrt": lambda d, y, x: (0.5 * d / y,),
-    "minimum": lambda d, y, x: _chosen(x[0] < x[1], d),
-    "maximum": lambda d, y, x: _chosen(x[0] > x[1], d),
-    "sin": lambda d, y, x: (d * np.cos(x[0]),),
-    "cos": lambda d, y, x: (-(d * np.sin(x[0])),),
-}
-"""One rule an operation; affine maps and parameters: [`gradient`]."""
 
 
 def gradient(program: Program, output: str, slope: str) -> tuple[Program, tuple[Sum, ...]]:
@@ -127,11 +92,11 @@ class _Walk:
                 through = emit(self.builder, "affine", d, **dict(attributes(weight=name)))
                 self._add(index, node.args[0], through)
         else:
-            if node.op not in RULES:
-                supported = ", ".join(("affine", "parameter", *RULES))
+            slopes = OPS[node.op].slopes
+            if slopes is None:
+                supported = ", ".join(("affine", "parameter", *(op.name for op in OPS.values() if op.slopes)))
                 raise CompileError(f"{node.op} has no derivative rule; supported: {supported}")
-            operands = tuple(Traced(self.builder, arg) for arg in node.args)
-            parts = RULES[node.op](d, Traced(self.builder, index), operands)
+            parts = slopes(d, Traced(self.builder, index), *(Traced(self.builder, arg) for arg in node.args))
             for arg, part in zip(node.args, parts, strict=True):
                 if self.needs[arg]:
                     self._add(index, arg, part)

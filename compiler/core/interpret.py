@@ -1,5 +1,7 @@
 """The meaning of a program: each node's NumPy definition, applied in order [`interpret`].
 
+A program runs in other domains as well, such as ranges [`run`].
+
 Lanes are leading axes: an input of type float32[n] is an array (..., n), a number an array (...). With
 dtype=float64, in which floats are then computed, this is the reference that error bounds speak about; with
 float32 it is one more executor. Integers and booleans are the same in both.
@@ -9,18 +11,64 @@ A value is dropped after its last use [`loops.last_reads`]: a picture's are larg
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .ir import Gather, Node, Parameters, Program
-from .loops import Loop, Part, last_reads, loops
+from .loops import Loop, Walk, last_reads, loops
 from .ops import OPS
 from .sums import parts
 
 Array = NDArray[Any]
+
+
+Rule = Callable[[Node, list[Any], int], Any]
+"""(node, its operands, the row of a trip's tables) -> its value, whatever values are."""
+
+
+def run(program: Program, rule: Rule, enters: Callable[[Any], bool] | None = None) -> dict[str, Any]:
+    """Return each output of the program in the domain whose values `rule` makes, node by node.
+
+    `enters` tells of a walk's condition whether any lane enters a node; without it all rows are read, as
+    those that are left out change nothing.
+    """
+    values: list[Any] = [None] * len(program.nodes)
+    ends, in_bodies = loops(program)
+    unread = last_reads(program, ends)
+
+    def compute(indices: Iterable[int], row: int = 0) -> None:
+        for index in indices:
+            node = program.nodes[index]
+            operands = [values[arg] for arg in node.args]
+            if node.op in ("carried", "loop"):
+                at = int(node["index"]) if node.op == "loop" else 0  # type: ignore[arg-type]
+                values[index] = operands[at]
+            else:
+                values[index] = rule(node, operands, row)
+
+    def entered(walk: Walk, branch: int) -> bool:
+        compute(walk.guard, branch)
+        return enters is not None and enters(values[walk.enters])
+
+    def turn(loop: Loop) -> None:
+        """Make the trips of a loop; the carried numbers are then its results."""
+        for part, row in loop.rows(program.parameters, entered if enters else None):
+            compute(part.body, row)
+            after = [values[index] for index in part.after]
+            for index, value in zip(loop.carried, after, strict=True):
+                values[index] = value
+
+    for index in range(len(program.nodes)):
+        if index in ends:
+            turn(ends[index])
+        if index not in in_bodies:
+            compute([index])
+        for old in unread[index]:
+            values[old] = None
+    return {name: values[index] for name, index in program.outputs}
 
 
 def interpret(
@@ -32,70 +80,24 @@ def interpret(
         name: array.astype(element(str(array.dtype), kind), copy=False)
         for name, array in program.parameters.items()
     }
-    values: list[Any] = [None] * len(program.nodes)
-    ends, in_bodies = loops(program)
-    unread = last_reads(program, ends)
-    for index, node in enumerate(program.nodes):
-        if index in ends:
-            _run(ends[index], program, values, inputs, parameters, kind)
-        if index not in in_bodies:
-            values[index] = _value(node, program, values, inputs, parameters, kind)
-        for old in unread[index]:
-            values[old] = None
-    return {name: values[index] for name, index in program.outputs}
 
+    def value(node: Node, operands: list[Any], row: int) -> Any:
+        """Return the value of one node in all lanes."""
+        if node.op == "input":
+            return np.asarray(inputs[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
+        if node.op == "constant":
+            return element(node.type.dtype, kind).type(node["value"])
+        if node.op == "parameter":
+            return parameters[str(node["name"])]
+        if node.op in ("row", "branch"):
+            return parameters[str(node["table"])][row]
+        spread = [_spread(x, program.nodes[arg], node) for x, arg in zip(operands, node.args, strict=True)]
+        of_window = node.op == "affine" and program.nodes[node.args[0]].op == "input"
+        if of_window and kind == np.float32 and program.gather:
+            return _in_parts(node, spread[0], parameters, program.gather)
+        return apply(node, spread, parameters, kind)
 
-def _run(
-    loop: Loop, program: Program, values: list[Any], given: Mapping[str, Array], parameters: Any, kind: Any
-) -> None:
-    """Make the trips of a loop; the carried numbers are then its results."""
-
-    def compute(indices: tuple[int, ...], at: int) -> None:
-        for index in indices:
-            node = program.nodes[index]
-            if node.op in ("row", "branch"):
-                values[index] = parameters[str(node["table"])][at]
-            else:
-                values[index] = _value(node, program, values, given, parameters, kind)
-
-    def enters(branch: int) -> bool:
-        assert loop.walk is not None
-        compute(loop.walk.guard, branch)
-        return bool(np.any(values[loop.walk.enters]))
-
-    walk, plain = loop.walk, Part(loop.body, loop.after)
-    rows = walk.rows(program.parameters, enters) if walk else ((plain, trip) for trip in range(loop.trips))
-    for part, row in rows:
-        compute(part.body, row)
-        after = [values[index] for index in part.after]
-        for index, value in zip(loop.carried, after, strict=True):
-            values[index] = value
-
-
-def _value(
-    node: Node,
-    program: Program,
-    values: list[Any],
-    given: Mapping[str, Array],
-    parameters: Any,
-    kind: np.dtype[Any],
-) -> Any:
-    """Return the value of one node in all lanes."""
-    if node.op == "input":
-        return np.asarray(given[str(node["name"])]).astype(element(node.type.dtype, kind), copy=False)
-    if node.op == "constant":
-        return element(node.type.dtype, kind).type(node["value"])
-    if node.op == "parameter":
-        return parameters[node["name"]]
-    if node.op == "carried":
-        return values[node.args[0]]
-    if node.op == "loop":
-        return values[node.args[int(node["index"])]]  # type: ignore[arg-type]
-    operands = [_spread(values[arg], program.nodes[arg], node) for arg in node.args]
-    of_window = node.op == "affine" and program.nodes[node.args[0]].op == "input"
-    if of_window and kind == np.float32 and program.gather:
-        return _in_parts(node, operands[0], parameters, program.gather)
-    return apply(node, operands, parameters, kind)
+    return run(program, value, lambda condition: bool(np.any(condition)))
 
 
 def _in_parts(node: Node, x: Any, parameters: Any, gather: Gather) -> Any:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from .ir import Node, Parameters, Program
@@ -142,6 +143,16 @@ class Loop:
     after: tuple[int, ...]
     body: tuple[int, ...]
     walk: Walk | None = None
+
+    def rows(
+        self, parameters: Parameters, enters: Callable[[Walk, int], bool] | None = None
+    ) -> Iterator[tuple[Part, int]]:
+        """Yield what is done in the trips, and with which row; of a walk without `enters` all rows."""
+        if self.walk is None:
+            return ((Part(self.body, self.after), trip) for trip in range(self.trips))
+        if enters is None:
+            return self.walk.all_rows(parameters)
+        return self.walk.rows(parameters, partial(enters, self.walk))
 
 
 def loops(program: Program) -> tuple[dict[int, Loop], frozenset[int]]:

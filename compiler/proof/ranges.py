@@ -6,7 +6,7 @@
    monotone, so the ends of a sum, rounded, are the ends of the rounded sums, and what is computed exactly
    stays a point [`_nearest`]. Functions that the target only approximates widen the ends by their promise.
 3. A decision is certain where the ranges of what is compared do not overlap; else it is *undecided*: false
-   and true, and a selection by it has a range that holds both branches [`_compare`, `_select`]. Booleans are
+   and true, and a selection by it has a range that holds both branches [`_decision`, `_select`]. Booleans are
    ordered, false before true, which makes "and" and "or" Kleene's three-valued ones.
 4. Beside its range a value knows whether an undecided decision affects it [`Range.sure`]: a box behind
    the nearest surface may be undecided, and the distance is sure all the same.
@@ -32,10 +32,9 @@ from typing import Any
 import numpy as np
 
 from ...refimpl.errors import CompileError
-from ..core.interpret import apply, element
+from ..core.interpret import apply, element, run
 from ..core.intervals import Ends
 from ..core.ir import Node, Program
-from ..core.loops import Loop, Part, last_reads, loops
 from ..core.ops import image
 from ..core.profiles import (
     EMITTED_COSINE,
@@ -138,65 +137,27 @@ def evaluate(
     program: Program, inputs: Mapping[str, Any], arithmetic: Arithmetic = PROMISED, guided: bool = False
 ) -> dict[str, Range]:
     """Return the range of each output for inputs (...), exact numbers or ranges by name."""
-    run = _Run(program, inputs, arithmetic, guided, [None] * len(program.nodes))
-    ends, in_bodies = loops(program)
-    unread = last_reads(program, ends)
-    # Numbers that are too large or no numbers are recognised by their value [`_whole`].
-    with np.errstate(all="ignore"):
-        for index in range(len(program.nodes)):
-            if index in ends:
-                run.loop(ends[index])
-            if index not in in_bodies:
-                run.found[index] = run.node(index)
-            for done in unread[index]:
-                run.found[done] = None
-    return {name: run.found[index] for name, index in program.outputs}
+    parameters = program.parameters
 
-
-@dataclass(frozen=True)
-class _Run:
-    """A walk through a program; `found` holds the ranges of its nodes so far."""
-
-    program: Program
-    inputs: Mapping[str, Any]
-    arithmetic: Arithmetic
-    guided: bool
-    found: list[Any]
-
-    def loop(self, loop: Loop) -> None:
-        """Make the trips of a loop, as interpret.py does; the carried numbers are then its results.
-
-        A walk makes all of them: what it leaves out changes nothing.
-        """
-        plain = ((Part(loop.body, loop.after), trip) for trip in range(loop.trips))
-        for part, row in loop.walk.all_rows(self.program.parameters) if loop.walk else plain:
-            for index in part.body:
-                self.found[index] = self.node(index, row)
-            after = [self.found[index] for index in part.after]
-            for index, found in zip(loop.carried, after, strict=True):
-                self.found[index] = found
-
-    def node(self, index: int, trip: int = 0) -> Range:
+    def range_of(node: Node, operands: list[Range], row: int) -> Range:
         """Return the range of one node."""
-        node, parameters = self.program.nodes[index], self.program.parameters
-        operands = [self.found[arg] for arg in node.args]
         if node.op == "input":
-            return _given(self.inputs[str(node["name"])], node.type.dtype)
+            return _given(inputs[str(node["name"])], node.type.dtype)
         if node.op == "constant":
             return _given(np.asarray(node["value"]), node.type.dtype)
         if node.op == "row":
-            return _given(parameters[str(node["table"])][trip], node.type.dtype)
-        if node.op == "carried":
-            return operands[0]  # type: ignore[no-any-return]
-        if node.op == "loop":
-            return operands[int(node["index"])]  # type: ignore[no-any-return,arg-type]
+            return _given(parameters[str(node["table"])][row], node.type.dtype)
         if node.op not in RULES or node.type.shape:
             raise CompileError(
                 f"operation {node.op!r} giving {node.type} has no rule for ranges; there are rules for "
                 f"numbers and for: {', '.join(RULES)}; add one to RULES of compiler/proof/ranges.py"
             )
         plain = apply(node, [o.plain for o in operands], parameters, np.dtype(np.float32))
-        return RULES[node.op](Context(node, parameters, self.arithmetic, plain, self.guided), operands)
+        return RULES[node.op](Context(node, parameters, arithmetic, plain, guided), operands)
+
+    # Numbers that are too large or no numbers are recognised by their value [`_whole`].
+    with np.errstate(all="ignore"):
+        return run(program, range_of)
 
 
 def _given(value: Any, dtype: str) -> Range:
@@ -373,16 +334,12 @@ def _wave(context: Context, operands: list[Range]) -> Range:
 # ---- exact operations -------------------------------------------------------------------------------------
 
 
-def _negative(context: Context, operands: list[Range]) -> Range:
+def _sign(context: Context, operands: list[Range]) -> Range:
     """Exact; a product that is negated may be fused still."""
     (a,) = operands
     product = None if a.product is None else (-a.product[1], -a.product[0])
-    return Range(*_image(context, operands), context.plain, a.sure, product)
-
-
-def _absolute(context: Context, operands: list[Range]) -> Range:
-    """Exact."""
-    return Range(*_whole(*_image(context, operands)), context.plain, operands[0].sure)
+    ends = _whole(*_image(context, operands))
+    return Range(*ends, context.plain, a.sure, product if context.node.op == "negative" else None)
 
 
 def _extreme(context: Context, operands: list[Range]) -> Range:
@@ -434,15 +391,10 @@ def _take(context: Context, operands: list[Range]) -> Range:
 # ---- decisions --------------------------------------------------------------------------------------------
 
 
-def _compare(context: Context, operands: list[Range]) -> Range:
+def _decision(context: Context, operands: list[Range]) -> Range:
     """False and true are the ends of what is not certain; on what may be NaN nothing is."""
-    (low, high), known = _image(context, operands), operands[0].known & operands[1].known
+    (low, high), known = _image(context, operands), operands[0].known & operands[-1].known
     return _decided(context, low & known, high | ~known, False)
-
-
-def _logic(context: Context, operands: list[Range]) -> Range:
-    """Kleene's: false if one is false, or true if one is true; not turns both round."""
-    return _decided(context, *_image(context, operands), False)
 
 
 def _select(context: Context, operands: list[Range]) -> Range:
@@ -454,32 +406,25 @@ def _select(context: Context, operands: list[Range]) -> Range:
 
 
 RULES: Mapping[str, Rule] = {
-    "add": _numbers(_sum),
-    "subtract": _numbers(_sum),
+    **dict.fromkeys(("add", "subtract"), _numbers(_sum)),
     "multiply": _numbers(_multiply),
-    "divide": _divide,
-    "reciprocal": _divide,
-    "negative": _negative,
-    "absolute": _absolute,
-    "minimum": _extreme,
-    "maximum": _extreme,
+    **dict.fromkeys(("divide", "reciprocal"), _divide),
+    **dict.fromkeys(("negative", "absolute"), _sign),
+    **dict.fromkeys(("minimum", "maximum"), _extreme),
     "floor": _floor,
     "sqrt": _sqrt,
     "power": _power,
     "exp": _exp,
-    "sin": _wave,
-    "cos": _wave,
-    **dict.fromkeys(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"), _compare),
-    **dict.fromkeys(("logical_and", "logical_or", "logical_not"), _logic),
-    "bitwise_xor": _integers,
-    "bitwise_and": _integers,
-    "right_shift": _integers,
+    **dict.fromkeys(("sin", "cos"), _wave),
+    **dict.fromkeys(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"), _decision),
+    **dict.fromkeys(("logical_and", "logical_or", "logical_not"), _decision),
+    **dict.fromkeys(("bitwise_xor", "bitwise_and", "right_shift"), _integers),
     "select": _select,
     "convert": _convert,
     "take": _take,
 }
-"""One rule an operation; inputs, constants and what makes up a loop are the walk's own [`_Run`]. Vectors are
-taken apart before, by `scalarize`."""
+"""One rule an operation; inputs, constants and rows are `evaluate`'s own. Vectors are taken apart before, by
+`scalarize`."""
 
 
 def where(condition: Any, a: Range, b: Range) -> Range:

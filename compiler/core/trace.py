@@ -242,7 +242,7 @@ def _operand(builder: Builder, value: Any, beside: str | None = None) -> int:
         return _add(builder, "convert", (index,), dtype=kind) if kind in ("int32", "uint32") else index
     if not isinstance(value, int | float | np.number | np.bool_ | np.ndarray):
         _refuse(f"a {type(value).__name__} as an operand")
-    return _constant(builder, value, _kind(value, beside))
+    return constant_of(builder, value, _kind(value, beside))
 
 
 def _is_mixed(value: Any) -> bool:
@@ -265,7 +265,7 @@ def _kind(value: Any, beside: str | None) -> str:
     return "float32"
 
 
-def _constant(builder: Builder, value: Any, dtype: str) -> int:
+def constant_of(builder: Builder, value: Any, dtype: str) -> int:
     """Return the index of a constant."""
     if dtype == "float32":
         return _add(builder, "constant", (), value=float(value))
@@ -334,7 +334,7 @@ def _full_like(builder: Builder, like: Traced, value: Any, dtype: Any = None) ->
     kind = np.dtype(dtype).name if dtype is not None else like.type.dtype
     if kind not in DTYPES:
         _refuse(f"np.full_like with dtype {kind}")
-    number = Traced(builder, _constant(builder, value, kind))
+    number = Traced(builder, constant_of(builder, value, kind))
     return emit(builder, "stack", *[number] * like.shape[0]) if like.shape else number
 
 

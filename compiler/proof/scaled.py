@@ -21,7 +21,7 @@ section 3, with slopes in [-1, 1], layer by layer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -33,6 +33,9 @@ from ..core.ir import Program
 from .adjoint import unclamped
 
 Array = NDArray[np.float64]
+
+Gradients = Callable[[list[Array], float], Sequence[Array]]
+"""Of logarithms of scalings, and the power that makes norms sharp."""
 
 STEPS = 60
 """Most steps of the descent: three hundred more gain a hundredth."""
@@ -191,16 +194,21 @@ class Held:
 def _scalings(*held: Held) -> list[Array]:
     """Return the scalings for matrices and, last, the first layer's errors."""
     *matrices, error = (array.array for array in held)
-    widths = [matrix.shape[1] for matrix in matrices]
-    logs, means = [np.zeros(n) for n in widths], [np.zeros(n) for n in widths]
-    squares = [np.zeros(n) for n in widths]
-    for step in range(min(STEPS, WORK // max(_work(matrices), 1))):
-        gradients = _gradients(matrices, error, logs, 20.0 * (1 + step / 20))
-        for i, gradient in enumerate(gradients):
+    steps = min(STEPS, WORK // max(_work(matrices), 1))
+    start = [np.zeros(matrix.shape[1]) for matrix in matrices]
+    found = descended(start, lambda logs, power: _gradients(matrices, error, logs, power), steps)
+    return [short(np.exp(log - log.mean())) for log in found]
+
+
+def descended(logs: list[Array], gradients: Gradients, steps: int) -> list[Array]:
+    """Return the logarithms of scalings after so many steps along means of gradients, over their size."""
+    means, squares = ([np.zeros_like(log) for log in logs] for _ in range(2))
+    for step in range(steps):
+        for i, gradient in enumerate(gradients(logs, 20.0 * (1 + step / 20))):
             means[i] = 0.9 * means[i] + 0.1 * gradient
             squares[i] = 0.99 * squares[i] + 0.01 * gradient**2
             logs[i] = logs[i] - 0.1 / (1 + step / 20) * means[i] / (np.sqrt(squares[i]) + 1e-6)
-    return [short(np.exp(log - log.mean())) for log in logs]
+    return logs
 
 
 def chain(matrices: Sequence[Array], logs: Sequence[Array], power: float) -> tuple[float, list[Array]]:

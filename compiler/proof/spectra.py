@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.profiles import UNIT_ROUNDOFF
-from .spectra_checker import layers
+from .spectra_checker import AGAIN as AGAIN
+from .spectra_checker import UNDERFLOW, layers
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-AGAIN = 1 + 2.0**-16
-"""Factor of errors of errors: the sum of all coefficients is below 2^7."""
-
-TINY = 2.0**-90
+TINY = UNDERFLOW
 """More than underflow adds: fewer than 2^24 operations, each off by 2^-120 of the largest factor."""
 
 

@@ -22,9 +22,6 @@ from . import scaled, spectra
 
 Array = NDArray[np.float64]
 
-STEPS = 60
-"""Steps of the descent: as many again gain a hundredth."""
-
 WORK = 2**28
 """Multiplications that all steps may take, about."""
 
@@ -46,21 +43,20 @@ def _scalings(held: tuple[Any, ...], size: int, both: Any, ways: tuple[float, fl
     """Return t and the scalings of all layers."""
     weight, radius, *matrices = (each.array for each in held)
     first = _First(weight, radius, size, np.array(both, np.intp).reshape(2, -1), ways)
-    logs = [np.zeros(len(first.energies)), *(np.zeros(matrix.shape[1]) for matrix in matrices)]
-    means, squares = ([np.zeros_like(log) for log in logs] for _ in range(2))
+    start = [np.zeros(len(first.energies)), *(np.zeros(matrix.shape[1]) for matrix in matrices)]
     work = first.spectra.size * len(radius) + sum(m.size * min(m.shape) for m in matrices)
-    best, least = logs, math.inf
-    for step in range(min(STEPS, WORK // max(work, 1))):
-        power = 20.0 * (1 + step / 20)
-        value, gradients = first.gradient(logs[0], logs[1], power)
+    best, least = start.copy(), math.inf
+
+    def gradients(logs: list[Array], power: float) -> list[Array]:
+        """Return the derivatives of the product's logarithm, and keep what is best so far."""
+        nonlocal best, least
+        value, (before, after) = first.gradient(logs[0], logs[1], power)
         later, of_chain = scaled.chain(matrices, logs[1:], power)
-        gradients = [gradients[0], gradients[1] + of_chain[0], *of_chain[1:]]
         if value + later < least:
-            least, best = value + later, [log.copy() for log in logs]
-        for i, gradient in enumerate(gradients):
-            means[i] = 0.9 * means[i] + 0.1 * gradient
-            squares[i] = 0.99 * squares[i] + 0.01 * gradient**2
-            logs[i] = logs[i] - 0.1 / (1 + step / 20) * means[i] / (np.sqrt(squares[i]) + 1e-6)
+            least, best = value + later, logs.copy()
+        return [before, after + of_chain[0], *of_chain[1:]]
+
+    scaled.descended(start, gradients, min(scaled.STEPS, WORK // max(work, 1)))
     return [scaled.short(np.exp(log - log.mean())) for log in best]
 
 

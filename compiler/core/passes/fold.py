@@ -19,7 +19,8 @@ import numpy as np
 from ..interpret import apply, element
 from ..ir import Builder, Node, Program, Type
 from ..ops import OPS
-from .rewrite import constant_of, rewrite
+from ..trace import constant_of
+from .rewrite import rewrite
 
 NEUTRAL: Mapping[str, tuple[float, bool]] = {
     "multiply": (1.0, True),

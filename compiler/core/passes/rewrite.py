@@ -18,14 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..ir import Builder, Node, Program, Type, attributes, users
 from ..ops import OPS
 from ..sine import DEGREE, cosine, sine
-from ..trace import Traced
+from ..trace import Traced, constant_of
 
 Rule = Callable[[Builder, Node, tuple[int, ...]], int | None]
 """(new program, old node, its operands in the new one) -> the index of what stands for it, None: a copy."""
@@ -44,14 +43,6 @@ def rewrite(program: Program, rule: Rule) -> Program:
         moved.append(builder.add(kept) if index is None else index)
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     return replace(program, nodes=tuple(builder.nodes), outputs=outputs)
-
-
-def constant_of(builder: Builder, value: Any, dtype: str) -> int:
-    """Return the index of a constant."""
-    if dtype == "float32":
-        return builder.add(Node("constant", (), Type(), attributes(value=float(value))))
-    plain = bool(value) if dtype == "bool" else int(value)
-    return builder.add(Node("constant", (), Type(dtype), attributes(value=plain, dtype=dtype)))
 
 
 def expand_sine(program: Program, degree: int = DEGREE) -> Program:
@@ -135,10 +126,7 @@ def _numbers(
     if node.op == "component":
         return (operands[0][int(node["index"])],)  # type: ignore[arg-type]
     if node.op == "parameter":
-        values = program.parameters[str(node["name"])]
-        return tuple(
-            builder.add(Node("constant", (), number, attributes(value=float(value)))) for value in values
-        )
+        return tuple(constant_of(builder, each, "float32") for each in program.parameters[str(node["name"])])
     if OPS[node.op].elementwise or not node.type.shape:
         parts = range(node.type.shape[0] if node.type.shape else 1)
         spread = [operand * len(parts) if len(operand) == 1 else operand for operand in operands]

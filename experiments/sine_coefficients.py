@@ -184,6 +184,13 @@ def _even(coefficients: list[Fraction], r: Fraction) -> Fraction:
     return total
 
 
+def reduction_error(r: Any) -> Any:
+    """Return how far step 2 moves sin(r), |r| (...) <= R_MAX: the error of r times |cos|, and its square."""
+    rounded = 2.0 * np.abs(r) + 2.0**12 * abs(sine.PI_PARTS[2])
+    moved = 2.0**-24 * (1 + 2.0**-20) * rounded + 2.0**12 * sine.PI_REST
+    return moved * np.abs(np.cos(r)) + moved * moved
+
+
 def whole_error(coefficients: list[float], cosine: bool = False) -> float:
     """Return an upper bound of the emitted sine's error, or the cosine's, with and without fusing.
 
@@ -195,7 +202,7 @@ def whole_error(coefficients: list[float], cosine: bool = False) -> float:
     low, high = edges[:-1], edges[1:]
     program = trace(lambda r: sine.horner(r, coefficients), {"r": Type()})
     (rounding,) = bounds.over_box(program, {"r": (low, high)}, SineContract("none", None)).values()
-    total = rounding + np.maximum(sine.reduction_error(low), sine.reduction_error(high))
+    total = rounding + np.maximum(reduction_error(low), reduction_error(high))
     total = total + 4 * 2.0**-24 * np.diff(edges)
     if cosine:
         slope = np.maximum(np.abs(np.cos(low)), np.abs(np.cos(high)))

@@ -65,14 +65,13 @@ def mse(image: Floats, reference: Floats) -> float:
     return float(np.mean((x - r) ** 2))
 
 
-def psnr(image: Floats, reference: Floats, data_range: float = 1.0) -> float:
-    """Peak signal-to-noise ratio of two images (...): 10 log10(data_range**2 / MSE) dB; equal images: inf."""
-    peak = _positive(data_range) ** 2
+def psnr(image: Floats, reference: Floats) -> float:
+    """Peak signal-to-noise ratio of two images (...): 10 log10(1 / MSE) dB; equal images: inf."""
     error = mse(image, reference)
-    return 10.0 * math.log10(peak / error) if error > 0.0 else math.inf
+    return 10.0 * math.log10(1.0 / error) if error > 0.0 else math.inf
 
 
-def ssim(image: Floats, reference: Floats, data_range: float = 1.0) -> float:
+def ssim(image: Floats, reference: Floats) -> float:
     """Mean structural similarity of two images (H, W, C), over the windows inside and the channels.
 
     The window is Gaussian, its weights sum to 1; variances and covariance are the population's.
@@ -81,7 +80,7 @@ def ssim(image: Floats, reference: Floats, data_range: float = 1.0) -> float:
     if x.ndim != 3 or min(x.shape[:2]) < WINDOW_SIZE_PX:
         rule = f"SSIM needs (height, width, channels) with at least {WINDOW_SIZE_PX} rows and columns"
         raise InputError("shape of the images", x.shape, rule, "compare larger images or use another metric")
-    c1, c2 = (K1 * _positive(data_range)) ** 2, (K2 * _positive(data_range)) ** 2
+    c1, c2 = K1**2, K2**2
 
     # Local means, variances and covariance (H - 10, W - 10, C).
     mean_x, mean_r = _window_mean(x), _window_mean(r)
@@ -207,14 +206,6 @@ def _pair(image: Floats, reference: Floats) -> tuple[Float64, Float64]:
             rule = f"every value must be finite, and {bad} of {values.size} are not"
             raise InputError(f"value of {what}", float(value), rule, "repair or leave out these pixels")
     return x, r
-
-
-def _positive(data_range: float) -> float:
-    """Return the data range, or refuse one that is not positive and finite."""
-    if not 0.0 < data_range < math.inf:
-        rule = "the distance from black to white must be positive and finite"
-        raise InputError("data_range", data_range, rule, "use 1.0 for encoded floats, 255 for bytes")
-    return data_range
 
 
 def _window_mean(values: Float64) -> Float64:

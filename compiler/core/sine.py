@@ -151,10 +151,3 @@ def horner(r: Any, coefficients: Sequence[float]) -> Any:
     for coefficient in reversed(others[:-1]):
         q = z * q + coefficient
     return r + r * (z * q) if first == 1.0 else r * (z * q + first)
-
-
-def reduction_error(r: Any) -> Any:
-    """Return how far step 2 moves sin(r), |r| (...) <= R_MAX: the error of r times |cos|, and its square."""
-    rounded = 2.0 * np.abs(r) + 2.0**12 * abs(PI_PARTS[2])
-    moved = 2.0**-24 * (1 + 2.0**-20) * rounded + 2.0**12 * PI_REST
-    return moved * np.abs(np.cos(r)) + moved * moved

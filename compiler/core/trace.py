@@ -292,11 +292,6 @@ def _matmul(builder: Builder, x: Any, matrix: Any) -> Traced:
     return emit(builder, "affine", x, weight=builder.parameter(_exact_float32(matrix.T)))
 
 
-def _clip(builder: Builder, x: Any, low: Any, high: Any) -> Traced:
-    """np.clip is maximum, then minimum."""
-    return emit(builder, "minimum", emit(builder, "maximum", x, low), high)
-
-
 def _stack(builder: Builder, numbers: Any, axis: int = 0) -> Traced | Planes:
     """np.stack of numbers on the last axis, or on the first one before np.moveaxis."""
     if axis == 0:
@@ -458,7 +453,7 @@ def _concatenate(builder: Builder, parts: Any, axis: int = 0) -> Traced:
 
 
 _FUNCTIONS: Mapping[Any, Callable[..., Any]] = {
-    np.clip: _clip,
+    np.clip: lambda builder, x, low, high: emit(builder, "minimum", emit(builder, "maximum", x, low), high),
     np.sum: _sum,
     np.concatenate: _concatenate,
     np.stack: _stack,

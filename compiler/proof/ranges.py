@@ -265,14 +265,10 @@ def _multiply(context: Context, operands: list[Range]) -> Range:
     """The image, rounded; and before that, for a sum that reads it."""
     (a, b), (low, high) = operands, _image(context, operands)
     # Products of two float32 numbers are exact in float64: 2 u - 1 stays a point.
-    slack = np.where(_is_float32(a.low, a.high, b.low, b.high), -SLACK, 0.0)
+    ends = np.broadcast_arrays(a.low, a.high, b.low, b.high)
+    slack = np.where(np.logical_and.reduce([end.astype(np.float32) == end for end in ends]), -SLACK, 0.0)
     product = _whole(*_wider(low, high, slack))
     return _made(context, *_nearest(low, high), _all_sure(operands), product)
-
-
-def _is_float32(*values: Any) -> Any:
-    """Tell where (...) all values are float32 numbers."""
-    return np.logical_and.reduce(np.broadcast_arrays(*(v.astype(np.float32) == v for v in values)))
 
 
 def _within(context: Context, operands: list[Range], ends: tuple[Any, Any], allowed: Any) -> Range:

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS, NODE, inputs_of, places
 from ..proof.sine_checker import sine
-from .field import P, Words, drawn, hashed, literal
-from .integers import Ranges, Stored, stated
+from .field import P, Words, drawn, hashed, literal, zero
+from .integers import Ranges, Stored, filled, stated
 from .lanes import Lanes, Unread
 from .spectra import Tiles, patches
 from .terms import Fold, Term, compared, constant, expression, known_floats, known_integers, operate, select
@@ -87,7 +87,8 @@ class Claim:
         self.exact = held["schema"] == INTEGERS
         self.sine = self._sine(held)
         self.stated = stated(held)
-        self.ranges = Ranges(held, self.stated)
+        arrays = self.stated or (self._arrays(raw) if self.exact else {})
+        self.ranges = Ranges(held, arrays, bool(self.stated))
         self.spectra = tiles.range if tiles else range(0)
         self.weights: Any = Stored(raw) if self.stated else self._weights(raw)
         self.tables: list[tuple[str, str]] = []
@@ -100,7 +101,8 @@ class Claim:
         own = (lanes.x < lanes.known[1]) & (lanes.y < lanes.known[3])
         self.fold = Fold(own | (lanes.inside is not None), slots)  # all items of a group compute sums
         self.together = pixels * self.rows * slots
-        self.expected = self._outputs().known.reshape(slots, pixels * self.rows, -1)
+        outputs = self._outputs().known.reshape(slots, pixels * self.rows, -1)
+        self.expected = outputs[..., :-1] if self.exact else outputs
 
     def _sine(self, held: Any) -> Any:
         """Return the sine that the certificate promises, as the spec defines it."""
@@ -109,6 +111,13 @@ class Claim:
         return partial(sine, degree=int(degree[1])) if degree else None
 
     # ---- inputs --------------------------------------------------------------------------------------------
+
+    def _arrays(self, raw: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+        """Return the parameters' numbers, all of which the file holds."""
+        return {
+            name: raw[places(name, place, len(raw))].reshape(place["shape"])
+            for name, place in self.parameters.items()
+        }
 
     def _weights(self, raw: NDArray[np.float32]) -> Term:
         """Return all weights (1, n) of the file: those of the program as unknowns, others as they are."""
@@ -125,6 +134,8 @@ class Claim:
             owned[self.tiles.owned.ravel()] = True
             owned[self.tiles.bias if self.tiles.bias is not None else []] = True
         value[:, ~owned] = drawn(literal(raw[~owned], "float32"))
+        if self.exact:
+            shape[~owned] = literal(raw[~owned], "float32")
         return Term(shape[None], draw=value[:, None])
 
     def _stored(self, at: NDArray[np.intp]) -> Term:
@@ -132,7 +143,23 @@ class Claim:
         return self.weights.each(lambda a: a[:, at], lambda a: a[:, :, at])  # type: ignore[no-any-return]
 
     def parameter(self, name: str) -> Term:
-        """Return a parameter's numbers, (1, outputs * inputs) or (1, outputs)."""
+        """Return a parameter's numbers, (1, outputs * inputs) or (1, outputs); of integers `filled`."""
+        number = self._parameter(name)
+        if not self.exact:
+            return number
+        shape = self.parameters[name]["shape"]
+
+        def each(values: Words, nothing: Any) -> Words:
+            return filled(self.text, name, values.reshape(shape), nothing).ravel()
+
+        sums, draw = (
+            None if rows is None else np.stack([each(row, 0) for row in rows])[:, None]
+            for rows in (number.sums, number.draw)
+        )
+        return Term(each(number.known, zero())[None], sums, draw)
+
+    def _parameter(self, name: str) -> Term:
+        """Return a parameter's numbers as they are."""
         if self.stated:
             array = self.stated[name].ravel()[None]
             return known_integers(array, "float32") if self.stated[name].ndim > 1 else known_floats(array)
@@ -190,7 +217,7 @@ class Claim:
         if is_window and self.tiles:
             return self._from_spectra(node, "bias" in named)
         weight = self.parameter(named["weight"])
-        outputs = self.parameters[named["weight"]]["shape"][0]
+        outputs = self.parameters[named["weight"]]["shape"][0] + self.exact
         matrix = weight.term[:, 0].reshape(2, outputs, -1)
         whole: Any = np.zeros((2, 1, 1), dtype=np.uint64)
         parts = self._parts(matrix.shape[2]) if is_window and not self.exact else []
@@ -225,7 +252,7 @@ class Claim:
         """Note the sums (2, pixels, n), or (2, 1, pixels * n), of a map; return the numbers that they are."""
         value = value.reshape(2, 1, -1)
         self._note(value, "sum", f"the sums of %{node}")
-        return Term(hashed("found", *value))
+        return Term(np.where(value.any(axis=0), hashed("found", *value), hashed("sum", 0, 0)))
 
     def _parts(self, n: int) -> list[tuple[str, NDArray[np.intp]]]:
         """Return the partial sums of a window: of each image and row of taps."""
@@ -240,11 +267,11 @@ class Claim:
         ]
 
     def _note(self, value: Words, kind: str, name: str) -> None:
-        """Keep sums of all pixels, to be found by their pairs of numbers."""
+        """Keep sums of all pixels, to be found by their pairs of numbers; one of nothing is not found."""
         table = len(self.tables) * self.together
         words = word_of(value.reshape(2, self.together, -1))
         for pixel, line in enumerate(words.tolist()):
-            for word in line:
+            for word in filter(None, line):
                 self.first.setdefault(word, table + pixel)
         self.tables.append((kind, name))
 
@@ -262,7 +289,7 @@ def word_of(value: Words) -> Words:
 
 def renamed(value: Words) -> Words:
     """Return the number that stands for a part in the sums that it goes into."""
-    return drawn(hashed("part", *value))
+    return np.where(value.any(axis=0), drawn(hashed("part", *value)), np.uint64(0))
 
 
 def dot(given: Words, matrix: Words) -> Words:

@@ -14,6 +14,7 @@ checker of the certificate finds them again.
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS, inputs_of
-from ..proof.integer_checker import check_integers
+from ..proof.integer_checker import check_integers, ranges
 from .field import P, Words, drawn, hashed
 from .lanes import Unread, Wrong
 from .terms import Span, Term, aligned, constant, expression, known_floats, known_integers, stacked
@@ -111,8 +112,6 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     if not ranges.stated or (term.span is None and not whole):
         term = fold(term)
     span = term.span if whole or not ranges.stated else term.span or ranges.of(term.known)
-    if span is None and not whole:  # sums of nothing but products with 0, which fill vectors up
-        span = spans((term.value == 0).all(axis=0) | (term.known == hashed("sum", 0, 0)), 0, 0)
     good = np.zeros(term.known.shape, bool) if span is None else within(span, LIMITS[kind])
     good = good & (term.shape is not None or whole)
     if term.is_wide and not good.all():
@@ -144,6 +143,8 @@ def as_float(term: Term, found: Callable[[Term], Term], wrong: Wrongs) -> Term:
         return Term(shape)
     beyond = (term.span[0] <= term.span[1]) & ~within(term.span, (-EXACT, EXACT))
     wrong(beyond, f"a sum may be beyond {EXACT}, where float32 does not hold all integers")
+    if term.sums is not None:
+        shape = np.where((term.sums % P).any(axis=0), shape, hashed("sum", 0, 0))
     return replace(found(Term(shape, term.sums)), sums=None)
 
 
@@ -216,6 +217,13 @@ class Stored:
         return known_floats(values) if kind == "float32" else known_integers(values, kind)
 
 
+def filled(text: str, name: str, array: NDArray[Any], value: Any = 0) -> NDArray[Any]:
+    """Return a parameter with the weights of one more neuron in each layer, all 0: they fill vectors up."""
+    window = re.search(rf"= affine %0 \{{.*weight={name}\b", text) is not None
+    pads = [(0, 1), (0, not window)][: array.ndim]
+    return np.pad(array, pads, constant_values=value)
+
+
 def stated(held: Any) -> dict[str, NDArray[np.float32]]:
     """Return the parameters that a certificate of integers has itself; none where weights.bin has them."""
     places = held["parameters"].items()
@@ -233,15 +241,18 @@ def stated(held: Any) -> dict[str, NDArray[np.float32]]:
 class Ranges:
     """Which numbers of a program are known to lie in a span, by their shapes."""
 
-    def __init__(self, held: Any, arrays: Mapping[str, NDArray[np.float32]]) -> None:
-        self.stated = bool(arrays)
+    def __init__(self, held: Any, arrays: Mapping[str, NDArray[np.float32]], stated: bool) -> None:
+        self.stated, text = stated, str(held["program"])
         self.noted: dict[int, tuple[int, int]] = {}
         self.keys, self.ends = np.zeros(0, np.uint64), np.zeros((0, 2), np.int64)
-        self.found: Any = check_integers(held, str(held["program"]), arrays) if arrays else []
+        self.found: Any = []
+        if arrays:
+            check_integers(held, text, arrays)
+            self.found, _ = ranges(text, {name: filled(text, name, a) for name, a in arrays.items()})
 
     def note(self, node: str, numbers: Term) -> None:
         """Keep the spans of what an affine map reads, as the checker finds them, if it is whole."""
-        low, high, grain = self.found[int(node)] if self.found else ([], [], -1)
+        low, high, grain = self.found[int(node)] if self.stated else ([], [], -1)
         if grain < 0 or numbers.shape is None:
             return
         for k, shape in enumerate(numbers.shape[0].tolist()):
@@ -260,5 +271,5 @@ class Ranges:
 
     def images(self, text: str) -> dict[str, tuple[int, int]]:
         """Return the spans of the images' numbers by name, where a program's text is one of these."""
-        found = inputs_of(text)[1] if self.found else []
+        found = inputs_of(text)[1] if self.stated else []
         return {name: (int(low), int(high)) for name, _, whole, low, high in found if whole}

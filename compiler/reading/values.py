@@ -260,15 +260,14 @@ class Values(Walker):
         return self._defined(found) if term.kind == "float32" else found
 
     def _defined(self, term: Term) -> Term:
-        """Return an integer that its kind is known to hold, or that is one of the program's.
-
-        Kernels of bytes are let be: they fill words up with what follows from zeros.
-        """
+        """Return an integer that its kind is known to hold, or that is one of the program's."""
         good: Any = False if term.span is None else term.span[0] <= term.span[1]
-        if not self.claim.stated and not np.all(good):
+        if not np.all(good):
             made = [word in self.claim.made for word in term.known.ravel().tolist()]
             good = np.logical_or(good, np.reshape(made, term.known.shape))
-            self._wrong(~good, f"a number that is not the program's may be beyond what {term.kind} holds")
+            missing = self.claim.missing()
+            why = missing and f": {missing} are never made"
+            self._wrong(~good, f"a number that is not the program's may be beyond {term.kind}{why or ''}")
         return term
 
     def _value_bits(self, value: Expr) -> Any:

@@ -21,6 +21,11 @@ def dot16(tmp_path_factory):
     return parts(planned(tmp_path_factory.mktemp("dot:16"), "opencl", "dot:16", border="clamp"))
 
 
+@pytest.fixture(scope="module")
+def dot_c(tmp_path_factory):
+    return parts(planned(tmp_path_factory.mktemp("dot_c"), "c", "dot:16"))
+
+
 @pytest.fixture(scope="module", params=["cuda", "opencl"])
 def grouped(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("grouped")
@@ -81,6 +86,38 @@ def test_faults_of_words_are_noticed(grouped, old, new):
     pair = [t.replace("uint", "unsigned int") if "__dp4a" in grouped[0] else t for t in (old, new)]
     with pytest.raises((Refused, Unread), match=NO_MARKER):
         run_text(*changed(grouped, *pair))
+
+
+DEAD = ("if (1 < 0) { float t301 = (float)t300; float t302 = t301; t301 = t302; }",
+        "for (int k = 0; k < 0; ++k) { int t301 = t300; t301 = t300 + t301; }")  # fmt: skip
+
+
+@pytest.mark.parametrize("dead", DEAD)
+@pytest.mark.parametrize(
+    ("line", "new"),
+    [
+        ("uint t43 = t42 & 1u;", "(int)((float)t43 * 1.0e+20f)"),
+        ("float t49 = t40 * t48;", "(int)(t49 * 1.5f)"),
+        ("float t49 = t40 * t48;", "(int)(t48 * 3.0e+09f)"),
+        ("int t2 = (int)v1[i];", "t2 * 100000000"),
+        ("int t2 = (int)v1[i];", "t2 * t2 * t2 * t2"),
+        ("int t85 = (int)v84[i];", "(int)(float)t85 * 100000000"),
+    ],
+)
+def test_integers_of_bytes_that_nothing_uses_are_refused(dot_c, line, new, dead):
+    """TXT-6: what overflows is undefined; a branch that is never taken does not use it."""
+    line, new, dead = (
+        t.replace("uint ", "uint32_t ").replace("(int)", "(int32_t)") for t in (line, new, dead)
+    )
+    line = line if line in dot_c[0] else line.replace("int ", "int32_t ")
+    with pytest.raises((Refused, Unread), match=r"may be beyond int32"):
+        run_text(*changed(dot_c, line, f"{line} int t300 = {new}; {dead}"))
+
+
+def test_vectors_are_filled_up_with_zeros(tmp_path):
+    """TXT-11: six neurons in vectors of four have two beside them, whose weights are 0."""
+    given = parts(planned(tmp_path, "opencl", "group:1"))
+    assert run_text(*given)["sums"] == 3
 
 
 def test_weights_in_another_order_are_refused(dot16):

@@ -276,6 +276,8 @@ class Parser(Expressions):
             statements.append(self._statement())
         if end:
             self._take(end)
+            if not statements:
+                raise Unread("an empty block")
         self.scope = outer
         self.depth -= 1
         return tuple(statements)

@@ -6,13 +6,28 @@ import hashlib
 import math
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...refimpl.reading import read_file
 from ..kernel.interface import IMAGE, ITEMS, RESULT
-from ..kernel.kernel import Array, Body, Call, Kernel, Let, Store, inside, parts, values, walk
+from ..kernel.kernel import (
+    INT,
+    Array,
+    Body,
+    Call,
+    For,
+    If,
+    Kernel,
+    Let,
+    Store,
+    apply,
+    inside,
+    parts,
+    values,
+    walk,
+)
 from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
@@ -94,13 +109,16 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
         lanes.channels = max(int(manifest["output"]["channels"]), *(n for _, n in claim.images))
         kernel = parsed(source, manifest)
         check_interface(kernel, claim, manifest)
-        bodies = [(kernel.body, ()), *((each.body, filter(None, [each.result])) for each in kernel.functions)]
-        for body, results in bodies:
-            for key in unread(body, {e.value for result in results for e in parts(result)}):
-                raise Wrong(f"{key} is computed and never read")
+        for each in kernel.functions:
+            end = () if each.result is None else (Store(RESULT, (), each.result),)
+            check_used((*each.body, *end), {RESULT, *(key for key, _ in each.takes)})
+        check_used(kernel.body, {RESULT})
         trial = Trial(kernel, claim, LANGUAGES[manifest["target"]].texels)
         trial.body(kernel.body)
         trial.ended()
+        bodies = (kernel.body, *(each.body for each in kernel.functions))
+        if not {id(each) for body in bodies for each in walk(body)} <= trial.ran:
+            raise Wrong("a statement, or a branch, is never run")
         shared = 4 * sum(memory.size for memory in trial.shared)
         if shared != schedule.get("shared_bytes", 0):
             raise Wrong(f"its groups share {shared} bytes, not what its manifest says")
@@ -113,17 +131,41 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     return {"sums": len(claim.tables) * claim.together // slots, "lanes": lanes.count}
 
 
-def unread(body: Body, read: set[Any]) -> Iterator[str]:
-    """Yield the names of values and arrays that nothing reads, and add to `read` what statements read."""
-    for statement in reversed(body):
-        if isinstance(statement, Let | Array) and statement.name not in read:
-            yield statement.name
+def check_used(body: Body, ends: set[str]) -> None:
+    """Refuse values, arrays and loops in a body of which nothing in these names is made."""
+    made: dict[str, set[str]] = {}
+    note_uses(body, {}, set(), made)
+    live, more = set[str](), ends
+    while more:
+        live |= more
+        more = set().union(*(made.get(each, ()) for each in more)) - live
+    for key in (key for key in made if key not in live):
+        raise Wrong(f"{key.split()[0]} is computed and never read")
+
+
+def note_uses(body: Body, names: Mapping[str, str], within: set[str], made: dict[str, set[str]]) -> None:
+    """Note of what each name's values are made; a name has a number, as it may be declared again elsewhere.
+
+    `names`: those around a body; `within`: what decides whether it is run.
+    """
+    names = dict(names)
+    for statement in body:
+        every = [each for value in values(statement) for each in parts(value)]
+        if any(e.type == INT and len(e.args) == 2 and apply(e.op, *e.args) != e for e in every):
+            raise Wrong("arithmetic that no kernel has, as sums with 0 and products with 1")
+        used = {each.value for each in every if each.op in ("name", "load")}
+        written = {statement.array} if isinstance(statement, Store) else set()
+        if isinstance(statement, Call):
+            written = {view.array for view in statement.views}
+        used = {names.get(key, key) for key in (used | written)} | within
+        around = used if isinstance(statement, If) else within
+        if isinstance(statement, Let | Array | For):
+            names[statement.name] = f"{statement.name} {len(made)}"
+            written, around = {statement.name}, used | {names[statement.name]}
+        for key in written:
+            made.setdefault(names.get(key, key), set()).update(used)
         for inner in inside(statement):
-            own: set[Any] = set()
-            yield from unread(inner, own)
-            read |= own
-        read |= {e.value for v in values(statement) for e in parts(v) if e.op in ("name", "load")}
-        read |= {view.array for view in statement.views} if isinstance(statement, Call) else set()
+            note_uses(inner, names, around, made)
 
 
 def passes_of(schedule: Any) -> Passes | None:

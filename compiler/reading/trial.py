@@ -29,6 +29,7 @@ from ..kernel.kernel import (
     If,
     Kernel,
     Launch,
+    Statement,
     Store,
     Type,
     name,
@@ -79,6 +80,7 @@ class Trial(Values):
         self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
         self.number_of = {self.masks[0].tobytes(): 0}
         self.looking: NDArray[np.bool_] | None = None
+        self.ran: set[int] = set()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
         self.names: dict[str, Any] = {**self.constants, "width": width, "height": height}
@@ -132,6 +134,11 @@ class Trial(Values):
         self.mask = outer
 
     # ---- statements ----------------------------------------------------------------------------------------
+
+    def statement(self, statement: Statement) -> None:
+        """Run a statement, and note that it was."""
+        self.ran.add(id(statement))
+        super().statement(statement)
 
     def _run_array(self, statement: Array) -> None:
         """Make new memory, of which nothing is written."""
@@ -375,6 +382,7 @@ class Trial(Values):
         body = statement.body
         first = corner(column)
         if body[: len(first)] == first and self.constants.get("OUT") == self.claim.rows:
+            self.ran |= {*map(id, body[: len(first)])}
             body = body[len(first) :]
             self.names |= dict(zip(("tile_x", "tile_y"), self.start, strict=True))
         try:

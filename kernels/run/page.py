@@ -17,6 +17,7 @@ Everything is JSON's types; arrays are base64 of little-endian numbers. spec/web
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -63,7 +64,7 @@ from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
 from . import webassembly
 from .denoise_on import bound_of, products_of
 
-SCHEMA = "wamnet-page-5"
+SCHEMA = "wamnet-page-6"
 """Name and version of the form of a page's data."""
 
 TARGET = "glsl-es"
@@ -82,7 +83,7 @@ WHOLE = "whole8"
 MANY, FEW = "packed", "inlined"
 """Schedules: four weights a texel, however many there are; constants of the source where they are few."""
 
-PROCESSOR = "c", "tile:4"
+PROCESSOR = "c", "fft:4"
 """Target and schedule of the variant for processors: vectors of WebAssembly hold four floats."""
 
 CHECK_PX = 32
@@ -172,10 +173,11 @@ def page_data(
     lengths = [settings, *(feature_settings(settings, sees(part)) for part in together[1:])]
     rays = learned_rays(replace(first, features=shown), settings)
     shadows = learned_shadow_rays(replace(first, features=shown))
-    paths = [
-        path_kernel(scene, length, inputs, part, rays, shadows)
-        for length, part in zip(lengths, together, strict=True)
-    ]
+    paths = []
+    for length, part in zip(lengths, together, strict=True):
+        seen = sees(part)
+        programs = lower_scene(scene, length, STATEMENTS, inputs, seen=seen, rays=rays, shadow_rays=shadows)
+        paths.append(compile_path(programs, TARGET, groups=layers_of(part)))
     images = check(animation, first, shown, settings, rays, shadows)
     return {
         "schema": SCHEMA,
@@ -235,20 +237,6 @@ def drawn_together(features: Sequence[str]) -> list[tuple[str, ...]]:
     return parts
 
 
-def path_kernel(
-    scene: Scene,
-    settings: Settings,
-    inputs: SceneInputs,
-    features: Sequence[str],
-    rays: FeatureRays | None,
-    shadows: int = 0,
-) -> Artifact:
-    """Return the kernel that adds up the planes of some features."""
-    more = {"seen": sees(features), "rays": rays, "shadow_rays": shadows}
-    programs = lower_scene(scene, settings, STATEMENTS, inputs, **more)  # type: ignore[arg-type]
-    return compile_path(programs, TARGET, groups=layers_of(features))
-
-
 def moving_numbers(animation: Animation, settings: Settings) -> tuple[SceneInputs, dict[str, Any]]:
     """Return the scene's numbers that are uniforms, and their values at each time."""
     scene = animation.scenes[0]
@@ -297,12 +285,12 @@ def variants(
     """Return the networks of a page, each with what it has learned and how far it is from the first one."""
     found, expected = list[dict[str, Any]](), list[tuple[Network, Expected]]()
     for network in networks:
-        # Two schedules of one network have one reference and one bound, which take seconds.
+        # Two schedules of one network have one reference, and most of them one bound, which take seconds.
         same = (n for n in expected if n[0].model is network.model and n[0].rank == network.rank)
         like = next(same, None)
         one, held = variant(network, images, like and like[1])
         expected.append((network, held))
-        if like is not None:
+        if like is not None and held is like[1]:
             one["check"] = like[0].name
         # How far a variant's picture is from the first one's is a fact about the weights, not about a device.
         off = held.value - expected[0][1].value
@@ -324,7 +312,7 @@ def variant(
     artifact = compile_plan(plan)
     packed = None if network.target == TARGET else compile_plan(plan_program(program, TARGET, schedule=MANY))
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}
-    held = held or plan.expected(mine)
+    held = held if held and plan.shares_bound else plan.expected(mine)
     bits = sha256(held.value.astype("<f4").tobytes()) if plan.is_whole else None
     found = {
         "name": network.name,
@@ -339,8 +327,8 @@ def variant(
         "bound": bound_of(artifact),
         "passes": [_pass(kernel, packed) for kernel in artifact.kernels],
         "check": {
-            "expected": _packed(held.value, "<f8"),
-            "bound": None if plan.is_whole else _packed(held.most_from(held.value)),
+            "expected": _packed(held.value),
+            "bound": None if plan.is_whole else _packed(held.most_from(held.value.astype(np.float32))),
             "sha256": bits,
         },
     }
@@ -364,18 +352,29 @@ def _pass(kernel: Artifact, packed: Artifact | None) -> dict[str, Any]:
     }
     if packed is None:
         return {"source": kernel.source, "weights": _weights(kernel.weights), **found}
-    module = base64.b64encode(webassembly.module_of(kernel)).decode()
-    channels = [image.channels for image in images]
-    return {"module": module, "channels": channels, "weights": _blocks(kernel, packed), **found}
+    return {
+        "module": base64.b64encode(webassembly.module_of(kernel)).decode(),
+        "channels": [image.channels for image in images],
+        "rows": kernel.manifest["schedule"].get("rows", 1),
+        "weights": _transformed(kernel, packed),
+        **found,
+    }
 
 
-def _blocks(kernel: Artifact, packed: Artifact) -> dict[str, Any]:
-    """Return where the weights of tiles are in those of the first variant, which are packed."""
-    places = []
-    for there, here in zip(*(each.manifest["weights"]["layout"] for each in (packed, kernel)), strict=True):
-        count, rows, width = here["shape"] if len(here["shape"]) == 3 else (1, 1, *here["shape"])
-        places.append([there["offset"], there["shape"][-1], here["offset"], count, rows, width])
-    return {"of": "full", "count": kernel.weights.size, "places": places}
+def _transformed(kernel: Artifact, packed: Artifact) -> str | dict[str, Any]:
+    """Return how a page makes spectra from the weights of its first variant, `packed`, and all other weights.
+
+    Spectra are eight times as many (FOU-4). A kernel without spectra has its own weights.
+    """
+    spectra = kernel.plan.schedule.spectra(kernel.programs)
+    if spectra is None:
+        return _packed(kernel.weights)
+    slot = max(kernel.manifest["weights"]["layout"], key=lambda slot: len(slot["shape"]))
+    (whole,) = (each for each in packed.manifest["weights"]["layout"] if each["name"] == slot["name"])
+    inside = slice(slot["offset"], slot["offset"] + math.prod(slot["shape"]))
+    facts = {"window": spectra.size, "order": spectra.order.tolist()}
+    others = _packed(np.delete(kernel.weights, inside))
+    return {"of": "full", "from": whole, "to": slot, **facts, "others": others}
 
 
 def _weights(numbers: NDArray[np.float32]) -> str | dict[str, Any]:

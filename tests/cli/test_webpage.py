@@ -183,6 +183,34 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
     assert np.ptp(value) > bound.max()
 
 
+def test_a_module_with_transforms_has_the_spectra_of_the_weights(chromium, kit, tmp_path):
+    """FOU-4, WEB-14: the page computes them in float64, and rounds once; pictures end within a tile."""
+    features, window = ("color", "normal"), dataset.Window(12, "clamp")
+    network = kit.network([dataset.n_inputs(features, window), 32, 7, 3], (3.0, 3.0))
+    model = Model(network, features, window, SCALES)
+    networks = [each for each in P.networks_of(model, processor=True) if each.name in ("full", "processor")]
+    animation = P.Animation(TIMES[:1], (scenes.canonical("minicubes", time=TIMES[0]),))
+    data = P.page_data(animation, networks, SETTINGS)
+    assert [one["schedule"] for one in data["variants"]] == ["packed", "fft:4"]
+    (tmp_path / "page.html").write_text(webpage.render_page(data), encoding="utf-8")
+    plan = P.plan_program(P.lower(model), "c", schedule="fft:4")
+    held = P.compile_plan(plan).weights
+    with chromium.tab(tmp_path / "page.html", **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        module = "wamnet.page.renderer.variant('processor').passes[0].processor.module"
+        weights = np.float32(tab.page.evaluate(f"Array.from({module}.weights)"))
+        spacing = np.spacing(np.abs(held))
+        assert np.all(np.abs(weights - held) <= np.maximum(spacing, 2.0**-60))
+        assert (weights == held).mean() > 0.99
+        draw(tab, seed=SEED)
+        images = {name: read(tab, name)[..., :3].copy() for name in features}
+        expected = plan.expected(images)
+        found = read(tab, "picture")[..., :3].astype(np.float64)
+        assert np.all(np.abs(found - expected.value) <= expected.bound)
+        assert np.ptp(expected.value) > expected.bound.max()
+        assert tab.said == []
+
+
 def test_the_network_in_integers_is_beside_those_of_floats(still, model, data):
     """The same bits as the reference, on the page's own picture and on the moment that is shown."""
     whole = P.networks_of(model, rank=4)[3].model
@@ -207,7 +235,7 @@ def test_the_page_measures_its_own_error(still, data):
     moved = """async () => {
       const check = wamnet.page.data.variants[0].check;
       const kept = check.expected;
-      const values = wamnet.parts.decodeFloats(kept, Float64Array);
+      const values = wamnet.parts.decodeFloats(kept);
       values[7] += 1e-3;
       const letters = Array.from(new Uint8Array(values.buffer), (byte) => String.fromCharCode(byte));
       check.expected = btoa(letters.join(""));

@@ -137,7 +137,7 @@ def test_variants_say_what_they_cost_and_how_far_they_are(model_of):
     assert np.array_equal(held[1].value, held[2].value)
     assert np.ptp(held[0].value - held[1].value) > 0, "a cut to rank 1 leaves something out"
     for one, expected in made:
-        assert np.array_equal(floats(one["check"]["expected"], "<f8"), expected.value.ravel())
+        assert np.array_equal(floats(one["check"]["expected"]), expected.value.ravel().astype("<f4"))
         assert 0 < floats(one["check"]["bound"]).max() <= one["bound"]
 
 

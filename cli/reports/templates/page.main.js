@@ -384,7 +384,7 @@ class Page {
     const context = canvas.getContext("2d");
     const image = context.createImageData(check.size, check.size);
     image.data.fill(255);
-    decodeFloats(variants[0].check.expected, Float64Array).forEach((value, i) => {
+    decodeFloats(variants[0].check.expected).forEach((value, i) => {
       image.data[4 * Math.floor(i / 3) + (i % 3)] = 255 * value; // rounded, and clamped
     });
     context.putImageData(image, 0, 0);

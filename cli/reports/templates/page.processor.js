@@ -49,8 +49,9 @@ class Module {
 
 /** A module whose images come from textures, and whose picture goes back into one. */
 class Processor {
-  constructor(device, bytes, weights, channels) {
+  constructor(device, bytes, weights, { channels, rows }) {
     this.device = device;
+    this.rows = rows; // that are computed together
     this.module = new Module(bytes, weights, channels);
     this.starting = this.module.starting;
   }
@@ -83,26 +84,52 @@ class Processor {
   }
 }
 
-/** Weights of a kernel in tiles from those of the packed one: a block of neurons after another, and the rows of the
- * first matrix image by image. `places`: [place, neurons, place in blocks, blocks, rows, neurons of a block]. */
-function inBlocks(packed, { count, places }, channels) {
-  const values = new Float32Array(count);
-  const order = byImage(channels, places[0][4]);
-  places.forEach(([from, neurons, to, blocks, rows, width], number) => {
-    for (let block = 0; block < blocks; ++block) {
-      for (let row = 0; row < rows; ++row) {
-        const start = from + neurons * (number === 0 ? order[row] : row);
-        const some = packed.subarray(start + block * width, start + Math.min((block + 1) * width, neurons));
-        values.set(some, to + (block * rows + row) * width);
+/** Weights of a kernel with transforms: the spectra of the packed one's (FOU-4), as
+ * compiler/schedules/fft.py: spectra_stored, and all others. */
+function transformed(packed, { from, to, window, order, others }) {
+  const [columns, groups, points, pairs, halves, parts, lanes] = to.shape;
+  const [inputs, neurons] = from.shape;
+  const channels = inputs / (window * window);
+  const rest = decodeFloats(others);
+  const count = to.shape.reduce((a, b) => a * b);
+  const values = new Float32Array(rest.length + count);
+  values.set(rest.subarray(0, to.offset));
+  values.set(rest.subarray(to.offset), to.offset + count);
+  const turns = Float64Array.from({ length: points }, (_, k) => (2 * Math.PI * k) / points);
+  const [cosines, sines] = [turns.map(Math.cos), turns.map(Math.sin)];
+  const [real, imaginary] = [new Float64Array(window), new Float64Array(window)]; // of each row of the window
+  const transformRows = (neuron, c, k) => {
+    for (let y = 0; y < window; ++y) {
+      real[y] = imaginary[y] = 0;
+      for (let x = 0; x < window; ++x) {
+        const weight = packed[from.offset + neurons * ((y * window + x) * channels + c) + neuron];
+        real[y] += weight * cosines[(k * x) % points];
+        imaginary[y] += weight * sines[(k * x) % points];
+      }
+    }
+  };
+  const store = (at, k, f) => {
+    let [a, b] = [0, 0];
+    for (let y = 0; y < window; ++y) {
+      const turn = (f * y) % points;
+      a += real[y] * cosines[turn] - imaginary[y] * sines[turn];
+      b += real[y] * sines[turn] + imaginary[y] * cosines[turn];
+    }
+    values[at] = a / (2 * points * points);
+    // A frequency that is its own negative is real.
+    values[at + lanes] = (2 * k) % points || (2 * f) % points ? b / (2 * points * points) : 0;
+  };
+  order.forEach((neuron, place) => {
+    for (let c = 0; c < channels; ++c) {
+      for (let k = 0; k < columns; ++k) {
+        transformRows(neuron, c, k);
+        for (let f = 0; f < points; ++f) {
+          const row = (k * groups + Math.floor(place / lanes)) * points + f;
+          const pair = (row * pairs + (c % pairs)) * halves + Math.floor(c / pairs);
+          store(to.offset + pair * parts * lanes + (place % lanes), k, f);
+        }
       }
     }
   });
   return values;
-}
-
-/** For each input of the window, image by image, then pixel by pixel, its number pixel by pixel, then image by image. */
-function byImage(channels, inputs) {
-  const image = channels.flatMap((count, i) => Array(count).fill(i)); // of each channel of a pixel
-  const of = (n) => image[n % image.length];
-  return Array.from({ length: inputs }, (_, n) => n).sort((a, b) => of(a) - of(b) || a - b);
 }

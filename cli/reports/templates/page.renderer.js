@@ -68,8 +68,9 @@ class Strips {
       }
       const cost = (known ? this.pixelMs.get(key) : 1) * size;
       // Devices shade squares of 2 x 2 pixels: a single row would cost as much as two.
-      const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / (2 * cost))) : 1;
-      const rows = Math.min(2 * fit, size - job.row);
+      const least = pass.processor?.rows || 2;
+      const fit = known ? Math.max(1, Math.floor((BATCH_MS - this.guess) / (least * cost))) : 1;
+      const rows = Math.min(least * fit, size - job.row);
       if (pass.processor) {
         pass.processor.draw(pass.textures, pass.target, [job.row, rows]);
       } else {
@@ -153,11 +154,11 @@ class Renderer {
     return this.variants.get(name);
   }
 
-  /** What computes a pass that is a module; its weights are another variant's, in another order. */
-  processor({ module, channels, weights }) {
-    const other = this.data.variants.find((variant) => variant.name === weights.of).passes[0];
-    const ordered = inBlocks(decodeWeights(other.weights), weights, channels);
-    return new Processor(this.device, decodeBase64(module), ordered, channels);
+  /** What computes a pass that is a module; spectra among its weights are made of another variant's. */
+  processor({ module, weights, ...facts }) {
+    const other = this.data.variants.find((variant) => variant.name === weights.of);
+    const values = other ? transformed(decodeWeights(other.passes[0].weights), weights) : decodeFloats(weights);
+    return new Processor(this.device, decodeBase64(module), values, facts);
   }
 
   /** A pass's weights as whole rows of texels of one float or four. */
@@ -326,7 +327,7 @@ class Renderer {
     const found = device.read(result, 0);
     Object.values(textures).forEach((texture) => device.gl.deleteTexture(texture));
     device.release(result);
-    const expected = decodeFloats(variant.facts.check.expected, Float64Array);
+    const expected = decodeFloats(variant.facts.check.expected);
     const whole = variant.facts.check.bound === null; // of integers no number may be off
     const bound = whole ? new Float32Array(expected.length) : decodeFloats(variant.facts.check.bound);
     let error = 0;

@@ -23,8 +23,8 @@ function decodeBase64(text) {
 }
 
 /** Return floats from base64; the numbers are little-endian, as all machines with browsers are. */
-function decodeFloats(text, Kind = Float32Array) {
-  return new Kind(decodeBase64(text).buffer);
+function decodeFloats(text) {
+  return new Float32Array(decodeBase64(text).buffer);
 }
 
 /** The camera's axes, as refimpl/light/camera.py: camera_basis. */

@@ -1,6 +1,6 @@
 """Answers to the labs of the course, right and wrong ones, and what the grader finds in them."""
 
-import importlib.util
+import json
 import os
 import signal
 import sys
@@ -33,11 +33,9 @@ class Answer(NamedTuple):
 
 def answers(lab: Lab) -> list[Answer]:
     """Return the wrong answers to a lab."""
-    path = COURSE / "wrong" / f"{lab.name.partition('_')[0]}.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return [Answer(old, *row) for old, rows in module.WRONG.items() for row in rows]
+    path = COURSE / "wrong" / f"{lab.name.partition('_')[0]}.json"
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    return [Answer(old, *row) for old, some in rows.items() for row in some]
 
 
 def right_answer(lab: Lab) -> str:

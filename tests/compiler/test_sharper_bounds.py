@@ -22,9 +22,6 @@ from wamnet.refimpl.network.denoise import Model
 
 U = 2.0**-24
 
-WIDER = 1 + bounds.OUTWARD
-"""Rules are widened by this much where they are used: float64 rounds in them."""
-
 
 def tree_sum(terms, random, shape):
     """Add float32 numbers up in a tree: "chain" by magnitude, largest first, or any two at a time."""

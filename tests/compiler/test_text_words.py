@@ -13,7 +13,6 @@ from wamnet.compiler.reading.lanes import Unread, Wrong
 
 # What breaks a byte's marker shows where its text is read, not where it is summed.
 NO_MARKER = "begins with no token|which nothing defines"
-GROUPS = ("cuda", "glsl-vulkan", "opencl", "wgsl")
 
 
 @pytest.fixture(scope="module")

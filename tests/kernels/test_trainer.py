@@ -6,7 +6,6 @@ for a right kernel.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -32,8 +31,6 @@ from wamnet.refimpl.network.activation import ACTIVATIONS
 from wamnet.refimpl.network.dataset import Dataset, Window
 from wamnet.refimpl.network.factored import Factors
 from wamnet.refimpl.network.train import Recipe, TrainState
-
-Arrays = Mapping[str, Any]
 
 SMALL = Recipe(
     features=("color",),

@@ -16,9 +16,6 @@ from wamnet.refimpl.errors import InputError
 ROOT = Path(__file__).resolve().parents[3]
 """The repository's root folder."""
 
-SHELF = ROOT / "kernels/shelf"
-"""The shelf of the repository."""
-
 LARGEST_PROOFS = 500_000
 """Most bytes of all certificates and manifests of the shelf: whoever clones the repository has them."""
 

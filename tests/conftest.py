@@ -14,13 +14,14 @@
 4. `golden` compares generated text with a file under tests/golden; only `--update-golden` writes one.
 5. Processes stay small (tests/support/workers.py, tests/support/apart.py).
 6. `--quick` runs what needs NumPy only (tests/support/quick.py), `--nightly` what takes long as well
-   (tests/support/tiers.py).
+   (tests/support/tiers.py). `--shuffle SEED` runs the tests in another order, the same for all workers.
 """
 
 import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import hypothesis
@@ -69,11 +70,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tests/golden instead of comparing with it"
     )
+    parser.addoption(
+        "--shuffle", type=int, metavar="SEED", help="run files, and tests of a file, in any order"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     required_executors()
     config.stash[_state_key] = {}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Shuffle files, and the tests of each file; pytest then puts those together that share a fixture."""
+    if (seed := config.getoption("--shuffle")) is not None:
+        draw = Random(seed).random
+        files = {path: draw() for path in dict.fromkeys(item.path for item in items)}
+        items.sort(key=lambda item: (files[item.path], draw()))
 
 
 # ---- executors ------------------------------------------------------------------------------------------

@@ -46,7 +46,7 @@ def test_files_are_short(house):
 def test_functions_are_short(house):
     wrong = []
     for source in house.python():
-        for node in source.functions():
+        for node in source.functions:
             lines = (node.end_lineno or node.lineno) - node.lineno + 1
             if lines > MAX_FUNCTION_LINES:
                 wrong.append(source.at(node, f"{node.name} has {lines} lines"))
@@ -56,7 +56,7 @@ def test_functions_are_short(house):
 def test_errors_come_from_one_module(house):
     wrong = []
     for source in house.installed():
-        nodes = list(ast.walk(source.tree))
+        nodes = list(source.nodes)
         caught = " ".join(ast.unparse(n.type) for n in nodes if isinstance(n, ast.ExceptHandler) and n.type)
         # Both stand for what refimpl/reading.py lists.
         if "BROKEN" in caught or any(

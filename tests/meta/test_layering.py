@@ -57,7 +57,7 @@ PUBLIC = ("api", "kernel")
 def imports(source) -> Iterator[tuple[ast.AST, str]]:
     """Yield every import, also inside functions, as an absolute dotted name."""
     package = source.package
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node, alias.name
@@ -236,7 +236,7 @@ def test_imports_inside_are_relative(house):
     wrong = [
         source.at(node, "absolute import of wamnet")
         for source in house.parts()
-        for node in ast.walk(source.tree)
+        for node in source.nodes
         if (isinstance(node, ast.ImportFrom) and not node.level and (node.module or "").startswith("wamnet"))
         or (isinstance(node, ast.Import) and any(alias.name.startswith("wamnet") for alias in node.names))
     ]
@@ -250,7 +250,7 @@ def test_no_hidden_random_state(house):
     wrong = [
         source.at(node, ast.unparse(node))
         for source in house.parts()
-        for node in ast.walk(source.tree)
+        for node in source.nodes
         if isinstance(node, ast.Attribute) and ast.unparse(node) in {"np.random", "numpy.random"}
     ]
     house.refuse(

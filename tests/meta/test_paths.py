@@ -23,7 +23,7 @@ def texts(house) -> Iterator[tuple[str, str]]:
         if path.suffix == ".md":
             yield path.relative_to(house.root).as_posix(), path.read_text()
     for source in house.python():
-        for node in ast.walk(source.tree):
+        for node in source.nodes:
             alone = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
             if alone and isinstance(node.value.value, str):
                 yield source.at(node, "docstring"), node.value.value

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import re
+from functools import cache
 
 import pytest
 import rewrite
-from lab import gallery, plots, records, shown, texts
+from lab import gallery, plots, records, results, shown, texts
 from lab.records import Records, checked
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -27,9 +28,11 @@ OTHERS = ("web-page", "front")
 
 @pytest.fixture(scope="module")
 def filled():
-    """Give all texts as the records fill them: what filled them, and the texts that differ."""
+    """Give all texts as the records, each read once, fill them: what filled them, and those that differ."""
     filler = texts.Filler(Counting(Records().folder), shown.TABLES, shown.FIGURES)
-    return filler, [path.relative_to(records.ROOT).as_posix() for path, _ in texts.stale(filler)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "_data", cache(results._data))
+        return filler, [path.relative_to(records.ROOT).as_posix() for path, _ in texts.stale(filler)]
 
 
 def test_texts_are_what_the_records_give(filled):

@@ -113,8 +113,8 @@ def test_what_a_format_means_is_expected():
             return [{"color": np.broadcast_to(self.words, (shot.size, shot.size, 3))} for _ in seeds]
 
     def shows(*color):
-        found = run.verify(Shows("test", "gltf", color, lambda path: {}), chosen(["mirror"]), pictures=4)
-        (verdict,) = [each for each in found if each.question.name == "mirror"]
+        asked = [each for each in chosen(["mirror"]) if each.name == "mirror"]
+        (verdict,) = run.verify(Shows("test", "gltf", color, lambda path: {}), asked, pictures=4)
         return verdict
 
     fades = [2.0 * (r + (1.0 - r) / 32.0) for r in (0.9, 0.6, 0.3)]

@@ -1,11 +1,12 @@
 """Reading the texts of spectra: transforms, products and tiles, operation by operation (spec/text.md)."""
 
+import json
 import operator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-import spectra_classes
 from texts import NAME, changed, parts
 
 from wamnet.compiler import artifact, targets
@@ -215,9 +216,16 @@ def test_a_text_is_held_against_what_its_certificate_says(opencl, place, value):
 
 # ---- wrong texts -----------------------------------------------------------------------------------------
 
-WRONG = [(w, target, old, new) for w, ts, old, new in spectra_classes.CLASSES for target in ts]
+FAULTS = json.loads(Path(__file__).with_name("spectra_faults.json").read_text())
+"""What a person who edits a transform, a product, a tile or a manifest may do wrong.
 
-USUAL = [f"{ts[-1]}: {w}" for w, ts, *_ in spectra_classes.CLASSES[::5]]
+Of texts: what, the targets that have the text, which text, and what instead; of hosts: what, which launches,
+the number of one, its key, and by how much.
+"""
+
+WRONG = [(what, target, old, new) for what, names, old, new in FAULTS["texts"] for target in names.split()]
+
+USUAL = [f"{names.split()[-1]}: {what}" for what, names, *_ in FAULTS["texts"][::5]]
 """Classes of each part of a kernel, in one language."""
 
 
@@ -244,7 +252,7 @@ def test_wrong_texts_of_spectra_are_refused(what, target, old, new, request):
         run_text(*changed(request.getfixturevalue(target), old, new))
 
 
-@pytest.mark.parametrize(("what", "of", "number", "key", "more"), spectra_classes.HOSTS)
+@pytest.mark.parametrize(("what", "of", "number", "key", "more"), FAULTS["hosts"])
 def test_hosts_of_other_launches_are_refused(what, of, number, key, more, opengl):
     source, held, manifest, weights = opengl
     launches = [dict(each) for each in manifest["schedule"][of]]

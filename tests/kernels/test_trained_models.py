@@ -101,7 +101,7 @@ def trained(name: str) -> Trained:
 # ---- kernels within their bounds -----------------------------------------------------------------------
 
 
-@pytest.mark.product
+@pytest.mark.nightly(but=("opencl-glossy", "c-cornell", "opengl-egl-minicubes"))
 @pytest.mark.parametrize("name", MODELS)
 def test_whole_frames_equal_the_definition(denoiser, name):
     """As users run it: encoding and choice of the schedule included, under the bound of the manifest."""
@@ -113,11 +113,11 @@ def test_whole_frames_equal_the_definition(denoiser, name):
     assert wanted.std() > 0.05, "the picture is nearly constant: it would hide a wrong kernel"
 
 
-@pytest.mark.product
+@pytest.mark.nightly(but="opencl-glossy")
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("target", DENOISERS)
 def test_certified_bounds_are_below_a_step_of_a_display(name, target):
-    """Over all pictures, of all schedules that hold the model."""
+    """Over all pictures, of all schedules that hold the model; of the shelf's: test_certify_shelf.py."""
     program = lower(load_model(Path(name)))
     plans = [plan_program(program, target, schedule=each.name) for each in DENOISERS[target].schedules]
     shared = [plan for plan in plans if plan.shares_bound]

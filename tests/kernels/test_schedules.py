@@ -94,6 +94,10 @@ def executor_of(executor_named, target):
 @pytest.mark.nightly(
     "c-fft:4",
     "c-fft:8",
+    "c-tile:4",
+    "c-tile:8",
+    "opengl-group:1",
+    "opengl-group:2",
     "opencl-fft:8",
     "opencl-fft:4",
     "opencl-group:1",

@@ -173,6 +173,7 @@ def test_a_tree_computes_what_the_list_computes(denoiser, name, monkeypatch):
     assert np.array_equal(found, expected)
 
 
+@pytest.mark.nightly("8")
 @pytest.mark.parametrize("lanes", [1, 4, 8])
 def test_a_tree_is_the_same_for_any_number_of_lanes(executor_named, lanes, monkeypatch):
     monkeypatch.setattr(hierarchy, "VISIT", 5.0)

@@ -37,7 +37,7 @@ SUMS = "SHA256SUMS"
 
 MADE_OF = {
     "minicubes": (SHIPPED_SET, "shipped-shadows"),
-    "cornell": ("cornell", "best-16"),
+    "cornell": ("cornell", "shadows-16"),
     "glossy": ("glossy", "best-16"),
     "minicubes-basic": ("minicubes", "basic-16"),
     "cornell-basic": ("cornell", "basic-16"),

@@ -448,6 +448,9 @@ def seeded(records: Records) -> str:
     return tables.markdown(["emitters of", "origin", "bugs", *SEEDED], cells)
 
 
+SETS_IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight")
+"""Sets beside the mini cubes in which shadow rays are measured."""
+
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
     "course", "gpu-pipeline", "moving-quality", "savings", "shadows", "sines-speed", "specialisation",
@@ -502,6 +505,7 @@ TABLES: Mapping[str, TableOf] = {
     "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,
     "ranks": as_printed("ranks", without=TIMES),
+    **{f"shadows-{name}": as_printed(f"shadows-{name}", without=("ms",)) for name in SETS_IN_SHADOW},
     "shadows-bundled": as_printed("shadows-bundled", without=(*TIMES, "PSNR, range of seeds")),
     "same-bits": same.summary,
     "sines": sines,

@@ -123,8 +123,8 @@ def _join(groups: dict[str, typer.Typer], name: str | None, line: str) -> None:
     `line` is the command line's first two words.
     """
     installed = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
-    path = name if name in DISTRIBUTIONS else line
-    if path in DISTRIBUTIONS and name not in installed:
+    path = next((each for each in (name or "", line) if each in DISTRIBUTIONS), "")
+    if path and name not in installed:
         remedy = f"install it: pip install {DISTRIBUTIONS[path]}"
         raise InputError("command", path, f"distribution {DISTRIBUTIONS[path]} is not installed", remedy)
     for entry in installed.values():

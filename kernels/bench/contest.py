@@ -371,14 +371,14 @@ class Contest:
     def as_data(self) -> dict[str, Any]:
         """Return all that is known so far as JSON's types; the keys are those of spec/bench.md."""
         request, model, limits = self.request, self.request.model, self.limits
-        rows, *others = (
+        sizes: list[dict[str, Any]] = [
             {"size_px": size, "contenders": [self._data_of(row, size) for row in rows.values()]}
             for size, rows in self.sizes.items()
-        )
+        ]
         found: dict[str, Any] = clean(
             {
                 "schema": SCHEMA,
-                **rows,
+                **sizes[0],
                 "repeats": request.repeats,
                 "budget_s": request.budget_s,
                 "frames": request.frames or None,
@@ -395,8 +395,8 @@ class Contest:
                 "limits": limits and asdict(limits),
                 "limits_rounds_s": {entry.name: entry.seconds for entry in self.machine},
                 "rates": {name: asdict(found) for name, found in self.found_rates.items()},
-                "front": {part: _front_of(rows["contenders"], part) for part in FRONTS},
-                "sizes": others,
+                "front": {part: _front_of(sizes[0]["contenders"], part) for part in FRONTS},
+                "sizes": sizes[1:],
             }
         )
         return found

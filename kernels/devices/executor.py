@@ -406,6 +406,9 @@ class Executor(Closing, ABC):
                 f"compile the program for {self.name}",
             )
 
+    def __enter__(self) -> Any:
+        return self
+
 
 def _numbers(kernel: Artifact, numbers: NDArray[np.float32] | None) -> Images:
     """Return the array of a scene's numbers, where they are inputs."""

@@ -186,7 +186,7 @@ def _show(by: str, scene: str, entry: Entry, samples: int) -> None:
 
 
 def train(
-    presets: str = option("NAME,...  Training presets: best, mirrors, paper, short, sky.", "paper,short"),
+    presets: str = option(f"NAME,...  Training presets: {', '.join(PRESETS)}.", "paper,short"),
     trainers: str | None = option(
         "NAME,...  Trainers to measure: numpy, opencl, torch. [default: all that are installed]"
     ),

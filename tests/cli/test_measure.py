@@ -56,7 +56,7 @@ def test_a_command_prints_its_table(wamnet, name) -> None:
         ("render --depth 0", "--depth 0: must be from 1 to"),
         ("render --repeats 0", "--repeats 0: must be from 1 to"),
         ("render minicubes", "Got unexpected extra argument"),
-        ("train --presets long", "--presets 'long': must be one or more of best, mirrors, paper, "),
+        ("train --presets long", "--presets 'long': must be one or more of best, mirrors, "),
         ("train --trainers abacus", "--trainers 'abacus': must be one or more of numpy, opencl, torch"),
         ("train --seconds nan", "--seconds nan: must be above 0 and at most 600"),
         ("train --frames 0", "--frames 0: must be from 1 to"),

@@ -38,6 +38,9 @@ class Type:
         return Type(self.dtype, lanes)
 
 
+BYTES = {"float32": 4, "int32": 4, "uint32": 4, "bool": 4, "uint8": 1, "int8": 1}
+"""Bytes of a value of each kind."""
+
 FLOAT, INT, WORD, BOOL, BYTE = Type(), Type("int32"), Type("uint32"), Type("bool"), Type("uint8")
 
 
@@ -467,3 +470,17 @@ def substituted(value: Expr, known: Mapping[str, Expr]) -> Expr:
         if found.op != "const" or all(each.op == "const" for each in args):
             return found  # else 0 times what may be no integer of 32 bits
     return replace(value, args=args)
+
+
+def integer(kernel: Kernel, value: Expr | int) -> int:
+    """Return an integer that the kernel's constants determine."""
+    if isinstance(value, int):
+        return value
+    if value.op == "const":
+        return int(value.value)
+    if value.op == "name":
+        return integer(kernel, next(each.value for each in kernel.constants if each.name == value.value))
+    found = INTEGERS[value.op](*(integer(kernel, each) for each in value.args))
+    if not -(2**31) <= found < 2**31:
+        raise ArithmeticError(f"{found}, which int32 does not hold")
+    return found

@@ -23,7 +23,6 @@ from .domain import STORED, Domain, computed
 from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .interface import Array as Declared
 from .memory import Items, Memory, Part
-from .sizes import integer
 from .verify import STEPS, KernelError, verify
 from .walker import Walker
 
@@ -72,7 +71,7 @@ class Runner(Walker):
         self.kernel, self.domain = kernel, domain
         self.functions = {each.name: each for each in kernel.functions}
         self.tables = {key: computed(np.asarray(table)) for key, table in kernel.tables}
-        self.constants = {each.name: integer(kernel, each.value) for each in kernel.constants}
+        self.constants = {each.name: tree.integer(kernel, each.value) for each in kernel.constants}
         self.numbers: dict[int, Values] = {}
         self.items, places = self._items(integers.get("width", 1), integers.get(kernel.interface.rows, 1))
         self.names: dict[str, Values] = {**self.constants, **places}
@@ -95,7 +94,7 @@ class Runner(Walker):
 
     def _items(self, width: int, height: int) -> tuple[Items, dict[str, Values]]:
         """Return the work items, and names of their places; only groups reach beyond the image."""
-        across, down = (integer(self.kernel, each) for each in self.kernel.step)
+        across, down = (tree.integer(self.kernel, each) for each in self.kernel.step)
         columns, rows = self.kernel.group or (1, 1)
         groups = -(-width // (across * columns)), -(-height // (down * rows))
         row, column = (each.ravel() for each in np.mgrid[: groups[1] * rows, : groups[0] * columns])

@@ -1,27 +1,11 @@
-"""How large a kernel is: its named integers, the bytes of an item's arrays, the bytes that a group shares."""
+"""How large a kernel is: the bytes of an item's arrays, and the bytes that a group shares."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .kernel import BATCH, INTEGERS, Array, Expr, Kernel, const, expr, substituted, walk
-
-BYTES = {"float32": 4, "int32": 4, "uint32": 4, "bool": 4, "uint8": 1, "int8": 1}
-"""Bytes of a value of each kind."""
-
-
-def integer(kernel: Kernel, value: Expr | int) -> int:
-    """Return an integer that the kernel's constants determine."""
-    if isinstance(value, int):
-        return value
-    if value.op == "const":
-        return int(value.value)
-    if value.op == "name":
-        return integer(kernel, next(each.value for each in kernel.constants if each.name == value.value))
-    found = INTEGERS[value.op](*(integer(kernel, each) for each in value.args))
-    if not -(2**31) <= found < 2**31:
-        raise ArithmeticError(f"{found}, which int32 does not hold")
-    return found
+from .kernel import BATCH, BYTES, Array, Expr, Kernel, const, expr, substituted, walk
+from .kernel import integer as integer
 
 
 def of_tile(kernel: Kernel, count: Expr | int, tiles: int = 1) -> int:

@@ -14,7 +14,6 @@ import numpy as np
 
 from . import kernel as tree
 from .interface import BOTH, DENOISE, IMAGE, READ, RESULT, UNSIGNED, WEIGHTS, WRITE
-from .sizes import BYTES
 
 LIMITS = {
     dtype: (int(np.iinfo(dtype).min), int(np.iinfo(dtype).max))
@@ -131,7 +130,7 @@ class Verifier:
         """Declare a name in the innermost scope."""
         if any(name in scope for scope in self.scopes) or name in self.functions:
             raise KernelError(f"{name} is declared twice")
-        if declared.type.dtype not in BYTES or declared.type.lanes < 1:
+        if declared.type.dtype not in tree.BYTES or declared.type.lanes < 1:
             raise KernelError(f"{name} has the type {declared.type}, which does not exist")
         self.scopes[-1][name] = declared
 
@@ -422,7 +421,7 @@ class Verifier:
     def _type_convert(self, value: tree.Expr) -> tree.Type:
         """Return the type of a value of another kind."""
         self.arity(value, 1)
-        if value.value not in BYTES:
+        if value.value not in tree.BYTES:
             raise KernelError(f"a value is converted to {value.value}, which is not a kind of value")
         return tree.Type(value.value, self.type(value.args[0]).lanes)
 

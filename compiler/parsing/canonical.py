@@ -15,7 +15,7 @@ import numpy as np
 
 from ..kernel import kernel as tree
 from ..kernel.interface import DENOISE, IMAGE, RESULT, Interface
-from ..kernel.sizes import integer
+from ..kernel.kernel import integer
 
 Terms = list[tuple[tree.Expr, int]]
 """Terms of a sum of integers, each with 1 or -1."""

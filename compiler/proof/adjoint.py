@@ -81,7 +81,9 @@ def slopes(node: Node, operands: Sequence[Enclosure], secant: bool = True) -> li
     rule, found, is_wave = OPS[node.op].slopes, list[Near](), secant and node.op in ("sin", "cos")
     reach = [o.read / 2 if is_wave else o.read for o in operands]
     both = [Interval(o.low - r, o.high + r) for o, r in zip(operands, reach, strict=True)]
-    for i in range(len(operands)) if rule else ():
+    if rule is None:
+        return []
+    for i in range(len(operands)):
         x = [*(Interval(o.low, o.high) for o in operands[:i]), *both[i:]]
         y = image(node, [(each.low, each.high) for each in x])
         slope = rule(Interval(1.0, 1.0), Interval(*y), *x)[i]

@@ -24,11 +24,11 @@ from ..kernel.kernel import (
     Store,
     apply,
     inside,
+    integer,
     parts,
     values,
     walk,
 )
-from ..kernel.sizes import integer
 from ..parsing.grammar import LANGUAGES
 from ..parsing.parse import parse
 from ..parsing.reader import Passes

@@ -32,10 +32,10 @@ from ..kernel.kernel import (
     Statement,
     Store,
     Type,
+    integer,
     name,
     walk,
 )
-from ..kernel.sizes import integer
 from ..kernel.verify import STEPS
 from .cells import Cells, Device, Race, Shared, Slice, Tile, Turns
 from .claim import Claim

@@ -33,11 +33,11 @@ def certify(
     The checker derives every value again from the weights and the program, and prints each layer's
     contribution. The source checker then parses the source, executes it symbolically for images of any size,
     and compares every sum and every operation with the program's. Both checkers share only the definitions of
-    kernels, operations and instructions with the compiler, and print their number of lines. They assume that
-    compiler and device keep to the language's standard and to IEEE 754's float32, rounded to nearest, and
-    that the host calls the kernel as the manifest states, with finite values in the stated ranges. Exit
-    status 0: the proof holds, and the source computes the program; 1: a step fails, and is named; 2: the file
-    is not a certificate; 3: the source was not checked, and the reason is printed.
+    kernels and instructions with the compiler, and print how many lines they have, with all that they import.
+    They assume that compiler and device keep to the language's standard and to IEEE 754's float32, rounded to
+    nearest, and that the host calls the kernel as the manifest states, with finite values in the stated
+    ranges. Exit status 0: the proof holds, and the source computes the program; 1: a step fails, and is
+    named; 2: the file is not a certificate; 3: the source was not checked, and the reason is printed.
 
     Examples:
     wamnet certify kernel-opencl/denoise.certificate.json

@@ -429,6 +429,7 @@ def _lamplight(world: World, surface: Surface) -> Floats:
 
     assert world.lights is not None
     black = np.zeros_like(surface.reflectance[..., 0])
+    total: Floats
     (total,) = vectors.fold_rows(add, _lamp_tables(world.lights), (black,))
     return total
 

@@ -32,8 +32,8 @@ class Expressions(Reader):
     def _takes_lanes(self, what: str, first: int, *rest: int) -> bool:
         """Return whether an operation takes operands of so many lanes, one of them a vector."""
         language, alike = self.language, {first, *rest} == {first}
-        if what.startswith("logical"):
-            return language.casts
+        if what == "logical_and":
+            return False
         if what == "select":
             return rest[0] == rest[1] and first in (1, rest[0])
         if what in ("minimum", "maximum", "clamp"):
@@ -81,8 +81,6 @@ class Expressions(Reader):
             value = self._unary()
             self._check_vectors("-", value)
             return self._made("negative", value)
-        if self._has("!"):
-            return self._made("logical_not", self._unary())
         if self.in_floats and self._has("*", "("):
             self._has("const")
             self._form("wamnet_vector * ) (")
@@ -133,8 +131,6 @@ class Expressions(Reader):
         if self._has("("):
             value: Expr = self._form("E )")[0]
             return value
-        if text in ("true", "false"):
-            return const(self._take() == "true")
         if kind != "word":
             raise Unread(f"{text!r} is not a value")
         self._take()
@@ -331,13 +327,13 @@ class Expressions(Reader):
 def binds(sign: str, first: str, second: str) -> bool:
     """Return whether WGSL lets an operator have operands of these operators without brackets."""
     relations, sums = ("==", "!=", "<", ">", "<=", ">="), ("+", "-", "*", "/", "%")
-    if sign in ("&&", "||"):
+    if sign == "&&":
         inner: tuple[str, ...] = (*relations, *sums, ">>")
     elif sign in relations:
         inner = (*sums, ">>")
     else:
         inner = sums if sign in sums else ()
-    again = (sign,) if sign in ("&&", "||", "&", "^") else ()
+    again = (sign,) if sign in ("&&", "&", "^") else ()
     return first in (*inner, *again, "") and second in (*inner, "")
 
 

@@ -13,12 +13,12 @@ TOKEN = re.compile(
     r"|(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
     r"|(?P<float>\d+(?:\.\d+(?:e[+-]\d+)?|e[+-]\d+)f(?!\w))|(?P<mask>0x7fffffff)(?!\w)"
     r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>vec4<[fi]32>|unsigned int|[A-Za-z_]\w*(?:::\w+)?)"
-    r"|(?P<sign>\+\+|--|->|[-+]=|<=|>=|==|!=|&&|\|\||>>|[-+*/%<>=!?:;,.(){}\[\]&^])"
+    r"|(?P<sign>\+\+|--|->|[-+]=|<=|>=|==|!=|&&|>>|[-+*/%<>=?:;,.(){}\[\]&^])"
 )
 """The tokens of all languages; a kernel has no others."""
 
 BINARY: tuple[Mapping[str, str], ...] = (
-    {"||": "logical_or"}, {"&&": "logical_and"}, {"^": "bitwise_xor"}, {"&": "bitwise_and"},
+    {"&&": "logical_and"}, {"^": "bitwise_xor"}, {"&": "bitwise_and"},
     {"==": "equal", "!=": "not_equal"},
     {"<": "less", "<=": "less_equal", ">": "greater", ">=": "greater_equal"}, {">>": "right_shift"},
     {"+": "add", "-": "subtract"}, {"*": "multiply", "/": "divide", "%": "remainder"},

@@ -121,16 +121,13 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
     if term.is_wide and not whole:
         leaf = term.shape
-    low, high = span or (1, 0)
-    if kind == "uint8" and not good.all():  # the byte of another integer
-        byte = drawn(hashed("byte", shape))
-        sums = byte if sums is None else np.where(good, sums, byte)
-        low, high = np.where(good, low, 0), np.where(good, high, 255)
-        good = np.ones(shape.shape, bool)
+    if kind == "uint8" and not good.all():
+        raise Wrong("it makes a byte of an integer that is none")
     if sums is None or not good.any():
         return Term(shape, kind=kind)
     if not good.all():
         sums = np.where(good, sums, drawn(shape))
+    low, high = span or (1, 0)
     return Term(shape, sums, kind=kind, span=spans(good, low, high), leaf=leaf)
 
 
@@ -158,24 +155,14 @@ def bits(term: Term) -> Term:
 # ---- bytes ------------------------------------------------------------------------------------------------
 
 
-def packed(four: Sequence[Term], fold: Callable[[Term], Term]) -> Term:
-    """Return a word of the low bytes of four integers."""
-    return replace(stacked([_low_byte(each, fold) for each in four]), kind="word")
-
-
-def _low_byte(term: Term, fold: Callable[[Term], Term]) -> Term:
-    """Return an integer's low byte with its sign: the same if it is one, else another unknown."""
-    good = np.zeros(term.known.shape, bool) if term.span is None else within(term.span, LIMITS["int8"])
-    if good.all():
-        return replace(term, kind="int32")
-    if term.is_wide:
-        return _low_byte(fold(term), fold)
-    byte = drawn(hashed("low byte", term.known))
-    if term.span is None or term.sums is None:
-        low, high = (np.full(good.shape, end) for end in LIMITS["int8"])
-        return Term(term.known, byte, span=(low, high), kind="int32")
-    low, high = (np.where(good, end, limit) for end, limit in zip(term.span, LIMITS["int8"], strict=True))
-    return Term(term.known, np.where(good, term.sums, byte), kind="int32", span=(low, high))
+def packed(four: Sequence[Term], wrong: Wrongs) -> Term:
+    """Return a word of four integers that are known to be bytes."""
+    for each in four:
+        wrong(
+            True if each.span is None else ~within(each.span, LIMITS["int8"]),
+            "it makes a byte of an integer that is none",
+        )
+    return replace(stacked([replace(each, kind="int32") for each in four]), kind="word")
 
 
 def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:

@@ -26,7 +26,7 @@ from .terms import Term, chosen, compared, constant, expression, operate, select
 
 EVALUATED = (
     "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
-    "logical_or", "logical_not", "convert", "bits", "pack4", "dot4",
+    "convert", "bits", "pack4", "dot4",
 )  # fmt: skip
 """Expressions that are not operations on their operands' values."""
 
@@ -125,8 +125,6 @@ class Values(Walker):
             a, b = terms
             found = operate(what, a, b, self.dual)
             return self._found(found) if what == "add" and found.sums is not None else found
-        if what == "negative" and terms[0].literal is not None:
-            return constant(-terms[0].literal, terms[0].kind)
         if (
             what.endswith("shift")
             and not 0 <= (terms[1].literal if terms[1].literal is not None else -1) < 32
@@ -168,7 +166,7 @@ class Values(Walker):
         """Return an integer within two others, the first of which is not above the second."""
         given, low, high = map(self.value, value.args)
         if any(isinstance(each, Term) for each in (given, low, high)):
-            return self.operate("minimum", self.operate("maximum", given, low), high)
+            raise Unread("a number of the image between two others")
         order = self._of_indices("less_equal", low, high)
         self._wrong(
             not order if isinstance(order, bool) else ~order, "a value between two others in no order"
@@ -193,31 +191,11 @@ class Values(Walker):
 
     def _value_logical_and(self, value: Expr) -> Any:
         """Return whether both hold; the second is not asked where the first does not."""
-        return self._logical(value, True)
-
-    def _value_logical_or(self, value: Expr) -> Any:
-        """Return whether one holds."""
-        return self._logical(value, False)
-
-    def _logical(self, value: Expr, both: bool) -> Any:
         a = self._truth(self.value(value.args[0]))
-        if isinstance(a, bool) and a is not both:
+        if isinstance(a, bool) and not a:
             return a
         b = self._truth(self.value(value.args[1]))
-        if isinstance(a, bool):
-            return b
-        return np.logical_and(a, b) if both else np.logical_or(self._shared(a), self._shared(b))
-
-    def _value_logical_not(self, value: Expr) -> Any:
-        """Return whether something does not hold."""
-        found = self._shared(self._truth(self.value(value.args[0])))
-        return not found if isinstance(found, bool) else ~found
-
-    def _shared(self, truth: Any) -> Any:
-        """Return what is true of all lanes: of a pixel's place only that it is far from borders is asked."""
-        if isinstance(truth, np.ndarray) and truth.shape[0] > 1:
-            raise Unread("the opposite of a condition on coordinates, or one of two")
-        return truth
+        return b if isinstance(a, bool) else np.logical_and(a, b)
 
     def _value_component(self, value: Expr) -> Any:
         """Return one number of a vector."""
@@ -241,12 +219,7 @@ class Values(Walker):
         given, kind = self.value(value.args[0]), value.type.dtype
         if isinstance(given, Term):
             return self._converted(given, kind)
-        if kind == "int32":
-            return int(given) if type(given) is bool else given
-        low, high = integers.LIMITS.get(kind, (-integers.EXACT, integers.EXACT))
-        if type(given) is not int or not low <= given <= high:
-            raise Unread(f"a coordinate, or {given!r}, as {kind}")
-        return constant(given, kind)
+        raise Unread(f"a coordinate, or {given!r}, as {kind}")
 
     def _converted(self, term: Term, kind: str) -> Term:
         """Return a number as one of another kind."""
@@ -277,7 +250,7 @@ class Values(Walker):
     def _value_pack4(self, value: Expr) -> Any:
         """Return the bytes of four floats as a word, the first one the lowest."""
         four = [self._converted(self._term(self.value(each), "float32"), "int32") for each in value.args]
-        return integers.packed(four, self.folded)
+        return integers.packed(four, self._wrong)
 
     def _value_dot4(self, value: Expr) -> Any:
         """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""

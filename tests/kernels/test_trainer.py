@@ -151,19 +151,9 @@ CHANGES = {
 
 
 COVERING = (
-    (
-        {
-            "widths": (),
-            "batch": 1,
-            "features": ("normal",),
-            "window": Window(1, "zero"),
-            "activation": "relu",
-        },
-        0,
-    ),
-    ({"widths": (1, 16, 17), "batch": 65, "window": Window(4, "zero"), "n_windows": 30}, 0),
-    ({"widths": (40, 15), "batch": 8, "features": ("color", "normal"), "omega_0_hidden": 1.0}, 16),
-    ({"widths": (70, 3), "batch": 700, "window": Window(7), "activation": "relu"}, 1),
+    ({"widths": (), "batch": 1, "features": ("normal",), "window": Window(1, "zero")}, 0),
+    ({"widths": (1, 16, 17), "batch": 65, "features": ("color", "normal"), "window": Window(4, "zero")}, 0),
+    ({"widths": (70, 3), "batch": 700, "window": Window(7), "activation": "relu", "n_windows": 30}, 16),
 )
 """Changes and a rank; each kind of size occurs in one."""
 

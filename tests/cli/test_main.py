@@ -112,14 +112,22 @@ def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, 
     )
 
 
-def test_errors_of_the_system_are_one_line(refused, monkeypatch) -> None:
-    """A full disk is not a bug."""
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device", "a.exr"), "No space left on device: a.exr\n"),
+        (MemoryError(), "out of memory (use smaller frames"),
+        (TrainingError("the loss\nis nan"), "the loss is nan\n"),
+    ],
+)
+def test_errors_of_the_system_and_of_training_are_one_line(refused, monkeypatch, error, said) -> None:
+    """A full disk is not a bug; an error of training is a plain sentence, perhaps over several lines."""
 
     def fail(*_args: object, **_options: object) -> None:
-        raise OSError(28, "No space left on device", "a.exr")
+        raise error
 
     monkeypatch.setattr(module, "application", lambda _: fail)
-    assert refused("render") == "wamnet: error: No space left on device: a.exr\n"
+    assert said in refused("render").removeprefix("wamnet: error: ")
 
 
 def test_bugs_keep_their_traceback(wamnet, monkeypatch) -> None:
@@ -188,26 +196,6 @@ def test_help_imports_nothing_heavy(tmp_path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=False, timeout=60
     )
     assert done.returncode == 0
-
-
-def test_too_little_memory_is_one_line(refused, monkeypatch) -> None:
-    """With a way out."""
-
-    def fail(*_args: object, **_options: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr(module, "application", lambda _: fail)
-    assert "out of memory (use smaller frames" in refused("render")
-
-
-def test_errors_without_four_parts_are_one_line(refused, monkeypatch) -> None:
-    """Training's errors are plain sentences, perhaps over several lines."""
-
-    def fail(*_args: object, **_options: object) -> None:
-        raise TrainingError("the loss\nis nan")
-
-    monkeypatch.setattr(module, "application", lambda _: fail)
-    assert refused("train") == "wamnet: error: the loss is nan\n"
 
 
 def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:

@@ -107,7 +107,9 @@ def test_certificates_of_all_schedules_hold(tmp_path, target, schedule):
 def test_certificates_of_all_profiles_hold(tmp_path, target, profile):
     """The checker knows every sine of which something is promised."""
     artifact.write(compile_program(lower(model()), target, profile), tmp_path)
-    assert checker.check(tmp_path / NAME)["profile"] == profile
+    held = checker.check(tmp_path / NAME)
+    assert held["profile"] == profile
+    assert target != "opencl" or held["sine"]["domain"] is None
 
 
 def test_a_certificate_is_what_its_schema_says(path):
@@ -404,13 +406,6 @@ def test_another_source_is_refused(path, changed):
         checker.check(changed(denoise_cl=source[:-1] + b" "))
 
 
-def test_a_manifest_that_promises_more_is_refused(path, changed):
-    manifest = json.loads((path.parent / "manifest.json").read_text())
-    manifest["bound"]["output"][1] /= 2
-    with pytest.raises(checker.Refused, match="manifest: bound"):
-        checker.check(changed(manifest_json=manifest))
-
-
 @pytest.mark.parametrize(
     ("place", "value", "match"),
     [
@@ -424,6 +419,8 @@ def test_a_manifest_that_promises_more_is_refused(path, changed):
         (("images", 0, "high"), 1000.0, "images"),
         (("images", 1, "low"), -100.0, "images"),
         (("images",), [], "images"),
+        (("images",), lambda images: images[::-1], "manifest: images"),
+        (("bound", "output", 1), lambda bound: bound / 2, "manifest: bound"),
         (("output", "name"), "normal", "output"),
         (("output", "channels"), "3", "integers"),
         (("schedule", "pixels"), "1", "integers"),
@@ -439,14 +436,9 @@ def test_a_manifest_of_another_program_is_refused(path, changed, place, value, m
     """CER-5: a host calls the kernel as the manifest says."""
     manifest = json.loads((path.parent / "manifest.json").read_text())
     with pytest.raises(checker.Refused, match=match):
-        checker.check(changed(manifest_json=put(manifest, place, lambda _: value)))
-
-
-def test_images_in_another_order_are_refused(path, changed):
-    manifest = json.loads((path.parent / "manifest.json").read_text())
-    manifest["images"].reverse()
-    with pytest.raises(checker.Refused, match="manifest: images"):
-        checker.check(changed(manifest_json=manifest))
+        checker.check(
+            changed(manifest_json=put(manifest, place, value if callable(value) else lambda _: value))
+        )
 
 
 @pytest.mark.parametrize("key", ["schedule", "target", "images", "window", "output", "weights"])
@@ -570,8 +562,3 @@ def test_garbage_is_no_certificate(changed, data):
         (InputError, checker.Refused), match=r"must be|promises|acceptable JSON|earlier version"
     ):
         checker.check(changed(denoise_certificate_json=data))
-
-
-def test_native_opencl_has_a_certificate(tmp_path):
-    artifact.write(compile_program(lower(model()), "opencl", "native"), tmp_path)
-    assert checker.check(tmp_path / NAME)["sine"]["domain"] is None

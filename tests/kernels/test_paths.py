@@ -92,8 +92,8 @@ WIDER = (r"defined(__AVX512F__)", r"defined(__AVX2__)", r"defined(__SSE2__) || d
 """What chooses vectors in C, the widest first; single values if there is none."""
 
 
-@pytest.mark.nightly(but="minicubes")
-@pytest.mark.parametrize("name", ["minicubes", "vitrine", "daylight"])
+@pytest.mark.nightly(but="lone_light")
+@pytest.mark.parametrize("name", ["lone_light", "minicubes", "vitrine", "daylight"])
 def test_c_has_the_same_bits_in_vectors_of_any_width(executor_named, name):
     """PTK-9: 16, 8, 4 paths at once, or one, in the middle of an image and at the end of a row."""
     executor, part = executor_named("c"), Part(21, 9, 1, 7, 0, 2, 3)

@@ -18,6 +18,7 @@ ends are the least and the largest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,15 +70,17 @@ def interval(values: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES
 
 
 def resampled_means(table: NDArray[np.float64], resamples: int = RESAMPLES) -> NDArray[np.float64]:
-    """Return the means (resamples,) of a table (seeds, poses) whose rows and columns are drawn again.
-
-    Tables of one shape have the same rows and columns drawn.
-    """
-    generator = np.random.default_rng(SEED)
-    # How large a part of each resample each row and column is.
-    rows, columns = (generator.multinomial(n, np.full(n, 1.0 / n), resamples) / n for n in table.shape)
+    """Return the means (resamples,) of a table (seeds, poses) whose rows and columns are drawn again."""
+    rows, columns = _parts(table.shape, resamples)
     means: NDArray[np.float64] = np.einsum("ri,ij,rj->r", rows, table, columns, optimize=True)
     return means
+
+
+@cache
+def _parts(shape: tuple[int, ...], resamples: int) -> list[NDArray[np.float64]]:
+    """Return how large a part of each resample (resamples, n) each row and each column of a table is."""
+    generator = np.random.default_rng(SEED)
+    return [generator.multinomial(n, np.full(n, 1.0 / n), resamples) / n for n in shape]
 
 
 def paired(first: ArrayLike, second: ArrayLike, level: float = LEVEL) -> Interval:

@@ -99,22 +99,21 @@ def rough_metal(angle_deg: float, alpha: float, correlated: bool = True) -> floa
     The mean of G2 (o . m) / ((o . n) (m . n)) over normals m drawn in proportion to D (m . n); masking by
     Smith (Heitz, JCGT 3(2), 2014), height-correlated or as the product of both directions' own.
     """
-    u, v = np.meshgrid((np.arange(GRID) + 0.5) / GRID, (np.arange(GRID) + 0.5) / GRID)
-    tangent, phi = alpha * np.sqrt(u / (1.0 - u)), 2.0 * np.pi * v
+    u, v = np.meshgrid((np.arange(GRID) + 0.5) / GRID, (np.arange(GRID // 2) + 0.5) / (GRID // 2))
+    # The plane of o and n is one of symmetry: half a turn of phi has the mean of a whole one.
+    tangent, phi = alpha * np.sqrt(u / (1.0 - u)), np.pi * v
     height = 1.0 / np.sqrt(1.0 + tangent**2)
-    m = np.stack([height * tangent * np.cos(phi), height * tangent * np.sin(phi), height])
-    angle = np.radians(angle_deg)
-    o = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    cosine = np.tensordot(o, m, 1)
-    up = 2.0 * cosine * m[2] - o[2]
+    across, along = np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg))
+    cosine = height * (across * tangent * np.cos(phi) + along)
+    up = 2.0 * cosine * height - along
     seen = (cosine > 0.0) & (up > 0.0)
 
     def slope(z: Any) -> Any:
         return 0.5 * (np.sqrt(1.0 + alpha**2 * (1.0 / z**2 - 1.0)) - 1.0)
 
-    out, back = slope(o[2]), slope(np.where(seen, up, 1.0))
+    out, back = slope(along), slope(np.where(seen, up, 1.0))
     masking = 1.0 / (1.0 + out + back) if correlated else 1.0 / ((1.0 + out) * (1.0 + back))
-    return float(np.mean(np.where(seen, masking * cosine / (o[2] * m[2]), 0.0)))
+    return float(np.mean(np.where(seen, masking * cosine / (along * height), 0.0)))
 
 
 def plane_hits(

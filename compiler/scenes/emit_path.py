@@ -13,8 +13,7 @@
         ray: the path at the camera; arrive; look; its emission, and shadow, for each shadow ray
 
 1. Each program is a block of statements, one a node, on variables that have the names of its inputs
-   [`_Builder.block`]; its outputs are assigned at the block's end. A loop over the rows of tables is a loop
-   on a counter that all paths share, so that a row is read once for all of them [`_Statements._loop`].
+   [`_Builder.block`]; its outputs are assigned at the block's end [`common.lets`, `common.assigned`].
 2. An item follows as many paths as values have lanes, those of pixels side by side. A path that has ended is
    computed on with the others of its item, and changes nothing: radiance is assigned where it is alive.
 3. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
@@ -24,15 +23,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError, choice
-from ..core.ir import Image, Node, Program
-from ..core.loops import Loop, Part, Walk, loops
+from ..core.ir import Image, Program
 from ..core.weights import tables
 from ..kernel.interface import IMAGE, INTEGERS, PATH, READ, SCENE_NUMBERS, SUMS, WRITE, Interface
 from ..kernel.interface import Array as Memory
@@ -62,6 +60,7 @@ from ..kernel.kernel import (
     name,
     splat,
 )
+from ..schedules.common import assigned, lets
 from .lower_scene import ALIVE, LAYERS, LIT, SEEN, SEEN_LIT, SURFACE, WAY, PathPrograms
 from .lower_scene import PATH as STATE
 from .values import RGB, Values, floats, kinds, names
@@ -78,12 +77,6 @@ SUMMED: Values = {**floats("color", "deviation", ends=RGB), **LAYERS, **SEEN, **
 
 GROUPS: Mapping[str, Sequence[str]] = {**{g: names({g: value}) for g, value in SUMMED.items()}, **END}
 """What a kernel can add up: groups of planes, by name."""
-
-TRIP = "i"
-"""Name of the counter of a loop over the rows of tables."""
-
-BRANCH = "node"
-"""Name of the number of a tree's node, where a loop walks along one."""
 
 FRAME_GROUPS = ("color", "deviation", *LAYERS)
 """What a rendered frame needs."""
@@ -131,109 +124,6 @@ def asked(programs: PathPrograms, groups: Sequence[str]) -> PathPrograms:
         if not wanted:
             parts.pop(part, None)
     return replace(programs, parts=parts)
-
-
-# ---- one program -------------------------------------------------------------------------------------------
-
-
-class _Statements:
-    """The statements of a program, one an operation, and the value of each node.
-
-    Inputs are variables of their names, or what `given` has for them; `tables` are the names of tables.
-    """
-
-    def __init__(
-        self, program: Program, given: Mapping[str, Expr], tables: Mapping[str, str], width: int
-    ) -> None:
-        self.program, self.given, self.tables, self.width = program, given, tables, width
-        self.values: list[Expr] = []
-        self.body: list[Statement] = []
-        ends, in_bodies = loops(program)
-        for index, node in enumerate(program.nodes):
-            if index in ends:
-                self.body.append(self._loop(ends[index]))
-            self.values.append(self._value(index, node))
-            if node.op not in ("input", "constant", "loop") and index not in in_bodies:
-                self.body.append(self._statement(index))
-
-    def _value(self, index: int, node: Node) -> Expr:
-        """Return a node's value: a constant, or a name."""
-        kind = Type(node.type.dtype, self.width)
-        if node.op == "input":
-            return self.given.get(str(node["name"]), name(str(node["name"]), kind))
-        if node.op == "constant":
-            return splat(const(node["value"], kind.of(1)), self.width)  # type: ignore[arg-type]
-        if node.op == "loop":
-            return self.values[node.args[int(node["index"])]]  # type: ignore[arg-type]
-        return name(f"t{index}", kind)
-
-    def _statement(self, index: int) -> Statement:
-        """Return the statement that computes a value."""
-        node, own = self.program.nodes[index], self.values[index]
-        args = [self.values[arg] for arg in node.args]
-        if node.op == "carried":
-            return Array(own.value, own.type, kept=True, value=args[0])
-        if node.op in ("row", "branch"):
-            value = splat(self._entry(node["table"], name(TRIP if node.op == "row" else BRANCH)), self.width)
-        elif node.op == "take":
-            value = self._entry(node["table"], args[0])
-        else:
-            value = apply(node.op, *args, value=node.get("dtype"))
-        return Let(own.value, value, kept=True)
-
-    def _entry(self, table: object, index: Expr) -> Expr:
-        """Return the entry of a table."""
-        kind = Type(str(self.program.parameters[str(table)].dtype), index.type.lanes)
-        return Expr("take", (index,), kind, self.tables[str(table)])
-
-    def _loop(self, loop: Loop) -> Statement:
-        """Return a loop over the rows of tables."""
-        if loop.walk is not None:
-            return self._walk(loop, loop.walk)
-        return For(TRIP, const(loop.trips), self._trip(loop, Part(loop.body, loop.after)))
-
-    def _walk(self, loop: Loop, walk: Walk) -> Statement:
-        """Return a walk along a tree: a node is entered where any of the paths enters it."""
-        nodes, node = len(self.program.parameters[walk.skip]), name(BRANCH)
-        parts = []
-        for number, part in enumerate(walk.parts):
-            start, end = (self._entry(walk.first, node + (number * (nodes + 1) + more)) for more in (0, 1))
-            parts.append(For(TRIP, end, self._trip(loop, part), start=start))
-        entered = Store(BRANCH, (), node + 1)
-        left_out = Store(BRANCH, (), self._entry(walk.skip, node))
-        branch = If(any_lane(self.values[walk.enters]), (*parts, entered), (left_out,))
-        guard = [self._statement(index) for index in walk.guard]
-        visit = For("visit", const(nodes), (Break(apply("equal", node, nodes)), *guard, branch))
-        return Block((Array(BRANCH, node.type, value=const(0)), visit))
-
-    def _trip(self, loop: Loop, done: Part) -> tuple[Statement, ...]:
-        """Return a trip of a loop: its body, then the assignments of what it carries."""
-        changed = {
-            self.values[c].value: self.values[n] for c, n in zip(loop.carried, done.after, strict=True)
-        }
-        body = [self._statement(index) for index in done.body]
-        return (*body, *_assigned(changed, [self.values[c].value for c in loop.carried]))
-
-
-def _assigned(
-    values: Mapping[str, Expr], variables: Collection[str], masked: Collection[str] = ()
-) -> list[Statement]:
-    """Return the assignments of values to variables, to those in `masked` where a path is alive."""
-    before: list[Statement] = []
-    after: list[Statement] = []
-    for variable, value in values.items():
-        old, alive = name(variable, value.type), name("alive", BOOL.of(value.type.lanes))
-        if value == old:
-            continue
-        if value.op == "name" and value.value in variables:  # which may be assigned before it is read
-            before.append(Let(f"new_{variable}", value, kept=True))
-            value = name(f"new_{variable}", value.type)
-        if variable == "alive":
-            value = alive & value
-        elif variable in masked:
-            value = apply("select", alive, value, old)
-        after.append(Store(variable, (), value))
-    return before + after
 
 
 # ---- the skeleton ------------------------------------------------------------------------------------------
@@ -428,18 +318,17 @@ class _Builder:
         if self.encoding is None:
             sums = enumerate(self.of(f"sum_{plane}") for plane in self.planes)
             return [Store(SUMS, (const(number), self.row, self.column), value) for number, value in sums]
-        program, outputs = self.encoding.program, dict(self.encoding.program.outputs)
         given = {plane: self.of(f"sum_{plane}") for plane in self.planes}
         given["samples"] = self.of("encoded_samples")
         samples = self.all(apply("convert", name("samples"), value="float32"))
-        made = _Statements(program, given, {}, self.width)
+        lines, outputs = lets(self.encoding.program, given, self.width)
         place = self.row + name("first_row"), self.column
         stores = [
-            Store(f"{IMAGE}{image.name}", (*place, const(c)), made.values[outputs[f"{image.name}_{c}"]])
+            Store(f"{IMAGE}{image.name}", (*place, const(c)), outputs[f"{image.name}_{c}"])
             for image in self.encoding.images
             for c in range(image.channels)
         ]
-        return [Comment("the features, encoded"), Let("encoded_samples", samples), *made.body, *stores]
+        return [Comment("the features, encoded"), Let("encoded_samples", samples), *lines, *stores]
 
     def block(
         self,
@@ -461,10 +350,9 @@ class _Builder:
         for table, array in tables(program).items():
             key = str(array.dtype), array.tobytes()
             own[table], _ = self.tables.setdefault(key, (f"table_{len(self.tables)}", array))
-        made = _Statements(program, given, own, self.width)
-        values = {output: made.values[index] for output, index in program.outputs}
+        lines, values = lets(program, given, self.width, tables=own)
         sums = [self._added(each, value) for each, value in values.items() if summed and each in self.planes]
         kept = {e: value for e, value in values.items() if (e in WAY if summed else e not in unread)}
         inputs = {str(node["name"]) for node in program.nodes if node.op == "input"}
-        body = (*made.body, *sums, *_assigned(kept, inputs, masked))
+        body = (*lines, *sums, *assigned(kept, inputs, masked))
         return Comment(f"{part}: {comment}"), Block(body)

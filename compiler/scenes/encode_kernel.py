@@ -38,13 +38,12 @@ from ..core.passes import pipeline
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS, READ, WRITE, Array, Interface, image_of
 from ..kernel.interface import SUMS as SUMS_ARRAY
 from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
-from ..plan import sine_contract
-from ..proof import bounds
+from ..proof.bounds import Enclosure
 from ..schedules.common import X, Y, lets
 from ..targets import Language, language_named
 from .emit_path import GROUPS, SUMMED, Encoding
 from .lower_scene import FeatureRays
-from .plane_kernel import compiled, reads
+from .plane_kernel import compiled, enclosed, exactly, reads
 from .values import Given, floats, lowered, numbered
 
 SCHEMA = "wamnet-encode-kernel-1"
@@ -206,15 +205,15 @@ def encoding_of(
 
 def error_at(artifact: Artifact, sums: Mapping[str, Any], samples: int) -> dict[str, NDArray[np.float64]]:
     """Return the bound (H, W, C) of each image's error against float64, at planes of sums (H, W) by name."""
-    inputs = {
-        each: np.asarray(sums[each], np.float64) for each in planes_of([i.name for i in artifact.images])
-    }
-    inputs[SAMPLES] = np.full(next(iter(inputs.values())).shape, float(samples))
-    contract = sine_contract(artifact.profile, artifact.target)
-    boxes = {each: (value, value) for each, value in inputs.items()}
-    found = bounds.enclose(artifact.programs, boxes, contract)
-    errors = {each: found[index].read for each, index in artifact.programs.outputs}
+    given = {each: exactly(sums[each]) for each in planes_of([i.name for i in artifact.images])}
+    given[SAMPLES] = exactly(np.full(next(iter(given.values())).low.shape, float(samples)))
+    return encoded_errors(artifact, given)
+
+
+def encoded_errors(artifact: Artifact, given: Mapping[str, Enclosure]) -> dict[str, NDArray[np.float64]]:
+    """Return the bound (H, W, C) of each image's error, of planes that have errors themselves."""
+    found = enclosed(artifact, artifact.programs, given)
     return {
-        image.name: np.stack([errors[f"{image.name}_{c}"] for c in range(image.channels)], axis=-1)
+        image.name: np.stack([found[f"{image.name}_{c}"].read for c in range(image.channels)], axis=-1)
         for image in artifact.images
     }

@@ -11,6 +11,9 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...refimpl.errors import CompileError
 from ..artifact import Artifact
 from ..compile import assemble
@@ -20,6 +23,8 @@ from ..core.profiles import Profile
 from ..kernel.interface import ENCODE
 from ..kernel.kernel import Expr, Kernel, Let
 from ..languages.renderer import Renderer
+from ..plan import sine_contract
+from ..proof.bounds import Enclosure, enclose
 from ..targets import Language
 
 
@@ -79,3 +84,17 @@ def compiled(
         programs,
         images=images,
     )
+
+
+def exactly(values: NDArray[Any]) -> Enclosure:
+    """Return the enclosure of numbers (H, W) that a kernel is given."""
+    exact = np.asarray(values, np.float64)
+    return Enclosure(exact, exact, np.zeros_like(exact))
+
+
+def enclosed(kernel: Artifact, program: Program, given: Mapping[str, Enclosure]) -> dict[str, Enclosure]:
+    """Return the enclosures of the outputs of a kernel's program, of inputs that have errors."""
+    known = {i: given[str(node["name"])] for i, node in enumerate(program.nodes) if node.op == "input"}
+    contract = sine_contract(kernel.profile, kernel.target)
+    found = enclose(program, {}, contract, known=known, local=False)
+    return {name: found[index] for name, index in program.outputs}

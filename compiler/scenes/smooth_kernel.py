@@ -60,14 +60,12 @@ from ..kernel.kernel import (
     name,
     splat,
 )
-from ..plan import sine_contract
-from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..schedules.common import HEIGHT, WIDTH, X, Y, clamp, lets, loop
 from ..targets import Language, language_named
 from .emit_path import GROUPS
-from .encode_kernel import PASSES, SAMPLES, compile_encode
-from .plane_kernel import check_lanes, compiled, reads
+from .encode_kernel import PASSES, SAMPLES, compile_encode, encoded_errors
+from .plane_kernel import check_lanes, compiled, enclosed, exactly, reads
 from .values import RGB, XYZ, Given, floats, lowered, names, numbered
 
 SCHEMA = "wamnet-smooth-kernel-1"
@@ -199,7 +197,7 @@ def compile_smoothing(
 
 def guide_kernel(programs: SmoothPrograms) -> Kernel:
     """Return the kernel of a pixel's light and guides."""
-    body: list[Let | Store] = []
+    body: list[Statement] = []
     for layer in LAYERS_READ:
         names = [f"{layer.name}_{c}" for c in range(layer.channels)]
         body += reads(names, lambda c, image=f"{IMAGE}{layer.name}": load(image, Y, X, c))  # type: ignore[misc]
@@ -257,46 +255,28 @@ def smooth_kernel(programs: SmoothPrograms, lanes: int) -> Kernel:
 
 def error_at(kernels: SmoothKernels, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
     """Return the bound (H, W, 3) of a feature image's error against float64, at layers (H, W, C) by name."""
-    programs = kernels.smooth.programs
+    programs, of = kernels.smooth.programs, partial(enclosed, kernels.smooth)
     given = {
-        f"{layer.name}_{c}": _exactly(layers[layer.name][..., c])
+        f"{layer.name}_{c}": exactly(layers[layer.name][..., c])
         for layer in LAYERS_READ
         for c in range(layer.channels)
     }
-    planes = _enclosed(kernels, programs.guide, given)
+    planes = of(programs.guide, given)
     height, width = layers[FEATURE].shape[:2]
     here = {f"{HERE}{name}": planes[name] for name in programs.guides}
     light = {name: planes[name] for name in LIGHT_PLANES}
     for level in range(smoothing.LEVELS):
-        sums = dict.fromkeys((*SUMS, WEIGHTS), _exactly(np.zeros((height, width))))
+        sums = dict.fromkeys((*SUMS, WEIGHTS), exactly(np.zeros((height, width))))
         for spline, rows, columns in smoothing.taps(height, width, 2**level):
             there = np.ix_(rows, columns)
             seen = {f"{THERE}{name}": _moved(planes[name], there) for name in GUIDED}
             lit = {name: _moved(light[name], there) for name in LIGHT_PLANES}
-            share = {SPLINE: _exactly(np.full((height, width), spline))}
-            sums = _enclosed(kernels, programs.tap, {**here, **seen, **lit, **share, **sums})
-        light = _enclosed(kernels, programs.mean, sums)
-    one = {SAMPLES: _exactly(np.ones((height, width)))}
-    found = _enclosed(kernels, kernels.encode.programs, {**light, **one})
-    return np.stack([found[f"{FEATURE}_{c}"].read for c in range(len(LIGHT_PLANES))], axis=-1)
-
-
-def _exactly(values: NDArray[Any]) -> Enclosure:
-    """Return the enclosure of numbers (H, W) that a kernel is given."""
-    exact = np.asarray(values, np.float64)
-    return Enclosure(exact, exact, np.zeros_like(exact))
+            share = {SPLINE: exactly(np.full((height, width), spline))}
+            sums = of(programs.tap, {**here, **seen, **lit, **share, **sums})
+        light = of(programs.mean, sums)
+    return encoded_errors(kernels.encode, {**light, SAMPLES: exactly(np.ones((height, width)))})[FEATURE]
 
 
 def _moved(found: Enclosure, there: Any) -> Enclosure:
     """Return the enclosures (H, W) of a plane at the pixels of a tap."""
     return Enclosure(found.low[there], found.high[there], found.error[there])
-
-
-def _enclosed(
-    kernels: SmoothKernels, program: Program, given: Mapping[str, Enclosure]
-) -> dict[str, Enclosure]:
-    """Return the enclosures of a program's outputs, of inputs that have errors."""
-    known = {i: given[str(node["name"])] for i, node in enumerate(program.nodes) if node.op == "input"}
-    contract = sine_contract(kernels.smooth.profile, kernels.smooth.target)
-    found = bounds.enclose(program, {}, contract, known=known, local=False)
-    return {name: found[index] for name, index in program.outputs}

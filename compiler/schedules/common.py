@@ -8,12 +8,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 from ...refimpl.errors import CompileError
 from ..core.ir import Gather, Image, Node, Program, users
+from ..core.loops import Loop, Part, Walk, loops
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
 from ..kernel import kernel as tree
@@ -22,6 +23,12 @@ from ..kernel.kernel import apply, const, expr, load, name, splat
 
 X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
 """An item's first pixel, and the size of the images."""
+
+TRIP = "i"
+"""Name of the counter of a loop over the rows of tables."""
+
+BRANCH = "node"
+"""Name of the number of a tree's node, where a loop walks along one."""
 
 
 def kernel_gather(program: Program) -> Gather:
@@ -80,28 +87,126 @@ def loop(counter: str, count: tree.Expr | int, *body: tree.Statement) -> tree.Fo
     return tree.For(counter, expr(count), body)
 
 
-def lets(
-    program: Program, known: Mapping[str, tree.Expr] | None = None, lanes: int = 1, prefix: str = "t"
-) -> tuple[list[tree.Let], dict[str, tree.Expr]]:
-    """Return a statement for each operation of a program, and its outputs.
+class _Statements:
+    """The statements of a program, one an operation, and the value of each node [`lets`].
 
-    Inputs are values of their names unless `known` has others.
+    A loop over the rows of tables is a loop on a counter that all lanes share, so that a row is read once.
     """
-    values: list[tree.Expr] = []
-    lines = []
-    for index, node in enumerate(program.nodes):
-        kind = tree.Type(node.type.dtype)
+
+    def __init__(
+        self,
+        program: Program,
+        known: Mapping[str, tree.Expr],
+        lanes: int,
+        tables: Mapping[str, str],
+        prefix: str,
+    ) -> None:
+        self.program, self.known, self.lanes, self.tables, self.prefix = program, known, lanes, tables, prefix
+        self.values: list[tree.Expr] = []
+        self.body: list[tree.Statement] = []
+        ends, in_bodies = loops(program)
+        for index, node in enumerate(program.nodes):
+            if index in ends:
+                self.body.append(self._loop(ends[index]))
+            self.values.append(self._value(index, node))
+            if node.op not in ("input", "constant", "loop") and index not in in_bodies:
+                self.body.append(self._statement(index))
+
+    def _value(self, index: int, node: Node) -> tree.Expr:
+        """Return a node's value: a constant, or a name."""
+        kind = tree.Type(node.type.dtype, self.lanes)
         if node.op == "input":
             key = str(node["name"])
-            values.append((known or {}).get(key) or name(key, kind.of(lanes)))
-        elif node.op == "constant":
+            return self.known.get(key) or name(key, kind)
+        if node.op == "constant":
             number: Any = node["value"]
-            values.append(splat(const(float(number) if kind == tree.Type() else number, kind), lanes))
+            return splat(const(float(number) if kind.of(1) == tree.FLOAT else number, kind.of(1)), self.lanes)
+        if node.op == "loop":
+            return self.values[node.args[int(node["index"])]]  # type: ignore[arg-type]
+        return name(f"{self.prefix}{index}", kind)
+
+    def _statement(self, index: int) -> tree.Statement:
+        """Return the statement that computes a value."""
+        node, own = self.program.nodes[index], self.values[index]
+        args = [self.values[arg] for arg in node.args]
+        if node.op == "carried":
+            return tree.Array(own.value, own.type, kept=True, value=args[0])
+        if node.op in ("row", "branch"):
+            value = splat(self._entry(node["table"], name(TRIP if node.op == "row" else BRANCH)), self.lanes)
+        elif node.op == "take":
+            value = self._entry(node["table"], args[0])
         else:
-            value = apply(node.op, *(values[arg] for arg in node.args), value=node.get("dtype"))
-            lines.append(tree.Let(f"{prefix}{index}", value, kept=True))
-            values.append(name(lines[-1].name, value.type))
-    return lines, {key: values[index] for key, index in program.outputs}
+            value = apply(node.op, *args, value=node.get("dtype"))
+        return tree.Let(own.value, value, kept=True)
+
+    def _entry(self, table: object, index: tree.Expr) -> tree.Expr:
+        """Return the entry of a table."""
+        kind = tree.Type(str(self.program.parameters[str(table)].dtype), index.type.lanes)
+        return tree.Expr("take", (index,), kind, self.tables[str(table)])
+
+    def _loop(self, found: Loop) -> tree.Statement:
+        """Return a loop over the rows of tables."""
+        if found.walk is not None:
+            return self._walk(found, found.walk)
+        return loop(TRIP, found.trips, *self._trip(found, Part(found.body, found.after)))
+
+    def _walk(self, found: Loop, walk: Walk) -> tree.Statement:
+        """Return a walk along a tree: a node is entered where any of the lanes enters it."""
+        nodes, node = len(self.program.parameters[walk.skip]), name(BRANCH)
+        parts = []
+        for number, part in enumerate(walk.parts):
+            start, end = (self._entry(walk.first, node + (number * (nodes + 1) + more)) for more in (0, 1))
+            parts.append(tree.For(TRIP, end, self._trip(found, part), start=start))
+        entered = tree.Store(BRANCH, (), node + 1)
+        left_out = tree.Store(BRANCH, (), self._entry(walk.skip, node))
+        branch = tree.If(tree.any_lane(self.values[walk.enters]), (*parts, entered), (left_out,))
+        guard = [self._statement(index) for index in walk.guard]
+        visit = loop("visit", nodes, tree.Break(apply("equal", node, nodes)), *guard, branch)
+        return tree.Block((tree.Array(BRANCH, node.type, value=const(0)), visit))
+
+    def _trip(self, found: Loop, done: Part) -> tuple[tree.Statement, ...]:
+        """Return a trip of a loop: its body, then the assignments of what it carries."""
+        changed = {
+            self.values[c].value: self.values[n] for c, n in zip(found.carried, done.after, strict=True)
+        }
+        body = [self._statement(index) for index in done.body]
+        return (*body, *assigned(changed, [self.values[c].value for c in found.carried]))
+
+
+def lets(
+    program: Program,
+    known: Mapping[str, tree.Expr] | None = None,
+    lanes: int = 1,
+    prefix: str = "t",
+    tables: Mapping[str, str] | None = None,
+) -> tuple[list[tree.Statement], dict[str, tree.Expr]]:
+    """Return a statement for each operation of a program, and its outputs.
+
+    Inputs are values of their names unless `known` has others; `tables` are the names of tables.
+    """
+    made = _Statements(program, known or {}, lanes, tables or {}, prefix)
+    return made.body, {key: made.values[index] for key, index in program.outputs}
+
+
+def assigned(
+    values: Mapping[str, tree.Expr], variables: Collection[str], masked: Collection[str] = ()
+) -> list[tree.Statement]:
+    """Return the assignments of values to variables, to those in `masked` where a lane is alive."""
+    before: list[tree.Statement] = []
+    after: list[tree.Statement] = []
+    for variable, value in values.items():
+        old, alive = name(variable, value.type), name("alive", tree.BOOL.of(value.type.lanes))
+        if value == old:
+            continue
+        if value.op == "name" and value.value in variables:  # which may be assigned before it is read
+            before.append(tree.Let(f"new_{variable}", value, kept=True))
+            value = name(f"new_{variable}", value.type)
+        if variable == "alive":
+            value = alive & value
+        elif variable in masked:
+            value = apply("select", alive, value, old)
+        after.append(tree.Store(variable, (), value))
+    return before + after
 
 
 Read = Callable[[int], tree.Expr]

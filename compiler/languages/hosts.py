@@ -16,9 +16,6 @@ from ..kernel.interface import DENOISE
 from .glsl import GLSL
 from .glsl_es import ASSUMES, GLSLES
 
-CHANNELS = 4
-"""Inputs of a Shadertoy tab, iChannel0 to iChannel3, and buffers that feed them: A to D."""
-
 NO_PRECISE = "#define PRECISE /* GLSL ES 3.00 has no `precise` */"
 """The first line of a tab."""
 

@@ -23,10 +23,10 @@ from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK, TABLE, Interface
 from ...compiler.languages.glsl import SHADER_VERSION
 from ...compiler.languages.glsl_es import VERSION
-from ...compiler.languages.hosts import CHANNELS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.kernel import Memory, Size
 from ..devices.opengl_executor import OpenGLExecutor
+from . import tools
 from .buffer_runner import BufferRunner, Launch
 
 
@@ -102,41 +102,6 @@ class ComputeRunner(BufferRunner):
 # ---- hosts ------------------------------------------------------------------------------------------------
 
 
-TOP = f"""\
-{VERSION}
-precision highp float;
-precision highp int;
-precision highp sampler2D;
-out vec4 wamnet_written;
-"""
-"""The first lines of both."""
-
-SHADERTOY = f"""\
-{TOP}uniform vec3 iResolution;
-uniform float iTime;
-uniform int iFrame;
-{"".join(f"uniform sampler2D iChannel{i};{chr(10)}" for i in range(CHANNELS))}{{source}}
-void main()
-{{{{
-    mainImage(wamnet_written, gl_FragCoord.xy);
-}}}}
-"""
-"""What Shadertoy declares before a tab, and what calls it."""
-
-GODOT = f"""\
-{TOP}uniform vec2 wamnet_size;
-vec2 UV;
-vec4 COLOR;
-{{source}}
-void main()
-{{{{
-    UV = gl_FragCoord.xy / wamnet_size;
-    fragment();
-    wamnet_written = COLOR;
-}}}}
-"""
-"""What Godot gives a canvas item, and what calls it; its row 0 is the top, as the pictures' here."""
-
 GODOT_WORDS = re.compile(
     r"^(?:shader_type|render_mode)\b.*;\n|(?<=^uniform )(\w+ \w+) (?:: .*|= \d+);$", re.M
 )
@@ -149,8 +114,8 @@ class ShadertoyRunner(ESRunner):
     name = "shadertoy"
 
     def _wrapped(self, source: str) -> str:
-        """Return a tab as a shader of its own."""
-        return SHADERTOY.format(source=source)
+        """Return a kernel as a shader of its own: what its host declares before it, and what calls it."""
+        return tools.shim(f"{self.name}.frag").replace("@kernel@", source)
 
     def _program(self, source: str, made: ExitStack) -> tuple[Any, Any]:
         return super()._program(self._wrapped(source), made)
@@ -187,7 +152,7 @@ class GodotRunner(ShadertoyRunner):
 
     def _wrapped(self, source: str) -> str:
         # What is left of a match is a uniform's type and name.
-        return GODOT.format(source=GODOT_WORDS.sub(lambda match: f"{match[1]};" if match[1] else "", source))
+        return super()._wrapped(GODOT_WORDS.sub(lambda match: f"{match[1]};" if match[1] else "", source))
 
     def _values(self, integers: Mapping[str, int]) -> Mapping[str, Any]:
         return {"wamnet_size": (float(integers["width"]), float(integers["height"]))}

@@ -24,15 +24,6 @@ from .buffer_runner import BufferRunner, Launch
 OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """Nothing here may allow what the standards do not."""
 
-SHIMS = Path(__file__).parent / "shims"
-"""The words of CUDA and Metal that kernels use, and functions `wamnet_call` that run all threads one after
-another, or those of a group at once, where they wait for each other."""
-
-
-def _shim(name: str) -> str:
-    """Return the text of a file of the shims."""
-    return (SHIMS / name).read_text(encoding="utf-8")
-
 
 class HostRunner(BufferRunner):
     """A compiler and the glue of one language; what it has built stays loaded as long as the process.
@@ -137,7 +128,7 @@ class CUDARunner(HostRunner):
         else:
             place = "blockIdx = {(unsigned)group_column, (unsigned)group_row, 0};"
             place += " threadIdx = {(unsigned)column, (unsigned)row, 0};"
-        before = _waiting(group) + _shim("cuda.h") + '#include "kernel.txt"\n'
+        before = _waiting(group) + tools.shim("cuda.h") + '#include "kernel.txt"\n'
         return before + _started(f"{place} {call}", group)
 
 
@@ -148,7 +139,7 @@ class MetalRunner(HostRunner):
     options = ("-std=c++20", "-pthread", "-Wno-attributes")
 
     def _glue(self, kernel: Artifact, group: tuple[int, int] | None, folder: Path) -> str:
-        (folder / "metal_stdlib").write_text(_shim("metal_stdlib.h"), encoding="utf-8")
+        (folder / "metal_stdlib").write_text(tools.shim("metal_stdlib.h"), encoding="utf-8")
         arrays = _arrays(kernel.interface, kernel.interface.by_number())
         arguments = ["*(const Size *)sizes", *arrays]
         places = ["{(uint)column, (uint)row}"]
@@ -160,11 +151,11 @@ class MetalRunner(HostRunner):
 
 def _waiting(group: tuple[int, int] | None) -> str:
     """Return what lets threads wait for those of their group, if there is one."""
-    return _shim("alone.h" if group is None else "together.h")
+    return tools.shim("alone.h" if group is None else "together.h")
 
 
 def _started(call: str, group: tuple[int, int] | None) -> str:
     """Return the function that runs all threads."""
     names = {"CALL": call} | ({} if group is None else {"WIDTH": group[0], "HEIGHT": group[1]})
     defined = "".join(f"#define WAMNET_{name} {value}\n" for name, value in names.items())
-    return defined + _shim("threads.cpp" if group is None else "groups.cpp")
+    return defined + tools.shim("threads.cpp" if group is None else "groups.cpp")

@@ -109,10 +109,9 @@ def _spirv(stem: str, source: str) -> Mapping[str, bytes]:
 
 def _hlsl(stem: str, source: str) -> Mapping[str, bytes]:
     """Return HLSL for both compilers."""
-    binaries = {name: tools.spirv(text) for name, text in _launches(stem, source).items()}
     return {
-        f"{name}.{style}.hlsl": tools.hlsl(binary, style).encode()
-        for name, binary in binaries.items()
+        f"{name}.{style}.hlsl": tools.hlsl(text, style).encode()
+        for name, text in _launches(stem, source).items()
         for style in tools.HLSL_STYLES
     }
 
@@ -350,7 +349,7 @@ ROWS: tuple[Row, ...] = (
         "registers",
         _buffers_code("auto"),
         dispatch=DISPATCH,
-        opens=("wgpu_runner", "hlsl_runner"),
+        opens=("wgpu_runner", "vulkan_runner", "dxc"),
         route="back to SPIR-V, wgpu, ",
         tool=Tool("glslangValidator -D + spirv-val", ".hlsl", _translated, ("hlsl",)),
     ),
@@ -486,8 +485,8 @@ RUNNERS: Mapping[str, Callable[[], Executor]] = {
     for name, opens in {
         **{name: TARGETS[name].opens for name in OWN},
         "c99": TARGETS["c"].opens,
-        "glsl-vulkan/hlsl-fxc": ("wgpu_runner", "hlsl_runner", "fxc"),
-        "glsl-vulkan/hlsl-dxc": ("wgpu_runner", "hlsl_runner", "dxc"),
+        "glsl-vulkan/hlsl-fxc": ("wgpu_runner", "vulkan_runner", "fxc"),
+        "glsl-vulkan/hlsl-dxc": ("wgpu_runner", "vulkan_runner", "dxc"),
         "wgsl/tint": ("tint_runner", "TintRunner"),
         "wgsl/tint-gles": ("tint_runner", "TintRunner", "opengles"),
     }.items()

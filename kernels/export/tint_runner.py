@@ -19,7 +19,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from numpy.typing import NDArray
 from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK
 from ...refimpl.errors import CompileError, ExecutorUnavailable
+from . import tools
 from .buffer_runner import BufferRunner, Launch
 from .wgpu_runner import UNIFORM_BYTES, kinds_of
 
@@ -46,8 +46,8 @@ TRIED: Mapping[str, Mapping[str, str]] = {
 CLOSE_S = 10
 """Seconds that Node may take to end."""
 
-SCRIPT = Path(__file__).parent / "shims" / "dawn.mjs"
-"""What Node runs: one device; each line asks for a kernel to be built, or built and run."""
+SCRIPT = "dawn.mjs"
+"""The shim that Node runs: one device; each line asks for a kernel to be built, or built and run."""
 
 
 def _environment() -> dict[str, str]:
@@ -81,15 +81,7 @@ class TintRunner(BufferRunner):
         """Start the process; return why it has no device, or nothing."""
         self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115 (closed with the process)
         self._process = subprocess.Popen(
-            [
-                node,
-                "--input-type=module",
-                "-e",
-                SCRIPT.read_text(encoding="utf-8"),
-                "--",
-                backend,
-                LEVELS[backend],
-            ],
+            [node, "--input-type=module", "-e", tools.shim(SCRIPT), "--", backend, LEVELS[backend]],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._said,

@@ -1,26 +1,24 @@
 """Translators and compilers of other languages: glslang, SPIRV-Tools, SPIRV-Cross, compilers of C++ and CUDA.
 
 1. [`run`] runs one in a folder of its own; the error for a missing one says how to get it.
-2. [`spirv`] makes SPIR-V from GLSL or HLSL and validates it; [`hlsl`] makes HLSL from SPIR-V.
+2. [`spirv`] makes SPIR-V from GLSL or HLSL and validates it; [`hlsl`] makes HLSL from that.
 3. glslang gives a block that the source does not name an empty name, and a translator then makes one up:
    `_709`. A host that binds by name, as Unity does, needs `weights` and `image_color`, which the manifest
-   says: a block has the name of its first member there [`named`].
+   says [`named`].
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ...compiler.kernel.instructions import PORTABLE
-from ...compiler.kernel.interface import WEIGHTS
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 
 PACKAGES: Mapping[str, str] = {
@@ -44,6 +42,16 @@ ENVIRONMENT = "vulkan1.0"
 
 HLSL_STYLES: Mapping[str, str] = {"fxc": "50", "dxc": "60"}
 """Shader models by the compiler that takes them."""
+
+
+SHIMS = Path(__file__).parent / "shims"
+"""The words of CUDA, Metal, Shadertoy and Godot that kernels use; functions `wamnet_call` that run all
+threads one after another, or those of a group at once, where they wait for each other; a device of Dawn."""
+
+
+def shim(name: str) -> str:
+    """Return the text of a file of the shims."""
+    return (SHIMS / name).read_text(encoding="utf-8")
 
 
 def _command(program: str) -> list[str]:
@@ -72,6 +80,7 @@ def run(program: str, *arguments: str, folder: Path) -> str:
     return told
 
 
+@lru_cache(maxsize=2)
 def spirv(source: str, language: str = "glsl") -> bytes:
     """Return the validated SPIR-V of a compute shader in GLSL or HLSL."""
     with tempfile.TemporaryDirectory(prefix="wamnet-spirv-") as name:
@@ -89,68 +98,21 @@ def validate(folder: Path, name: str, environment: str = ENVIRONMENT) -> None:
     run("spirv-val", "--target-env", environment, name, folder=folder)
 
 
-def hlsl(binary: bytes, style: str) -> str:
-    """Return SPIR-V as HLSL for a compiler of [`HLSL_STYLES`]."""
+def hlsl(source: str, style: str) -> str:
+    """Return a compute shader in GLSL as HLSL for a compiler of [`HLSL_STYLES`]."""
     with tempfile.TemporaryDirectory(prefix="wamnet-hlsl-") as name:
-        folder = Path(name)
-        (folder / "kernel.spv").write_bytes(named(binary))
-        model = HLSL_STYLES[style]
-        run(
-            "spirv-cross",
-            *("kernel.spv", "--hlsl", "--shader-model", model, "--output", "kernel.hlsl"),
-            folder=folder,
-        )
-        return (folder / "kernel.hlsl").read_text(encoding="utf-8")
+        folder, model = Path(name), HLSL_STYLES[style]
+        (folder / "kernel.spv").write_bytes(spirv(source))
+        options = ("--hlsl", "--shader-model", model, "--output", "kernel.hlsl")
+        run("spirv-cross", "kernel.spv", *options, folder=folder)
+        return named((folder / "kernel.hlsl").read_text(encoding="utf-8"), source)
 
 
-# ---- names in SPIR-V --------------------------------------------------------------------------------------
-
-
-HEAD = 5
-"""Words before the first instruction."""
-
-NAME, MEMBER_NAME, POINTER, FUNCTION, VARIABLE = 5, 6, 32, 54, 59
-"""Numbers of OpName, OpMemberName, OpTypePointer, OpFunction and OpVariable."""
-
-UNIFORM, BLOCK_NAME = 2, "sizes"
-"""The storage class of buffers and blocks; what a block of integers is called, as manifests say it."""
-
-SHORT = {"w": WEIGHTS}
-"""What schedules of groups call an array for short."""
-
-Words = NDArray[np.uint32]
-
-
-def _instructions(words: Words) -> Iterator[tuple[int, Words]]:
-    """Yield the number and the operands of each instruction."""
-    at = HEAD
-    while at < len(words):
-        length = int(words[at] >> 16)
-        yield int(words[at] & 0xFFFF), words[at + 1 : at + length]
-        at += length
-
-
-def named(binary: bytes) -> bytes:
-    """Return a module whose buffers have the names of their first members, its block of integers `sizes`."""
-    words: Words = np.frombuffer(binary, "<u4").astype(np.uint32)
-    members, structures, names = dict[int, list[str]](), dict[int, int](), dict[int, str]()
-    for operation, given in _instructions(words):
-        if operation == MEMBER_NAME:
-            text = given[2:].tobytes().partition(b"\0")[0].decode()
-            members.setdefault(int(given[0]), []).append(text)
-        elif operation == POINTER and given[1] == UNIFORM:
-            structures[int(given[0])] = int(given[2])
-        elif operation == VARIABLE and given[2] == UNIFORM:
-            fields = members[structures[int(given[0])]]
-            first = SHORT.get(fields[0], fields[0])
-            names[int(given[1])] = first if len(fields) == 1 else BLOCK_NAME
-        elif operation == FUNCTION:
-            break
-    written = [words[:HEAD]]
-    for operation, given in _instructions(words):
-        number = int(given[0]) if operation == NAME else -1
-        if number in names:
-            raw = names[number].encode()
-            given = np.array([number, *np.frombuffer(raw + b"\0" * (4 - len(raw) % 4), "<u4")], np.uint32)
-        written += [np.array([(len(given) + 1) << 16 | operation], np.uint32), given]
-    return np.concatenate(written).astype("<u4").tobytes()
+def named(text: str, source: str) -> str:
+    """Return HLSL whose buffers have the names of their blocks in GLSL, that of integers the name `sizes`."""
+    blocks = dict(re.findall(r"binding = (\d+)\) .*?(\w+) \{", source))
+    names = {number: f"{block[0].lower()}{block[1:]}" for number, block in blocks.items()} | {"0": "sizes"}
+    buffers = re.findall(r"^\w*ByteAddressBuffer (_\d+) : register\(\w(\d+)", text, re.M)
+    constants = re.findall(r": register\(b(\d+).*\n\{\n *\w+ (_\d+)_", text)
+    own = {made: names[number] for made, number in [*buffers, *(pair[::-1] for pair in constants)]}
+    return re.sub(r"\b(_\d+)(?=_|\b)", lambda match: own.get(match[1], match[1]), text)

@@ -126,13 +126,10 @@ class WgpuRunner(BufferRunner):
         device.queue.submit([encoder.finish()])
 
 
-def vulkan_runner() -> WgpuRunner:
-    """Return a runner of GLSL for Vulkan, by way of SPIR-V."""
-    return WgpuRunner("glsl-vulkan", tools.spirv)
+def vulkan_runner(style: str = "") -> WgpuRunner:
+    """Return a runner of GLSL for Vulkan by way of SPIR-V, or of its HLSL for a compiler `style`."""
 
+    def translated(source: str) -> bytes:
+        return tools.spirv(tools.hlsl(source, style), "hlsl") if style else tools.spirv(source)
 
-def hlsl_runner(style: str = "dxc") -> WgpuRunner:
-    """Return a runner of the HLSL that GLSL for Vulkan is translated to, by way of SPIR-V."""
-    return WgpuRunner(
-        "glsl-vulkan", lambda source: tools.spirv(tools.hlsl(tools.spirv(source), style), "hlsl")
-    )
+    return WgpuRunner("glsl-vulkan", translated)

@@ -281,7 +281,7 @@ def export(
         wamnet.export("minicubes", "denoiser", target="wgsl")
     """
     from .cli.files.outputs import making_folder
-    from .kernels.export.hosts.table import host_named
+    from .kernels.export.hosts.host import host_named
     from .kernels.export.package import Request
     from .kernels.export.package import export as exported
 

@@ -9,10 +9,11 @@ import typer
 from ...compiler.artifact import schedule_text
 from ...kernels.export import check as checking
 from ...kernels.export import speed
-from ...kernels.export.hosts.table import host_named
+from ...kernels.export.hosts.host import HOSTS, host_named
 from ...kernels.export.motion import TIME, Motion
 from ...kernels.export.package import Export, Request, with_speed
 from ...kernels.export.package import export as exported
+from ...kernels.export.targets import NAMES
 from ...models.data.frame_plan import animation_times
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.scene import Scene
@@ -24,18 +25,6 @@ from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import STATUS_WRONG, say
 from ..files.outputs import check_new_folder, making_folder
 from ..reports import webpage
-
-TARGETS = (
-    "opencl, glsl, glsl-compute, glsl-es, glsl-vulkan, wgsl, hlsl, metal, spirv, c, cuda, shadertoy, godot, "
-    "onnx, html"
-)
-"""Targets by name, for help texts: those of the registry in kernels, and the page."""
-
-HOSTS = (
-    "c, cpp, blender, opencl, vulkan, webgpu, three, babylon, playcanvas, godot, "
-    "onnxruntime-web, onnxruntime, openvino"
-)
-"""Hosts by name, for help texts: those of the registry in kernels."""
 
 HTML, PAGE_NAME = "html", "index.html"
 """The target that is a web page, and its file."""
@@ -114,8 +103,10 @@ class Shown:
 class Into:
     """What is exported for; one of the two is needed."""
 
-    target: str | None = option(f"NAME  Target language or format: {TARGETS}. [default: the host's target]")
-    host: str | None = option(f"NAME  Complete host program to generate: {HOSTS}. [default: none]")
+    target: str | None = option(
+        f"NAME  Target language or format: {', '.join((*NAMES, HTML))}. [default: the host's target]"
+    )
+    host: str | None = option(f"NAME  Complete host program to generate: {', '.join(HOSTS)}. [default: none]")
 
     @property
     def language(self) -> str:
@@ -191,7 +182,7 @@ def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, m
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
     how = (kernel.profile, kernel.weights or "", kernel.network(), settings, kernel.schedule or "")
     made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
-    return with_speed(made, speed.measure(made).facts()) if measured else made
+    return with_speed(made, speed.measure(made)) if measured else made
 
 
 def _tell(made: Export) -> None:

@@ -23,18 +23,9 @@ from ...refimpl.errors import CompileError, ExecutorUnavailable
 from ..devices.executor import Executor
 from ..devices.kernel import Part
 from . import onnx_export
-from .check_pair import SEED
+from .check_pair import PATHS_ALIKE, PATHS_WITHIN, SEED
 from .package import Export
 from .targets import ONNX, TARGETS, Row, opened
-
-OPERATIONS = 10_000
-"""Operations of a path of six surfaces, rounded up: sums may be off by so many roundings of values near 1."""
-
-PATHS_WITHIN = OPERATIONS * 2.0**-24
-"""Largest difference of a sum that only rounding has moved."""
-
-PATHS_ALIKE = 0.98
-"""Share of a picture's sums that must lie within; the others are of paths that passed an edge that near."""
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,13 @@ SIDES = (1, 3)
 SEED = 7
 """Seed of the sample that a scene's picture has."""
 
+PATHS_WITHIN = 10_000 * 2.0**-24
+"""Largest difference of a sum that only rounding has moved: a path of six surfaces has fewer than 10,000
+operations, on values near 1."""
+
+PATHS_ALIKE = 0.98
+"""Share of a picture's sums that must lie within; the others are of paths that passed an edge that near."""
+
 CONTRASTS = (1.0, 0.5, 0.25, 0.1)
 """Shares of an image's range that are tried: a trained network clips most of what is pure noise."""
 

@@ -1,8 +1,9 @@
 """A model as an ONNX graph of operators 17 for images of any size, and its run by ONNX Runtime.
 
-Images come as rows with interleaved channels; the graph itself joins and transposes them.
-A network of integers is a graph in which no operation rounds: convolutions of integers in float32, the rest
-in int64 and uint32, none of whose results leaves its kind of number.
+Images come as rows with interleaved channels; the graph itself joins and transposes them. Its nodes are those
+of the model's program [compiler/core/lower.py], one by one [`NODES`]: an affine map is a Conv. That of a
+network of integers has no operation that rounds: convolutions of integers in float32, the rest in int32 and
+uint32, whose results wrap around.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.compile import AGAINST_WHOLE
+from ...compiler.core.ir import Node, Program
+from ...compiler.core.lower import lower
+from ...compiler.core.passes import pipeline
+from ...compiler.schedules.common import kernel_gather
 from ...refimpl.errors import ExecutorUnavailable
-from ...refimpl.network.activation import RELU, SINE
 from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
-from ...refimpl.network.whole import COLOUR_STEPS, SINES, TURN, Whole
-from ..bench.contenders import activation_in
 
 OPERATORS = 17
 """Version of the operators: the graph uses none that is newer."""
@@ -33,16 +35,26 @@ FORMAT = 8
 MODES = {"clamp": "edge", "zero": "constant"}
 """Border rules as modes of the operator Pad."""
 
-
-NODES = {SINE: "Sin", RELU: "Relu"}
-"""Activations as operators."""
+NODES = {
+    "add": "Add",
+    "bitwise_and": "BitwiseAnd",
+    "bitwise_xor": "BitwiseXor",
+    "convert": "Cast",
+    "maximum": "Clip",
+    "minimum": "Clip",
+    "multiply": "Mul",
+    "right_shift": "BitShift",
+    "sin": "Sin",
+    "subtract": "Sub",
+}
+"""Operations of programs as operators; a maximum and a minimum are with a constant."""
 
 TEXT = f"ONNX, operators {OPERATORS}: Conv and Sin nodes, dynamic height and width"
 """What a manifest says about the language."""
 
 WHOLE_TEXT = (
     f"ONNX, operators {WHOLE_OPERATORS}: Conv nodes of integers in float32, the rest in "
-    "int64 and uint32, dynamic height and width"
+    "int32 and uint32, dynamic height and width"
 )
 """The same for a network of integers."""
 
@@ -64,25 +76,12 @@ class Nodes:
         self.constants[name] = numpy_helper.from_array(np.asarray(value), name)
         return name
 
-    def node(self, kind: str, inputs: list[str], output: str = "", **attributes: Any) -> str:
+    def node(self, kind: str, inputs: list[str], output: str, **attributes: Any) -> str:
         """Add an operation, and return the name of its result."""
         from onnx import helper
 
-        name = output or f"{kind}{len(self.nodes)}"
-        self.nodes.append(helper.make_node(kind, inputs, [name], **attributes))
-        return name
-
-    def cast(self, x: str, kind: str) -> str:
-        """Convert to float32, int64 or uint32; uint32 holds what is converted to it."""
-        from onnx import helper
-
-        return self.node("Cast", [x], to=helper.np_dtype_to_tensor_dtype(np.dtype(kind)))
-
-    def words(self, kind: str, x: str, y: str | int) -> str:
-        """Add an operation on uint32."""
-        other = y if isinstance(y, str) else self.constant(f"word{y}", np.uint32(y))
-        direction = {"direction": "RIGHT"} if kind == "BitShift" else {}
-        return self.node(kind, [x, other], **direction)
+        self.nodes.append(helper.make_node(kind, inputs, [output], **attributes))
+        return output
 
 
 def graph(model: Model) -> bytes:
@@ -93,17 +92,17 @@ def graph(model: Model) -> bytes:
         raise ExecutorUnavailable(
             f"package {error.name} cannot be imported: pip install {error.name}"
         ) from None
-    made = Nodes()
-    axis, size = made.constant("axis", np.array([0], np.int64)), model.window.size
+    made, program = Nodes(), pipeline.run(lower(model), pipeline.COMMON)
+    axis = made.constant("axis", np.array([0], np.int64))
     x = made.node("Concat", list(model.features), "joined", axis=2)
     x = made.node("Transpose", [x], "planes", perm=[2, 0, 1])
     x = made.node("Unsqueeze", [x, axis], "batch")
     before, after = model.window.before, model.window.after
     margins = made.constant("margins", np.array([0, 0, before, before, 0, 0, after, after], np.int64))
-    x = made.node("Pad", [x, margins], "padded", mode=MODES[model.window.border])
-    network = model.siren
-    x = _whole_layers(made, network, size, x) if isinstance(network, Whole) else _layers(made, model, x)
-    x = made.node("Squeeze", [x, axis], "alone")
+    values = [made.node("Pad", [x, margins], "padded", mode=MODES[model.window.border])]
+    for index, node in enumerate(program.nodes[1:], 1):
+        values.append(_value(made, program, index, node, values))
+    x = made.node("Squeeze", [values[program.outputs[0][1]], axis], "alone")
     made.node("Transpose", [x], "result", perm=[1, 2, 0])
 
     def value(name: str, channels: int) -> Any:
@@ -119,68 +118,39 @@ def graph(model: Model) -> bytes:
     return data
 
 
-def _form(weight: NDArray[Any], side: int) -> NDArray[np.float32]:
-    """Return a layer's weights (D_out, D_in) as those of a convolution (D_out, C, side, side)."""
-    return weight.astype(np.float32).reshape(len(weight), side, side, -1).transpose(0, 3, 1, 2).copy()
+def _value(made: Nodes, program: Program, index: int, node: Node, values: list[str]) -> str:
+    """Return the name of a node's value in the graph: a constant, or the result of what is added for it."""
+    from onnx import helper
 
-
-def _layers(made: Nodes, model: Model, x: str) -> str:
-    """Add the layers of a network of floats; return the name of its colours."""
-    activate = activation_in("the ONNX graph", NODES, model)
-    last = len(model.siren.weights) - 1
-    for layer, (weight, bias) in enumerate(zip(model.siren.weights, model.siren.biases, strict=True)):
-        side = 1 if layer else model.window.size
-        form = made.constant(f"w{layer}", _form(weight, side))
-        named = [form, made.constant(f"b{layer}", bias.astype(np.float32))]
-        x = made.node("Conv", [x, *named], f"sum{layer}", kernel_shape=[side, side])
-        if layer < last:
-            omega = model.siren.omega_0_hidden if layer else model.siren.omega_0_first
-            x = made.node("Mul", [x, made.constant(f"o{layer}", np.float32(omega))], f"angle{layer}")
-            x = made.node(activate, [x], f"{model.siren.activation}{layer}")
-    bounds = [made.constant("black", np.float32(0.0)), made.constant("white", np.float32(1.0))]
-    return made.node("Clip", [x, *bounds], "clipped")
-
-
-def _whole_layers(made: Nodes, network: Whole, size: int, x: str) -> str:
-    """Add the layers of a network of integers [whole.py]; return the name of its colours.
-
-    Sums are float32, which holds them; sum * factor + bias is below 2^49, and int64 holds it. In Mod a
-    negative phase gets the divisor's sign, as in Python.
-    """
-    last = len(network.weights) - 1
-    for layer, weight in enumerate(network.weights):
-        side = 1 if layer else size
-        form = made.constant(f"w{layer}", _form(weight, side))
-        x = made.cast(made.node("Conv", [x, form], f"sum{layer}", kernel_shape=[side, side]), "int64")
-        for kind, arrays in (("Mul", network.factors), ("Add", network.biases)):
-            column = arrays[layer].astype(np.int64).reshape(-1, 1, 1)
-            x = made.node(kind, [x, made.constant(f"{kind.lower()}{layer}", column)], f"{kind}_{layer}")
-        if layer < last:
-            phase = made.node("Mod", [x, made.constant("turn", np.int64(TURN))], f"phase{layer}")
-            x = _whole_sine(made, made.cast(phase, "uint32"), network.amplitude)
-    white = made.constant("white", np.int64(COLOUR_STEPS << network.fraction))
-    units = made.node("Clip", [x, made.constant("black", np.int64(0)), white], "units")
-    steps = made.words("BitShift", made.cast(units, "uint32"), network.fraction)
-    step = made.constant("step", np.float32(1 / COLOUR_STEPS))
-    return made.node("Mul", [made.cast(steps, "float32"), step])
-
-
-def _whole_sine(made: Nodes, phases: str, amplitude: int) -> str:
-    """Add the sine of phases below 2^24, operation by operation that of the reference, in uint32."""
-    polynomial, words = SINES[amplitude], made.words
-    c1, c3, c5 = (made.constant(f"word{c}", np.uint32(c)) for c in polynomial.coefficients)
-    back = words("BitwiseAnd", words("BitShift", phases, 22), 1)
-    turned = words("BitwiseXor", phases, words("Mul", back, 2**32 - 1))
-    m = words("BitwiseAnd", words("BitShift", turned, 6), 0xFFFF)
-    z = words("BitShift", words("Mul", m, m), 16)
-    inner = words("Sub", c3, words("BitShift", words("Mul", z, c5), 16))
-    q = words("Sub", c1, words("BitShift", words("Mul", z, inner), 16))
-    raised = words("Add", words("Mul", m, q), 1 << (polynomial.shift - 1))
-    magnitude = made.cast(words("BitShift", raised, polynomial.shift), "float32")
-    half = made.cast(words("BitShift", phases, 23), "float32")
-    two, one = made.constant("two", np.float32(2)), made.constant("one", np.float32(1))
-    sign = made.node("Sub", [one, made.node("Mul", [half, two])])
-    return made.node("Mul", [magnitude, sign])
+    given, name = [values[arg] for arg in node.args], f"{node.op}{index}"
+    if node.op == "constant":
+        return made.constant(name, np.array(node["value"], node.type.dtype))
+    if node.op == "parameter":
+        return made.constant(name, program.parameters[str(node["name"])].astype(np.float32)[:, None, None])
+    if node.op == "affine":
+        # The window is read by the first one; all others are of a pixel.
+        gather = kernel_gather(program)
+        rows, columns = (gather.rows, gather.columns) if node.args == (0,) else (1, 1)
+        weight = program.parameters[str(node["weight"])].astype(np.float32)
+        form = weight.reshape(len(weight), rows, columns, -1).transpose(0, 3, 1, 2).copy()
+        named = [made.constant(f"weight{index}", form)]
+        if bias := node.get("bias"):
+            named.append(made.constant(f"bias{index}", program.parameters[str(bias)].astype(np.float32)))
+        return made.node("Conv", [*given, *named], name, kernel_shape=[rows, columns])
+    if node.op not in NODES:
+        raise ExecutorUnavailable(f"the ONNX graph has no implementation of {node.op}")
+    kind, options = NODES[node.op], {}
+    if kind == "Cast":
+        options["to"] = helper.np_dtype_to_tensor_dtype(np.dtype(str(node["dtype"])))
+    elif kind == "Mul":  # a runtime joins a Conv with the constant behind it
+        given.sort(key=made.constants.__contains__)
+    elif kind == "BitShift":
+        options["direction"] = "RIGHT"
+    elif node.op == "minimum" and program.nodes[node.args[0]].op == "maximum":
+        given = [*made.nodes.pop().input, given[1]]  # both ends in one
+    elif node.op == "minimum":
+        given.insert(1, "")
+    return made.node(kind, given, name, **options)
 
 
 def run_graph(data: bytes, images: Mapping[str, NDArray[np.float32]]) -> tuple[str, NDArray[np.float32]]:

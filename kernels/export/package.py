@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -27,26 +27,25 @@ from ...compiler import artifact as artifacts
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
 from ...compiler.core import weights as weight_layout
-from ...compiler.core.ir import sha256
+from ...compiler.core.ir import OUTPUT_ENCODING, sha256
 from ...compiler.core.lower import lower
 from ...compiler.kernel.interface import DENOISE
 from ...compiler.plan import plan_program
 from ...compiler.scenes.encode_kernel import compile_encode, layers_of, learned_rays, sees
 from ...compiler.scenes.lower_scene import PathPrograms, lower_scene
 from ...compiler.scenes.path_kernel import compile_path, feature_pass
+from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.names import remedy
-from ...compiler.targets import Language, language_named
 from ...compiler.variants import FULL, Varied, parse, plan_model, vary
-from ...refimpl.errors import ExecutorUnavailable, InputError, choice
+from ...refimpl.errors import NO_VALUE, ExecutorUnavailable, InputError, choice
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
 from ...refimpl.network.domain import of_model
-from ...refimpl.network.whole import Whole
 from ...refimpl.reading import SIZES
 from . import bindings, check_pair, onnx_export, readme
-from .hosts import scratch
-from .hosts.table import HOSTS, host_named
+from .hosts.headers import SCRATCH_NAME, scratch
+from .hosts.host import HOSTS, Host, host_named
 from .motion import ROWS_NAME, Motion
 from .targets import NAMES, ONNX, PASSES, TARGETS, Limit, Place, Row
 
@@ -129,111 +128,135 @@ def export(request: Request) -> Export:
         fix = choice(request.target, [*NAMES, "html"])
         fix = f"a host's name: use --host {request.target}" if request.target in HOSTS else fix
         raise InputError("--target", request.target, "unknown", fix)
-    request = _hosted(request)
-    if request.model.is_imported:
-        _check_imported(request)
-    if request.target == ONNX:
-        return _graph(request)
+    host = host_named(request.host) if request.host else None
+    request = replace(request, schedule=request.schedule or (host.schedule if host else ""))
+    for wrong, option, value, rule, fix in _refusals(request, host):
+        if wrong:
+            raise InputError(option, value, rule, fix)
+    return _finished(_graph(request) if request.target == ONNX else _compiled(request))
+
+
+def _refusals(request: Request, host: Host | None) -> Iterator[tuple[Any, str, Any, str, str]]:
+    """Yield what no export has: if it is asked for, the option, its value, the rule, and what to do."""
+    leave, without = "leave it out", "leave it out, or leave --host out"
+    model, target, schedule = request.model, request.target, request.schedule
+    scene = request.scene.name if request.scene else None
+    if host:
+        no, alone = f"is not supported by host {host.name}", f"{leave}, or export with --target and no --host"
+        runs = f"host {host.name} runs kernels of target {host.target}"
+        yield target != host.target, "--target", target, runs, without
+        lacking = ", ".join(name for name in model.features if host.features and name not in host.features)
+        has = f"are not available in host {host.name}, which has {', '.join(host.features)}"
+        yield lacking, "features of the model", lacking, has, "train it with these"
+        yield request.scene and not host.scenes, "--scene", scene, f"{no}, which only denoises", alone
+        yield request.motion, "--moving", NO_VALUE, f"{no}, which renders one time", alone
+        one, other = f"{no}: it has one pass, and a rank needs two", "leave the rank out, or choose another"
+        two = request.varied.rank > 0
+        yield two and not host.ranks, "--variant", request.variant, one, f"{other} host"
+        several = f"is several launches, and host {host.name} starts one for each kernel"
+        yield schedule == PASSES, "--schedule", schedule, several, without
+    if model.is_imported:
+        own = f"the model was imported and reads {', '.join(model.features)}, not a scene's features"
+        yield request.scene, "--scene", scene, own, leave
+        graph = "the model was imported from a graph in this form"
+        yield target == ONNX, "--target", target, graph, "use that file"
+    if target == ONNX:
+        paths = "a graph denoises; it traces no paths"
+        yield request.scene, "--scene", scene, paths, f"{leave}, or choose another target"
+        weights = request.weights
+        yield weights not in ("", "inline"), "--weights", weights, "the graph contains them", leave
+        yield schedule, "--schedule", schedule, "the runtime schedules it", leave
+
+
+def _compiled(request: Request) -> Export:
+    """Return the export of kernels, without what all exports have."""
     row = TARGETS[request.target]
-    how = request.weights or next(iter(row.places))
-    if how not in row.places:
-        rule = f"is not available for target {row.name}"
-        raise InputError("--weights", how, rule, f"{choice(how, row.places)}, or leave it out")
+    how = _one_of("--weights", request.weights, tuple(row.places), row.name, choice)
     place = row.places[how]
-    schedule = request.schedule or place.schedules[0]
-    if schedule not in place.schedules:
-        rule = f"is not available for target {row.name} with --weights {how}"
-        raise InputError(
-            "--schedule", schedule, rule, f"{remedy(schedule, place.schedules)}, or leave it out"
-        )
-    plan = plan_model(request.model, place.kernel, request.profile, schedule, request.variant)
+    at = f"{row.name} with --weights {how}"
+    schedule = _one_of("--schedule", request.schedule, place.schedules, at, remedy)
+    plan = plan_model(request.model, row.kernel(how), request.profile, schedule, request.variant)
     denoiser = compile_plan(plan)
     limits = _limits(request, row, place, denoiser)
     programs = _programs(request, row)
     path, encoder, passes = _of_scene(request, row, programs)
     made = {"path": path, "encode": encoder, "horizontal": denoiser.before, "denoise": denoiser}
     kernels = {role: kernel for role, kernel in made.items() if kernel is not None}
-    files: dict[str, bytes] = {}
-    for role, kernel in kernels.items():
-        held = {**artifacts.files_of(kernel), **row.files(kernel.role, kernel.source)}
-        if row.slots == "header" and kernel.role == DENOISE:
-            held[scratch.NAME] = scratch.header(kernel).encode()
-        files |= {f"{role}/{name}": data for name, data in held.items()}
+    sources = {role: row.files(kernel.role, kernel.source) for role, kernel in kernels.items()}
+    sources |= {f"feature {name}": row.files(f"feature.{name}", text) for name, text in passes.items()}
+    inputs = {} if request.model.is_imported else bindings.inputs_of(plan.model, row.language)
+    files = _files(row, kernels, inputs, sources)
     if halves := _halves(denoiser):
         files[f"denoise/{HALVES_NAME}"] = halves
-    for name, text in passes.items():
-        found = row.files(f"feature.{name}", text)
-        files |= {f"features/{n}": data for n, data in found.items()}
-        _check(row.source, max(map(len, found.values())), row.name)
-    model, promised = plan.model, plan.bound.output is not None
     others = []
     if request.motion:
         files[f"path/{ROWS_NAME}"] = request.motion.rows(request.settings).astype("<f4").tobytes()
         others = [request.motion.other(request.settings)]
-    pair = check_pair.pair(plan, model, promised, programs, others)
-    files |= {f"check/{name}": data for name, data in pair.files().items()}
-    made_by = [] if request.model.is_imported else bindings.inputs_of(model, _usual(row))
-    for each in made_by:
-        folder = f"{bindings.FOLDER}/{each.name}"
-        files |= {f"{folder}/{name}": data for name, data in artifacts.files_of(each.kernel).items()}
-    facts = _facts(request, row, how, denoiser, limits, bool(halves)) | {"schedules": list(place.schedules)}
-    facts["scene"] = _scene(request, programs)
-    facts["kernels"] = bindings.kernels(row, kernels, passes)
-    facts |= {"inputs": bindings.input_facts(made_by)} if made_by else {}
-    return _finished(Export(request, files, facts, pair, denoiser, path, encoder, passes))
+    pair = check_pair.pair(plan, plan.model, plan.bound.output is not None, programs, others)
+    held, first = denoiser.manifest, denoiser.kernels[0].manifest
+    facts = {
+        "language": row.text or row.language.language,
+        **{name: held[name] for name in ("profile", "output", "bound")},
+        "images": first["images"],
+        "window": {"size": plan.model.window.size, "border": first["window"]["border"]},
+        "assumes": plan.assumes,
+        "certificate": f"denoise/{held['certificate']}" if held["certificate"] else None,
+        "weights": {
+            "where": how,
+            **{name: held["weights"][name] for name in ("count", "order")},
+            "file": f"denoise/{artifacts.WEIGHTS_NAME}",
+            **({"half": f"denoise/{HALVES_NAME}"} if halves else {}),
+        },
+        "limits": limits,
+        "schedules": list(place.schedules),
+        "scene": _scene(request, programs),
+        "kernels": bindings.kernels(row, kernels, sources),
+        **({"inputs": bindings.input_facts(plan.model, inputs)} if inputs else {}),
+    }
+    return Export(request, files, facts, pair, denoiser, path, encoder, passes)
 
 
-def _check_imported(request: Request) -> None:
-    """Refuse what only a model of features has: a scene before it, a graph that it was not made of."""
-    way_out = "leave it out"
-    if request.scene is not None:
-        rule = f"the model was imported and reads {', '.join(request.model.features)}, not a scene's features"
-        raise InputError("--scene", request.scene.name, rule, way_out)
-    if request.target == ONNX:
-        rule = "the model was imported from a graph in this form"
-        raise InputError("--target", request.target, rule, "use that file")
+def _files(
+    row: Row,
+    kernels: Mapping[str, Artifact],
+    inputs: Mapping[str, Artifact],
+    sources: Mapping[str, Mapping[str, bytes]],
+) -> dict[str, bytes]:
+    """Return the files of all kernels by path."""
+    files: dict[str, bytes] = {}
+    beside = {f"{bindings.FOLDER}/{role}": kernel for role, kernel in inputs.items()}
+    for role, kernel in {**kernels, **beside}.items():
+        files |= {f"{role}/{name}": data for name, data in artifacts.files_of(kernel).items()}
+        if row.slots == "header" and kernel.role == DENOISE:
+            files[f"{role}/{SCRATCH_NAME}"] = scratch(kernel).encode()
+    for role, found in sources.items():
+        files |= {f"{bindings.folder_of(role)}/{name}": data for name, data in found.items()}
+        if role not in kernels:
+            _check(row.source, max(map(len, found.values())), row.name)
+    return files
 
 
-def _hosted(request: Request) -> Request:
-    """Return a request with what its host wants of an export, or refuse what the host does not run."""
-    if not request.host:
-        return request
-    host = host_named(request.host)
-    if request.target != host.target:
-        rule = f"host {host.name} runs kernels of target {host.target}"
-        raise InputError("--target", request.target, rule, "leave it out, or leave --host out")
-    scene = None if request.scene is None else request.scene.name
-    two = request.varied.rank > 0
-    host.check(scene, request.motion is not None, two, request.variant, request.model.features)
-    weights, schedule = request.weights or host.weights, request.schedule or host.schedule
-    if schedule == PASSES:
-        rule = f"is several launches, and host {host.name} starts one for each kernel"
-        raise InputError("--schedule", schedule, rule, "leave it out, or leave --host out")
-    return replace(request, weights=weights, schedule=schedule)
+def _one_of(
+    option: str, value: str, known: Sequence[str], where: str, fix: Callable[[str, Sequence[str]], str]
+) -> str:
+    """Return the value of an option, the first of those that are known by default, or refuse it."""
+    if value and value not in known:
+        rule = f"is not available for target {where}"
+        raise InputError(option, value, rule, f"{fix(value, known)}, or leave it out")
+    return value or known[0]
 
 
 def _graph(request: Request) -> Export:
     """Return the export as an ONNX graph."""
-    if request.scene is not None:
-        rule = "a graph denoises; it traces no paths"
-        raise InputError("--scene", request.scene.name, rule, "leave it out, or choose another target")
-    if request.weights not in ("", "inline"):
-        raise InputError("--weights", request.weights, "the graph contains them", "leave it out")
-    if request.schedule:
-        raise InputError("--schedule", request.schedule, "the runtime schedules it", "leave it out")
     model = request.varied.model
     data, plan = onnx_export.graph(model), plan_program(lower(model), "numpy")
-    pair, network = check_pair.pair(plan, model, promised=model.is_whole), model.siren
-    factors = network.factors if isinstance(network, Whole) else ()
-    count = sum(array.size for array in (*network.weights, *network.biases, *factors))
-    files = {"denoise/denoise.onnx": data}
-    files |= {f"check/{name}": content for name, content in pair.files().items()}
+    pair, program = check_pair.pair(plan, model, promised=model.is_whole), plan.analysed
+    count = sum(array.size for array in program.parameters.values())
     facts = {
-        "model": _model(request),
         "scene": None,
-        "images": bindings.images(model),
+        "images": [image.facts for image in kernel_gather(program).images],
         "window": {"size": model.window.size, "border": model.window.border},
-        "output": {"name": "result", "channels": 3, "encoding": bindings.encoding(model)},
+        "output": {"name": "result", "channels": 3, "encoding": dict(program.info)[OUTPUT_ENCODING]},
         **onnx_export.promise(model),
         "certificate": None,
         "weights": {"where": "inline", "count": count, "file": None, "order": "initialisers"},
@@ -241,20 +264,21 @@ def _graph(request: Request) -> Export:
         "schedules": [],
         "kernels": [onnx_export.kernel(model)],
     }
-    return _finished(Export(request, files, facts, pair))
+    return Export(request, {"denoise/denoise.onnx": data}, facts, pair)
 
 
 def _finished(export: Export) -> Export:
     """Return an export with what all manifests say, its host, its README, and hashes and lengths of files."""
-    request, pair, files = export.request, export.pair, export.files
+    request, pair = export.request, export.pair
+    files = {**export.files, **{f"check/{name}": data for name, data in pair.files().items()}}
     facts = {"schema": SCHEMA, "target": request.target, "licence": LICENCE, "check": pair.facts()}
-    facts |= export.manifest
+    facts |= {"model": _model(request), **export.manifest}
     if request.host:
         host = host_named(request.host)
         facts["host"] = host.facts()
         first = next(iter(pair.images.values()))
         seen = first if first.shape[2] == 3 else pair.output
-        files = {**files, **host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
+        files |= {**host.contents(facts), EXPECTED_NAME: beside(seen, pair.output)}
     return _closed(replace(export, files=files, manifest=facts))
 
 
@@ -291,38 +315,6 @@ def _closed(export: Export) -> Export:
 def with_speed(export: Export, speed: Mapping[str, Any]) -> Export:
     """Return an export that says how long it takes: `speed` in its manifest, a line in its README."""
     return _closed(replace(export, manifest={**export.manifest, "speed": speed}))
-
-
-def _facts(
-    request: Request,
-    row: Row,
-    how: str,
-    denoiser: Artifact,
-    limits: Sequence[Mapping[str, Any]],
-    halves: bool,
-) -> dict[str, Any]:
-    """Return the entries of a manifest other than kernels and files."""
-    held = denoiser.manifest
-    first = denoiser.kernels[0].manifest
-    return {
-        "language": row.text,
-        "profile": held["profile"],
-        "model": _model(request),
-        "images": first["images"],
-        "window": {"size": denoiser.plan.model.window.size, "border": first["window"]["border"]},
-        "output": held["output"],
-        "bound": held["bound"],
-        "assumes": denoiser.plan.assumes,
-        "certificate": f"denoise/{held['certificate']}" if held["certificate"] else None,
-        "weights": {
-            "where": how,
-            "count": held["weights"]["count"],
-            "file": f"denoise/{artifacts.WEIGHTS_NAME}",
-            "order": held["weights"]["order"],
-            **({"half": f"denoise/{HALVES_NAME}"} if halves else {}),
-        },
-        "limits": list(limits),
-    }
 
 
 def _halves(denoiser: Artifact) -> bytes:
@@ -402,14 +394,9 @@ def _programs(request: Request, row: Row) -> PathPrograms | None:
     seen = sees(request.model.features)
     # A pass of a host writes a feature of one sample.
     rays = None if row.single else learned_rays(request.model, request.settings)
-    forms = _usual(row).forms
+    forms = row.language.forms
     more = {"seen": seen, "rays": rays, "shadow_rays": learned_shadow_rays(request.model)}
     return lower_scene(request.scene, request.settings, forms, moving, **more)  # type: ignore[arg-type]
-
-
-def _usual(row: Row) -> Language:
-    """Return the language of a target, wherever weights are."""
-    return language_named(next(iter(row.places.values())).kernel.partition(":")[0])
 
 
 def _of_scene(
@@ -418,7 +405,7 @@ def _of_scene(
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}
-    model, language = request.varied.model, _usual(row)
+    model, language = request.varied.model, row.language
     scales, whole = model.normalization, model.is_whole
     if row.single:
         name = "".join(letter if letter.isalnum() else "_" for letter in request.scene.name[:60])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ...compiler.artifact import Artifact
@@ -33,41 +33,24 @@ MS = 1e3
 """Milliseconds of a second."""
 
 
-@dataclass(frozen=True)
-class Speed:
-    """Milliseconds of a picture: the median of `rounds`, the least and the most; and seconds to compile.
-
-    `plain_ms`: the median of a program in C that is compiled without the advised options.
-    """
-
-    device: str
-    size: int
-    rounds: int
-    ms: float
-    least_ms: float
-    most_ms: float
-    compile_s: float
-    plain_ms: float | None = None
-
-    def facts(self) -> dict[str, Any]:
-        """Return the entry `speed` of a manifest."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
-
 def measure(
     export: Export, size: int = SIZE_PX, rounds: int = ROUNDS, clock: Clock = time.perf_counter
-) -> Speed:
-    """Return how long the denoiser takes for a picture of `size` x `size` pixels, copies there and back too.
+) -> dict[str, Any]:
+    """Return the entry `speed` of a manifest: what a picture of `size` x `size` pixels takes, with copies.
 
-    Raises InputError for a target whose own kind of device nothing opens here, ExecutorUnavailable where it
-    is missing on this machine.
+    It has milliseconds, the median of `rounds`, the least and the most; seconds to compile; and `plain_ms`,
+    the median of a program in C that is compiled without the advised options. Raises InputError for a target
+    whose own kind of device nothing opens here, ExecutorUnavailable where it is missing on this machine.
     """
     check_measured(export.target)
-    found = [_measured(export, size, rounds, clock, each) for each in TARGETS[export.target].timed or [()]]
-    return replace(found[0], plain_ms=found[1].ms if found[1:] else None)
+    advised, *plain = TARGETS[export.target].timed or [()]
+    found = _measured(export, size, rounds, clock, advised)
+    for options in plain:
+        found["plain_ms"] = _measured(export, size, rounds, clock, options)["ms"]
+    return found
 
 
-def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Sequence[str]) -> Speed:
+def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Sequence[str]) -> dict[str, Any]:
     """Return how long the denoiser takes, compiled with options."""
     assert export.denoiser is not None, "targets that are measured have kernels"
     denoiser = _unseen(export.denoiser)
@@ -89,7 +72,8 @@ def _measured(export: Export, size: int, rounds: int, clock: Clock, options: Seq
         # Some drivers compile when a kernel first runs: what that took beyond a picture is theirs.
         device = " ".join([TARGETS[export.target].route + opened.device, *options])
         compiled = max(0.0, first - median)
-        return Speed(device, size, rounds, MS * median, min(ms), max(ms), compiled)
+        times = {"ms": MS * median, "least_ms": min(ms), "most_ms": max(ms), "compile_s": compiled}
+        return {"device": device, "size": size, "rounds": rounds, **times}
 
 
 def _unseen(denoiser: Artifact) -> Artifact:

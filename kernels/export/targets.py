@@ -1,8 +1,8 @@
 """The targets of `wamnet export`: which kernels are written for each, how they are called, what limits hold.
 
-One row a target [`TARGETS`]. A row names a compiler target for each place that weights can have, the first
-one being the usual one, and says how files are named, how kernels are called, and which limits hold. What
-runs kernels here that executors of the registry do not is in [`RUNNERS`].
+One row a target [`TARGETS`]. A row says where weights can be, how kernels are bound, and which limits hold;
+the compiler's language of that name, or `of` another one, says the rest. What runs kernels here that
+executors of the registry do not is in [`RUNNERS`].
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ from ...compiler.kernel.interface import BLOCK, TABLE, staged
 from ...compiler.languages.glsl import WEIGHT_TEXTURE_WIDTH
 from ...compiler.schedules.schedules import PLAIN
 from ...compiler.schedules.straight import LARGEST_WEIGHTS
+from ...compiler.targets import LANGUAGES, Language, language_named
 from ..devices.executor import Executor
 from ..devices.registry import open_executor
 from . import tools
 
 BUFFER, TEXTURE = "buffer", "texture"
 """The other places of weights."""
-
-KILOBYTE = 1024
-"""Bytes."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +37,11 @@ class Limit:
 
 @dataclass(frozen=True)
 class Place:
-    """A place of weights: the compiler's target, its schedules that can have them there, and a limit.
+    """A place of weights: the schedules that can have them there, the usual one first, and a limit.
 
-    The first schedule is the usual one. `each`: how much of the limit a weight takes.
+    `each`: how much of the limit a weight takes.
     """
 
-    kernel: str
     schedules: tuple[str, ...] = (PLAIN,)
     limit: Limit | None = None
     each: float = 4.0
@@ -86,15 +83,6 @@ class Tool:
     options: tuple[str, ...] = ()
 
 
-Files = Callable[[str, str], Mapping[str, bytes]]
-"""(stem of a file, source) -> files."""
-
-
-def _as(suffix: str) -> Files:
-    """Return the files of a language that is written as it is."""
-    return lambda stem, source: {f"{stem}{suffix}": source.encode()}
-
-
 def _launches(stem: str, source: str) -> Mapping[str, str]:
     """Return the source of each launch by the stem of its files, or of a kernel that is one."""
     count = source.count(" STAGE == ")
@@ -118,54 +106,77 @@ def _hlsl(stem: str, source: str) -> Mapping[str, bytes]:
 
 @dataclass(frozen=True)
 class Row:
-    """One target. `slots`: what kernels are bound to, `code`: ten lines of a program that calls the denoiser.
+    """One target. `slots`: what kernels are bound to; `places`: where weights can be, the usual one first.
 
+    `of`: the compiler's target, where that has another name, and `text` the language, for a reader.
+    `api`: the type of a pipeline in the README's code.
     `single`: a pass of the host writes one image, so that a noisy picture's features are passes of their own.
-    `dispatch`: how kernels on buffers with numbers are started.
 
     `opens`: what runs its kernels here, the target's own compiler and device or the nearest to it
     [`opened`], to which they are translated by `route`. `stands_in`: it computes the same, but is nothing
     that the target's users have. `timed`: where options of a compiler decide, those that are timed: the
     advised ones, and those of a plain build. `tool`: what takes its files, if not what runs them.
+    `translated`: from the stem of a name and a source to files of another language.
     """
 
     name: str
-    text: str
-    places: Mapping[str, Place]
-    files: Files
     slots: str
-    code: str
-    entry: str = ""
+    places: Mapping[str, Place]
+    api: str = ""
+    of: str = ""
+    text: str = ""
     single: bool = False
     most_images: Limit | None = None
     source: Limit | None = None
-    dispatch: str = ""
     opens: tuple[str, ...] = ()
     route: str = ""
     stands_in: bool = False
     timed: tuple[Sequence[str], ...] = ()
     tool: Tool | None = None
+    translated: Callable[[str, str], Mapping[str, bytes]] | None = None
+
+    @property
+    def language(self) -> Language:
+        """Return the language, wherever weights are."""
+        return language_named(self.of or self.name)
+
+    def kernel(self, place: str) -> str:
+        """Return the compiler's target with the weights at a place."""
+        placed = f"{self.language.name}:{place}"
+        return placed if placed in LANGUAGES else self.language.name
+
+    def files(self, stem: str, source: str) -> Mapping[str, bytes]:
+        """Return the files of a source: those that it is translated to, or it as it is."""
+        if self.translated:
+            return self.translated(stem, source)
+        return {f"{stem}{self.language.dialect.suffix}": source.encode()}
 
 
-def _block(bytes_: int, name: str) -> Limit:
-    """Return the limit of a uniform block."""
-    return Limit(name, bytes_, "use another place with --weights, or a smaller --variant, as window8+rank16")
-
-
-INLINED = Limit(
-    "weights that a driver compiles in reasonable time",
-    LARGEST_WEIGHTS,
-    "use --weights texture or uniform where the target has it, or a smaller --variant",
+STRAIGHT = Place(
+    ("inlined",),
+    Limit(
+        "weights that a driver compiles in reasonable time",
+        LARGEST_WEIGHTS,
+        "use --weights texture or uniform where the target has it, or a smaller --variant",
+    ),
+    1.0,
 )
 """Weights as straight code."""
 
-TABLE_WEIGHTS = Limit("weights of a constant table", 2**20, "use --weights buffer")
+TABLED = Place(limit=Limit("weights of a constant table", 2**20, "use --weights buffer"), each=1.0)
 """Weights as a table."""
 
 
-def _texture(side: int) -> Limit:
-    """Return the limit of a texture of so many rows."""
-    return Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
+def _block(kilobytes: int, name: str) -> Place:
+    """Return weights in a uniform block."""
+    fix = "use another place with --weights, or a smaller --variant, as window8+rank16"
+    return Place(limit=Limit(name, 1024 * kilobytes, fix))
+
+
+def _texture(side: int) -> Place:
+    """Return weights in a texture of so many rows."""
+    limit = Limit(f"GL_MAX_TEXTURE_SIZE rows of {WEIGHT_TEXTURE_WIDTH}", side, "use a smaller --variant")
+    return Place(limit=limit, each=1 / WEIGHT_TEXTURE_WIDTH)
 
 
 GROUPED = ("group:4", "group:2", "group:1", PLAIN)
@@ -178,36 +189,14 @@ PASSES = "fftpasses:32"
 """Schedule of spectra in several launches, the fastest where a processor runs shaders."""
 
 
-def _storage(
-    kernel: str, uniform: int = 0, name: str = "", schedules: tuple[str, ...] = GROUPED
-) -> dict[str, Place]:
-    """Return the places of a target with storage buffers."""
-    found = {BUFFER: Place(kernel, schedules)}
-    return found | {BLOCK: Place(f"{kernel}:{BLOCK}", limit=_block(uniform, name))} if uniform else found
+GL_BLOCK = _block(16, "GL_MAX_UNIFORM_BLOCK_SIZE")
+"""Weights in a block of OpenGL."""
 
+VULKAN_BLOCK = _block(16, "maxUniformBufferRange")
+"""Weights in a block of Vulkan."""
 
-def _tabled(kernel: str) -> dict[str, Place]:
-    """Return the place of a table."""
-    return {TABLE: Place(f"{kernel}:{TABLE}", limit=TABLE_WEIGHTS, each=1.0)}
-
-
-def _fragment(kernel: str, rows: int) -> dict[str, Place]:
-    """Return the places of a fragment shader."""
-    return {
-        TEXTURE: Place(kernel, limit=_texture(rows), each=1 / WEIGHT_TEXTURE_WIDTH),
-        TABLE: Place(kernel, ("inlined",), limit=INLINED, each=1.0),
-        BLOCK: Place(f"{kernel}:{BLOCK}", limit=_block(16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE")),
-    }
-
-
-UNIFORM_RANGE = (16 * KILOBYTE, "maxUniformBufferRange")
-"""What Vulkan promises of a uniform block."""
-
-TRANSLATED_PLACES = _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED, PASSES))
+TRANSLATED = {BUFFER: Place((*GROUPED, PASSES)), BLOCK: VULKAN_BLOCK}
 """Places of weights for what is made of GLSL for Vulkan by way of SPIR-V 1.0, without products of bytes."""
-
-DISPATCH = "dispatch(ceil(width / {across}), ceil({height} / {down}), 1)"
-"""How kernels on buffers are started, in groups that compute so many pixels."""
 
 DISPATCHED = ("numbered", "registers")
 """Kinds of slots of such kernels."""
@@ -225,189 +214,107 @@ ON_PROCESSORS = (*SPECTRA, "tile:16", "tile:8", "tile:4", "vector:16", BYTES[0])
 IN_C = ("tile:8", "tile:16", "tile:4", *SPECTRA, BYTES[0], PLAIN)
 """Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
 
-GL_CODE = """\
-GLuint program = link(fullscreen_triangle, compile(GL_FRAGMENT_SHADER, "{file}"));
-glUseProgram(program);
-/* One RGBA32F texture for each image (texel row 0 is the top row), and the weights: R32F, 1024 wide. */
-{images}
-bind_texture({count}, weight_texture, "weight_texture");
-/* The result: an RGBA32F colour buffer of the picture's size; its values are display-encoded already. */
-glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_of(result_texture));
-glViewport(0, 0, width, height);
-glDisable(GL_FRAMEBUFFER_SRGB);
-glDrawArrays(GL_TRIANGLES, 0, 3);"""
-"""Integration with OpenGL; helpers are the program's own."""
-
-
-ENGINES = """\
-/* three.js: a RawShaderMaterial with glslVersion: GLSL3 writes the first line itself: pass the text below
-   `#version 300 es`. PlayCanvas wants an output of its own name: see `--host playcanvas`. */"""
-"""What engines on WebGL do to a text."""
-
-
-def _buffers_code(api: str) -> str:
-    """Return the integration with buffers that have numbers; helpers are the program's own."""
-    return f"""\
-/* All buffers hold 32-bit floats; images (height, width, channels), rows from the top. */
-{api} pipeline = create_pipeline("{{file}}", "{{entry}}");
-{{bound}}
-{{dispatch}};
-wait();
-show(result);   /* width * height * 3 floats, encoded for the display: do not encode them again */"""
-
-
-def _arguments_code(call: str) -> str:
-    """Return the integration with functions."""
-    return f"""\
-/* Arrays of float: images (height, width, channels), rows from the top; weights as in weights.bin. */
-{call}
-/* result: width * height * 3 floats, display-encoded: do not encode them for the display again. */"""
-
-
 ROWS: tuple[Row, ...] = (
     Row(
         "opencl",
-        "OpenCL C 1.2",
-        _storage(
-            "opencl",
-            64 * KILOBYTE,
-            "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE",
-            (*ON_PROCESSORS, *GROUPED_BYTES),
-        )
-        | _tabled("opencl"),
-        _as(".cl"),
         "arguments",
-        'cl_kernel kernel = clCreateKernel(program, "wamnet_denoise", &error);\n'
-        "/* Arguments in this order: {arguments}. */\n"
-        "set_arguments(kernel, {arguments});\n"
-        "/* An item computes {columns} x {rows} pixels. */\n"
-        "size_t local[2] = {{{group_x}, {group_y}}}, global[2] = {{\n"
-        "    round_up((width + {columns} - 1) / {columns}, {group_x}),\n"
-        "    round_up((height + {rows} - 1) / {rows}, {group_y})}};\n"
-        "clEnqueueNDRangeKernel(queue, kernel, 2, NULL, global, local, 0, NULL, NULL);",
+        {
+            BUFFER: Place((*ON_PROCESSORS, *GROUPED_BYTES)),
+            BLOCK: _block(64, "CL_DEVICE_MAX_CONSTANT_BUFFER_SIZE"),
+            TABLE: TABLED,
+        },
         opens=("opencl",),
     ),
     Row(
         "glsl",
-        "GLSL 3.30, fragment shader",
-        _fragment("opengl", 1024),
-        _as(".frag"),
         "names",
-        GL_CODE,
+        {TEXTURE: _texture(1024), TABLE: STRAIGHT, BLOCK: GL_BLOCK},
+        of="opengl",
         opens=("opengl",),
     ),
     Row(
         "glsl-compute",
-        "GLSL 4.30, compute shader",
-        _storage("glsl-compute", 16 * KILOBYTE, "GL_MAX_UNIFORM_BLOCK_SIZE", ("group:2", *GROUPED, PASSES)),
-        _as(".comp"),
         "numbered",
-        _buffers_code("GLuint"),
-        dispatch=f"gl{DISPATCH}",
+        {BUFFER: Place(("group:2", *GROUPED, PASSES)), BLOCK: GL_BLOCK},
+        "GLuint",
         opens=("gl_runner", "ComputeRunner"),
         tool=Tool("glslangValidator", ".comp", options=("glslangValidator", "-S", "comp")),
     ),
     Row(
         "glsl-es",
-        "GLSL ES 3.00, fragment shader",
-        _fragment("glsl-es", 2048),
-        _as(".frag"),
         "names",
-        f"{GL_CODE}\n{ENGINES}",
+        {TEXTURE: _texture(2048), TABLE: STRAIGHT, BLOCK: GL_BLOCK},
         opens=("gl_runner", "ESRunner"),
         tool=Tool("glslangValidator", ".frag", options=("glslangValidator", "-S", "frag")),
     ),
     Row(
         "glsl-vulkan",
-        "GLSL 4.50 for Vulkan, compute shader",
-        _storage("glsl-vulkan", *UNIFORM_RANGE, (*GROUPED_BYTES, PASSES)),
-        _as(".comp"),
         "numbered",
-        _buffers_code("VkPipeline"),
-        dispatch=DISPATCH,
+        {BUFFER: Place((*GROUPED_BYTES, PASSES)), BLOCK: VULKAN_BLOCK},
+        "VkPipeline",
         opens=("wgpu_runner", "vulkan_runner"),
         route="SPIR-V, wgpu, ",
         tool=Tool("glslangValidator + spirv-val", ".comp", _translated),
     ),
     Row(
         "wgsl",
-        "WGSL",
-        _storage("wgsl", 64 * KILOBYTE, "maxUniformBufferBindingSize", (*GROUPED_BYTES, PASSES)),
-        _as(".wgsl"),
         "numbered",
-        _buffers_code("const"),
-        dispatch=DISPATCH,
+        {BUFFER: Place((*GROUPED_BYTES, PASSES)), BLOCK: _block(64, "maxUniformBufferBindingSize")},
+        "const",
         most_images=Limit("maxStorageBuffersPerShaderStage, less 2", 6, "use fewer features"),
         opens=("wgpu_runner", "WgpuRunner"),
         route="wgpu, ",
     ),
     Row(
         "hlsl",
-        "HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
-        TRANSLATED_PLACES,
-        _hlsl,
         "registers",
-        _buffers_code("auto"),
-        dispatch=DISPATCH,
+        TRANSLATED,
+        "auto",
+        of="glsl-vulkan",
+        text="HLSL, compute shader for fxc (shader model 5.0) and dxc (6.0)",
+        translated=_hlsl,
         opens=("wgpu_runner", "vulkan_runner", "dxc"),
         route="back to SPIR-V, wgpu, ",
         tool=Tool("glslangValidator -D + spirv-val", ".hlsl", _translated, ("hlsl",)),
     ),
     Row(
         "metal",
-        "Metal Shading Language",
-        _storage("metal", 64 * KILOBYTE, "constant memory of a kernel", (*GROUPED, PASSES))
-        | _tabled("metal"),
-        _as(".metal"),
         "numbered",
-        _buffers_code("id<MTLComputePipelineState>"),
-        dispatch="dispatchThreadgroups(ceil(width / {across}), ceil({height} / {down})) "
-        "of {group_x} x {group_y}",
+        {
+            BUFFER: Place((*GROUPED, PASSES)),
+            BLOCK: _block(64, "constant memory of a kernel"),
+            TABLE: TABLED,
+        },
+        "id<MTLComputePipelineState>",
         opens=("host_runner", "MetalRunner"),
         route="as C++ with a shim, ",
         stands_in=True,
     ),
     Row(
         "spirv",
-        "SPIR-V 1.0, compute shader",
-        TRANSLATED_PLACES,
-        _spirv,
         "numbered",
-        _buffers_code("VkPipeline"),
-        dispatch=DISPATCH,
+        TRANSLATED,
+        "VkPipeline",
+        of="glsl-vulkan",
+        text="SPIR-V 1.0, compute shader",
+        translated=_spirv,
         opens=("wgpu_runner", "vulkan_runner"),
         route="wgpu, ",
         tool=Tool("spirv-val", ".spv", tools.validate),
     ),
     Row(
         "c",
-        "C99, one header",
-        {BUFFER: Place("c", IN_C), **_tabled("c")},
-        _as(".h"),
         "header",
-        '#include "{file}"\n'
-        + _arguments_code("wamnet_image({arguments});")
-        + "\n/* wamnet_pixel computes {columns} pixels of a row, for your own loops. -O3 -march=native\n"
-        "   is the fastest. Without it GCC 12 and later compile tiles for AVX2 and AVX-512, on Linux, and\n"
-        "   the program chooses. For x86 processors without AVX2 define WAMNET_PORTABLE.\n"
-        "   Other schedules: tile:8 needs registers of 8 floats (AVX2), tile:4 those of 4 (SSE, NEON).\n"
-        "   GCC and clang also compile fft:16, fft:8 and fft:4, which are faster for large windows. */",
+        {BUFFER: Place(IN_C), TABLE: TABLED},
+        text="C99, one header",
         opens=("host_runner", "CRunner"),
         timed=(("-O3", "-march=native"), ("-O2",)),
         tool=Tool("cc -Wall -Wextra -Wconversion -Werror", ".h", _cc),
     ),
     Row(
         "cuda",
-        "CUDA C",
-        _storage("cuda", schedules=(*GROUPED_BYTES, PASSES)) | _tabled("cuda"),
-        _as(".cu"),
         "arguments",
-        _arguments_code(
-            "dim3 block({group_x}, {group_y});\n"
-            "dim3 grid((width + {across} - 1) / {across}, (height + {down} - 1) / {down});\n"
-            "wamnet_denoise<<<grid, block>>>({arguments});\n"
-            "cudaDeviceSynchronize();",
-        ),
+        {BUFFER: Place((*GROUPED_BYTES, PASSES)), TABLE: TABLED},
         opens=("host_runner", "CUDARunner"),
         route="as C++ with a shim, ",
         stands_in=True,
@@ -415,16 +322,9 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "shadertoy",
-        "Shadertoy's tabs",
-        {TABLE: Place("shadertoy", ("inlined",), limit=INLINED, each=1.0)},
-        _as(".glsl"),
         "channels",
-        "1. Make buffers A, B, ... and paste features/feature.<name>.glsl into one each, in this order.\n"
-        "2. Paste denoise.glsl into the tab Image.\n"
-        "3. In Image, set iChannel0, iChannel1, ... to the buffers in that order:\n"
-        "{images}\n"
-        "4. Set each channel's filter to nearest and its wrap to clamp.",
-        entry="mainImage",
+        {TABLE: STRAIGHT},
+        text="Shadertoy's tabs",
         single=True,
         opens=("gl_runner", "ShadertoyRunner"),
         route="its uniforms declared, ",
@@ -434,21 +334,8 @@ ROWS: tuple[Row, ...] = (
     ),
     Row(
         "godot",
-        "Godot 4 shading language, canvas item",
-        {
-            TEXTURE: Place("godot", limit=_texture(16384), each=1 / WEIGHT_TEXTURE_WIDTH),
-            **_tabled("godot"),
-        },
-        _as(".gdshader"),
         "names",
-        "var material = ShaderMaterial.new()\n"
-        'material.shader = load("res://denoise.gdshader")\n'
-        "# Images: FORMAT_RGBF, row 0 the top row; weights: FORMAT_RF, 1024 wide, padded with zeros.\n"
-        "{images}\n"
-        'material.set_shader_parameter("weight_texture", ImageTexture.create_from_image(weights))\n'
-        "$Picture.material = material   # a TextureRect of the picture's size\n"
-        "# Leave HDR 2D off: a viewport with it encodes for the display what it shows, and these colours\n"
-        "# are encoded. To read them in 16 bits, draw into a SubViewport with use_hdr_2d that is not shown.",
+        {TEXTURE: _texture(16384), TABLE: TABLED},
         single=True,
         opens=("gl_runner", "GodotRunner"),
         route="its words declared, ",

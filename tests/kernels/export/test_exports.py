@@ -68,7 +68,7 @@ def test_an_export_keeps_its_bound_where_it_is_run(exported):
         pytest.skip(verdict.executed)
     assert verdict.share <= 1
     assert verdict.error > 0, "clipped outputs would hide errors"
-    assert exported.target == "onnx" or verdict.paths >= check.PATHS_ALIKE
+    assert exported.target == "onnx" or verdict.paths >= check_pair.PATHS_ALIKE
 
 
 @pytest.mark.nightly(but=("c", "wgsl"))
@@ -95,7 +95,7 @@ def test_a_path_kernel_traces_the_rays_that_the_model_has_learned_from(target):
     assert verdict.holds, verdict.wrong
     if "missing" in verdict.executed:
         pytest.skip(verdict.executed)
-    assert verdict.paths >= check.PATHS_ALIKE
+    assert verdict.paths >= check_pair.PATHS_ALIKE
 
 
 MOVING = Motion(
@@ -151,7 +151,7 @@ def test_a_scene_that_moves_is_exported_for_all_moments(target):
     assert verdict.holds, verdict.wrong
     if "missing" in verdict.executed:
         pytest.skip(verdict.executed)
-    assert verdict.paths >= check.PATHS_ALIKE
+    assert verdict.paths >= check_pair.PATHS_ALIKE
 
 
 def test_a_moment_that_is_not_given_is_found():

@@ -23,8 +23,8 @@ from pages import browse
 
 from wamnet.kernels.bench.workload import random_model
 from wamnet.kernels.export import tint_runner
-from wamnet.kernels.export.hosts.host import FILES, SHARED
-from wamnet.kernels.export.hosts.table import HOSTS
+from wamnet.kernels.export.hosts.headers import FILES
+from wamnet.kernels.export.hosts.host import HOSTS, SHARED
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
@@ -102,12 +102,12 @@ def test_a_manifest_says_which_host_it_has(host):
     schema = json.loads((ROOT / "spec/export.schema.json").read_text())
     jsonschema.Draft202012Validator(schema).validate(whole.manifest)
     row = HOSTS[host]
-    assert whole.manifest["host"] == {
-        "name": host,
-        "run": row.run,
-        "storage": {"name": row.storage.name, "added": row.storage.added, "why": row.storage.why},
-    }
-    assert {*row.files, *row.shared, *row.made, "expected.png"} <= set(whole.manifest["files"])
+    assert whole.manifest["host"] == {"name": host, "run": row.run, "storage": row.storage}
+    folders = [*(FILES / host).iterdir(), *(FILES / SHARED / name for name in row.shared)]
+    named = {path.name.removesuffix(".txt") for path in folders} | {"expected.png"}
+    named |= {"host.h"} if row.header else set()
+    named |= {"index.html"} if row.page else set()
+    assert named <= set(whole.manifest["files"])
     assert whole.files["expected.png"].startswith(b"\x89PNG")
     readme = whole.files["README.md"].decode()
     assert f"```sh\n{row.run}\n```" in readme
@@ -115,16 +115,12 @@ def test_a_manifest_says_which_host_it_has(host):
 
 
 def test_storages_hold_what_they_say():
-    """Every number of [0, 1], cut off or rounded to half floats or 8 bits, is no farther off than stated."""
-    values = np.linspace(0, 1, 100_001)
-    halves = np.arange(0x3C01, dtype=np.uint16).view(np.float16).astype(np.float64)
-    for grid, host in ((halves, "godot-hdr"), (np.arange(256) / 255, "godot")):
-        if host not in HOSTS:
-            continue
-        below = np.searchsorted(grid, values, side="right") - 1
-        above = np.minimum(below + 1, len(grid) - 1)
-        worst = np.maximum(values - grid[below], grid[above] - values).max()
-        assert worst <= HOSTS[host].storage.added
+    """Every number of [0, 1], cut off or rounded to 8 bits, is no farther off than stated."""
+    values, grid = np.linspace(0, 1, 100_001), np.arange(256) / 255
+    below = np.searchsorted(grid, values, side="right") - 1
+    above = np.minimum(below + 1, len(grid) - 1)
+    worst = np.maximum(values - grid[below], grid[above] - values).max()
+    assert worst <= HOSTS["godot"].storage["added"]
 
 
 def test_what_a_host_does_not_run_is_refused():

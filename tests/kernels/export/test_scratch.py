@@ -11,7 +11,7 @@ import pytest
 
 from wamnet.compiler.languages.c import stack_bytes
 from wamnet.kernels.export import tools
-from wamnet.kernels.export.hosts import scratch
+from wamnet.kernels.export.hosts.headers import stack_of
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization, Window
@@ -94,7 +94,7 @@ def test_no_call_takes_more_stack_than_its_header_states(tmp_path, schedule, com
     made = written(tmp_path, schedule)
     stated = int(re.search(r"stack: (\d+) bytes", made.denoiser.source)[1])
     assert f"up to {stated:,} bytes" in made.contents()["README.md"].decode()
-    assert stated == stack_bytes(made.denoiser.manifest["private_bytes"]) == scratch.stack_of(made.denoiser)
+    assert stated == stack_bytes(made.denoiser.manifest["private_bytes"]) == stack_of(made.denoiser)
     (tmp_path / "one.c").write_text('#include "denoise.h"\nvoid *one = (void *)wamnet_image;\n')
     for options in (("-O0",), ("-O2",)):
         tools.run(compiler, *options, "-w", "-fstack-usage", "-c", "one.c", folder=tmp_path)

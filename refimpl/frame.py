@@ -102,9 +102,10 @@ SEEN_DIRECT = "seen_direct"
 LIT = (DIRECT, SEEN_DIRECT)
 """The layers of direct light with shadows."""
 
-REMEDIES = dict.fromkeys(
-    LIT, "render it: --shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it"
-)
+REMEDIES = {
+    DIRECT: "render it: --shadow-rays 1, or shadow_rays=1; bundled models named -basic do without it",
+    SEEN_DIRECT: "render it: --seen --shadow-rays 1, or seen=True, shadow_rays=1",
+}
 """What helps where a frame lacks a layer, if it is not as usual."""
 
 USUAL = tuple(name for name in LAYERS if name not in (*SEEN, *HISTORY, SUN, DIRECT, SEEN_DIRECT))

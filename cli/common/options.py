@@ -150,8 +150,8 @@ SHARED: Mapping[str, str] = {
     "samples.",
     "feature_spp": "--feature-spp N  Stratified camera rays per pixel for the features; 4 give smooth edges, "
     "and each costs a fraction of a path. [default: same as --spp]",
-    "shadow_rays": "--shadow-rays N  Also write the layer direct: direct light with its soft shadows, by N "
-    "shadow rays per camera ray.",
+    "shadow_rays": "--shadow-rays N  Also write the layer direct (with --seen seen_direct too): direct light "
+    "with its soft shadows, by N shadow rays per camera ray.",
     "seen": "--seen  Also write specular features, traced through mirrors and glass: seen_albedo, "
     "seen_normal, ...",
 }

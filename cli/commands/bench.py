@@ -16,7 +16,7 @@ from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.network.denoise import Model
 from ..common import packages
 from ..common.effort import said_of_measuring
-from ..common.executors import fastest
+from ..common.executors import chosen
 from ..common.inputs import load_model, trained_scene
 from ..common.options import ExecutorName, argument, option, parse_names
 from ..common.terminal import hint_on_interrupt, progress, say, table
@@ -183,7 +183,7 @@ class Wanted:
         else:
             pairs = tuple(bench_frames.for_training(network, self.output))
         folder = bench_forms.folder_of(network, self.output)
-        return bench_forms.trained(network, forms, pairs, folder, fastest(trains=True, work="trainer"))
+        return bench_forms.trained(network, forms, pairs, folder, chosen(trains=True, work="trainer"))
 
     def request(self, name: str, network: Model, frames: Frames) -> Request:
         """Return what is to be measured."""

@@ -21,7 +21,7 @@ from ...refimpl.frame import Frame
 from ...refimpl.light.render import FEATURE_SAMPLER
 from ...refimpl.light.variation import RANGES, ranges_from_json
 from ...refimpl.network.denoise import Model, learned_feature_spp, learned_shadow_rays
-from ..common.executors import fastest
+from ..common.executors import chosen
 from ..common.inputs import trained_scene, unlike_training
 from ..common.terminal import say
 from ..files import dataset_files, exr
@@ -123,7 +123,7 @@ def _first(model: Model, name: str, otherwise: int) -> int:
 
 def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Frames:
     """Return test frames (size, size) of the model's scene, rendered where they are missing."""
-    executor = fastest(work="renderer")
+    executor = chosen(work="renderer")
     # Where no kernel runs more samples would take an hour.
     spp = min(spp, 32) if executor == "numpy" else spp
     # A data set has a training frame at least; the shortest one.
@@ -135,7 +135,7 @@ def rendered(model: Model, folder: Path, size: int, count: int, spp: int) -> Fra
 
 def for_training(model: Model, folder: Path) -> Sequence[Pair]:
     """Return training frames of the model's scene, rendered where they are missing."""
-    executor = fastest(work="renderer")
+    executor = chosen(work="renderer")
     place = folder / f"training-{trained_scene(model)}-{TRAINING_PX}"
     numbers = {"frames": TRAINING_FRAMES, "test_frames": 0, "spp": TRAINING_SPP, "size_px": TRAINING_PX}
     _make(place, request_for(model, executor, seed=1 << 30, **numbers))

@@ -103,8 +103,8 @@ class Executor(Closing, ABC):
     homes of weights, apart from the target's usual one, whose kernels it runs
     [compiler/kernel/interface.py]. `paints`: it runs path kernels that write encoded images;
     `smooths`: it filters a frame, and adds a picture to a history, in far less time than the reference.
-    `interprets`: it runs programs as they are, without kernels. `software`: a graphics library's own renderer
-    on the processor, slower than the reference. `largest_bytes`: those of an image, where there is a limit.
+    `interprets`: it runs programs as they are, without kernels.
+    `largest_bytes`: those of an image, where there is a limit.
     """
 
     name: str
@@ -120,7 +120,6 @@ class Executor(Closing, ABC):
     paints: bool = False
     smooths: bool = False
     interprets: bool = False
-    software: bool = False
     largest_bytes: int = 0
 
     def __init__(self) -> None:

@@ -60,11 +60,8 @@ HOW_TO_GET = {
 """What to do when a kind of context cannot be had, in Debian's words."""
 
 
-SOFTWARE = (llvmpipe.NAME, "softpipe", "swrast", "SwiftShader")
-"""Renderers on the processor, by what their names contain."""
-
 SOFTWARE_SCHEDULE = "fftpasses:32"
-"""Schedule of a denoiser there: a twelfth of the operations, and short programs, which compile in seconds."""
+"""Schedule of a denoiser on llvmpipe: a twelfth of the operations, and programs that compile in seconds."""
 
 SOFTWARE_PIXELS = 2**14
 """Pixels of the smallest picture for which that is compiled: llvmpipe takes two seconds, in which the plain
@@ -101,7 +98,6 @@ class OpenGLExecutor(Executor):
         # current, and do nothing when it is asked to change.
         with self._context:
             self.device = f"{self._context.info['GL_RENDERER']} through {kind}"
-        self.software = any(name in self.device for name in SOFTWARE)
         computes = self._context.version_code >= SHADER_VERSION
         if llvmpipe.NAME in self.device and computes:
             self.schedule_pixels = SOFTWARE_PIXELS

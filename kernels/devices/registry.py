@@ -31,7 +31,11 @@ OPTIONS: Mapping[str, tuple[Mapping[str, str], ...]] = {"opengl": ({"context": "
 """Options of executors that can be opened in several ways, each perhaps another driver."""
 
 FASTEST = ("opencl", "c", "opengl")
-"""Executors that may be faster than NumPy, the fastest first, as measured (docs/speed.md)."""
+"""Executors that are faster than NumPy, the fastest first, as measured (docs/speed.md); each chooses its
+schedule by its device. Exports have the lists of export/targets.py, the fastest first."""
+
+SLOW = "softpipe"
+"""A renderer that interprets shaders, and is slower than NumPy."""
 
 WAYS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "-".join((name, *options.values())): (name, options)
@@ -70,8 +74,8 @@ def fastest(trains: bool = False) -> tuple[str, list[str]]:
     for name in FASTEST:
         try:
             with open_executor(name) as executor:
-                if executor.software:
-                    reasons.append(f"{name}: {executor.device} is a software renderer, slower than NumPy")
+                if SLOW in executor.device:
+                    reasons.append(f"{name}: {executor.device} interprets shaders, slower than NumPy")
                 elif trains and not executor.trains:
                     reasons.append(f"{name}: it does not train")
                 else:

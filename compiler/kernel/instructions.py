@@ -306,13 +306,23 @@ def gnu_vectors(lanes: str) -> str:
     return f"typedef float wamnet_vector {kind};\n\n{functions(VECTOR_CALLS, False)}"
 
 
-VECTORS = f"""\
+CLONES = """\
 /* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \\
     !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
 #define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #endif
-/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
+"""
+"""The attribute of functions on vectors; on x86 without AVX2 its copy is slow: define WAMNET_PORTABLE."""
+
+CLONED = """\
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
+#endif"""
+"""The attribute of the function that is declared next."""
+
+VECTORS = f"""\
+{CLONES}/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
 #if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \\
     defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
 {gnu_vectors("LANES")}#else
@@ -321,12 +331,17 @@ typedef struct {{
 }} wamnet_vector;
 
 {functions(VECTOR_CALLS, True)}#endif
-#if defined(WAMNET_CLONES)
-WAMNET_CLONES
-#endif
+{CLONED}
 """
-"""The type of vectors and what is done with them, by GCC and clang, and by other compilers; and the attribute
-of the function that is declared next. On x86 without AVX2 define WAMNET_PORTABLE: the copy for it is slow."""
+"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
+
+
+def transform_vectors(lanes: str) -> str:
+    """Return GCC's vectors, and the attribute of the functions of transforms, which are defined behind it."""
+    takes = "(const wamnet_vector *from, int step, wamnet_vector *to, int leap);"
+    declared = (f"{CLONED}\nstatic void wamnet_{name}{takes}" for name in ("forward", "backward"))
+    return "\n".join([f"{CLONES}{gnu_vectors(lanes)}", *declared])
+
 
 REFUSED = """\
 #if !defined(__GNUC__)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from ..core.profiles import SineContract
 from ..kernel.instructions import (
     C_TILE,
+    CLONED,
     FUSED,
     PRAGMAS,
     REFUSED,
@@ -23,7 +24,7 @@ from ..kernel.instructions import (
     STRAIGHT,
     UNFUSED,
     VECTORS,
-    gnu_vectors,
+    transform_vectors,
 )
 from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Array, Interface
 from ..kernel.kernel import Kernel, operations
@@ -219,9 +220,8 @@ class C(Arguments):
         elif kernel.weights.lanes == 1:
             above = [*head, UNFUSED, top]
         elif kernel.functions:
-            sizes, functions = top.split("\nstatic void", 1)
-            vectors = gnu_vectors(str(kernel.weights.lanes))
-            above = [*head, REFUSED, FUSED, STRAIGHT, vectors, sizes, f"static void{functions}"]
+            vectors = transform_vectors(str(kernel.weights.lanes))
+            above = [*head, REFUSED, FUSED, STRAIGHT, vectors, top, CLONED]
         else:
             above = [*head, FUSED, top, STRAIGHT, VECTORS]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."

@@ -14,6 +14,7 @@ from functools import cache
 from ..kernel.instructions import (
     BUILTINS,
     C_TILE,
+    CLONED,
     CUDA_GROUP,
     CUDA_VECTOR,
     FUSED,
@@ -27,7 +28,7 @@ from ..kernel.instructions import (
     VULKAN_EXTENSION,
     VULKAN_GROUP,
     WGSL_GROUP,
-    gnu_vectors,
+    transform_vectors,
 )
 from ..kernel.interface import ITEMS
 
@@ -200,10 +201,12 @@ FRAMES: dict[str, str] = {
 @|@{FUSED}
 @>@
 @(@@gnu@{STRAIGHT}
-{gnu_vectors("@lanes@")}
+{transform_vectors("@lanes@")}
 @)@
 @constants@
 @functions@
+@(@@gnu@{CLONED}
+@)@
 @(@@tiled@{STRAIGHT}
 {VECTORS}
 @|@@words@

@@ -38,6 +38,11 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
+/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
+    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+#define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#endif
 typedef float wamnet_vector __attribute__((vector_size(4 * 4), aligned(4), may_alias));
 
 static inline void wamnet_clear(wamnet_vector *to)
@@ -65,6 +70,14 @@ static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *w
     *sum += *weight * value;
 }
 
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
+#endif
+static void wamnet_forward(const wamnet_vector *from, int step, wamnet_vector *to, int leap);
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
+#endif
+static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *to, int leap);
 #define WINDOW_SIZE 2
 #define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
 #define POINTS 4 /* rows and columns of a tile with what its windows reach */
@@ -143,6 +156,9 @@ static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *
     to[leap * 4] = t18;
     to[leap * 4 + 1] = t19;
 }
+#if defined(WAMNET_CLONES)
+WAMNET_CLONES
+#endif
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
    to `result`, the whole image's array. */
 static inline void wamnet_pixel(

@@ -8,7 +8,8 @@
    turns for some rounds [`timed`]. PyTorch does the same with the same network [`by_torch`]. Processes
    compile beside each other, and one at a time has the device [`alone`].
 4. Without a GPU the same runs on software: PoCL, Mesa, and CUDA C as C++ (a rehearsal: no times of a GPU).
-   On a processor `--only` names C's kernels too, and these as WebAssembly in Node [`by_node`].
+   On a processor `--only` names C's kernels too, as an export's user compiles them, and as WebAssembly in
+   Node [`by_node`]. Processor time is kept beside a clock's: it does not grow with what else runs [`spent`].
 
     python experiments/gpu.py --prepare --prepared DIR   # for a machine without glslang, in less time there
     python experiments/gpu.py --prepared DIR
@@ -23,6 +24,7 @@ import fcntl
 import hashlib
 import json
 import os
+import resource
 import selectors
 import statistics
 import subprocess
@@ -58,7 +60,7 @@ from wamnet.kernels.devices.kernel import shapes
 from wamnet.kernels.devices.registry import open_executor
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.gl_runner import ComputeRunner
-from wamnet.kernels.export.host_runner import CUDARunner
+from wamnet.kernels.export.host_runner import CRunner, CUDARunner
 from wamnet.kernels.export.wgpu_runner import WgpuRunner
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError, WamnetError
@@ -110,12 +112,14 @@ class Way:
     """How a language is run: what opens its executor, in order of preference, and its schedules.
 
     `alone`: schedules that are each a process of their own, since their compilation may not end.
+    `target`: the compiler's, where it has another name; such a row has its own schedules only.
     """
 
     openers: tuple[Callable[[argparse.Namespace], Executor], ...]
     schedules: tuple[str, ...]
     alone: tuple[str, ...] = ()
     models: tuple[str, ...] = FLOATS
+    target: str = ""
 
 
 def spirv(source: str, folder: Path | None) -> bytes:
@@ -132,6 +136,9 @@ def spirv(source: str, folder: Path | None) -> bytes:
 GROUPS = ("plain", "group:1", "group:2", "group:4")
 """Schedules for graphics processors, and the simplest."""
 
+EXPORTED = ("tile:8", "fft:8")
+"""Schedules of C that are compiled as an export's user does."""
+
 WAYS: Mapping[str, Way] = {
     "cuda": Way(
         (lambda _: NvccRunner(), lambda _: CUDARunner()),
@@ -146,6 +153,8 @@ WAYS: Mapping[str, Way] = {
         (*FLOATS, "minicubes, integers", "minicubes, rank 16"),
     ),
     "c": Way((lambda _: open_executor("c"),), ()),
+    "c header -O2": Way((lambda _: CRunner("-O2"),), EXPORTED, target="c"),
+    "c header -O3 -march=native": Way((lambda _: CRunner("-O3", "-march=native"),), EXPORTED, target="c"),
     "opengl": Way((lambda _: open_executor("opengl", context="egl"),), GROUPS),
     "glsl-compute": Way((lambda _: Compute("egl"),), GROUPS),
     "wgsl": Way((lambda _: Wgpu(),), GROUPS),
@@ -153,7 +162,7 @@ WAYS: Mapping[str, Way] = {
 }
 """By target."""
 
-GPU_WAYS = tuple(language for language in WAYS if language != "c")
+GPU_WAYS = tuple(language for language in WAYS if not language.startswith("c") or language == "cuda")
 """What runs on graphics processors."""
 
 TORCH, NODE = "torch", "webassembly"
@@ -174,7 +183,8 @@ def network(name: str) -> tuple[Model, str]:
 def planned(name: str, target: str, schedule: str) -> Plan:
     """Return the plan of a network."""
     model, variant = network(name)
-    return replace(plan_model(model, target, "ieee", schedule, variant), proves=False)
+    named = WAYS[target].target or target if target in WAYS else target
+    return replace(plan_model(model, named, "ieee", schedule, variant), proves=False)
 
 
 def images_for(name: str, size: tuple[int, int]) -> dict[str, Picture]:
@@ -287,16 +297,25 @@ def alone(given: argparse.Namespace) -> Iterator[None]:
         yield
 
 
+def spent() -> float:
+    """Return the seconds of processors that this process and its compilers have taken."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 def timed(ways: Mapping[str, tuple[Callable[[int], float], dict[str, Any]]], rounds: int) -> None:
     """Time kernels in turns, and tell."""
     counts = {name: launches_of(seconds) for name, (seconds, _) in ways.items()}
     taken: dict[str, list[float]] = {name: [] for name in ways}
+    worked: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(rounds):
         for name, (seconds, _) in ways.items():
+            before = spent()
             taken[name].append(seconds(counts[name]) / counts[name] * 1000)
+            worked[name].append((spent() - before) / counts[name] * 1000)
     for name, (_, facts) in ways.items():
         told = {"ms": statistics.median(taken[name]), "least": min(taken[name]), "most": max(taken[name])}
-        tell(name, {**facts, **told, "rounds": rounds})
+        tell(name, {**facts, **told, "processor_ms": statistics.median(worked[name]), "rounds": rounds})
 
 
 def proven(artifact: Artifact, plan: Plan) -> dict[str, Any]:
@@ -316,7 +335,7 @@ def answer(language: str, name: str, names: Sequence[str], given: argparse.Names
             """Return a kernel that is built; None where another schedule stands in, or says what is wrong."""
             try:
                 artifact = compile_plan(plans[schedule])
-                start = time.perf_counter()
+                start, before = time.perf_counter(), spent()
                 if artifact.manifest["schedule"]["name"] != schedule:
                     return None
                 executor.build(artifact)
@@ -325,6 +344,7 @@ def answer(language: str, name: str, names: Sequence[str], given: argparse.Names
                 tell(f"{language}, {schedule}, {name}", {**facts[schedule], **missing})
                 return None
             facts[schedule] |= {"compile_s": time.perf_counter() - start, **proven(artifact, plans[schedule])}
+            facts[schedule]["first_s"] = spent() - before
             return artifact
 
         # nvcc is a program: several compile at once.
@@ -336,7 +356,10 @@ def answer(language: str, name: str, names: Sequence[str], given: argparse.Names
                 if artifact is None:
                     continue
                 with alone(given):
-                    pictures = [executor.run(artifact, images) for images in (odd, large)]
+                    before = spent()
+                    pictures = [executor.run(artifact, large)]
+                    facts[schedule]["first_s"] += spent() - before
+                    pictures.insert(0, executor.run(artifact, odd))
                 facts[schedule] |= checked(plans[schedule], name, pictures, (odd, large), given.prepared)
                 kept = Kept.of(executor, artifact, large)
                 made.callback(kept.close)
@@ -418,11 +441,13 @@ def by_node(name: str, schedules: Sequence[str], given: argparse.Namespace) -> N
                 "device": f"Node {told['version']}, one thread",
                 "schedule": schedule,
                 "compile_s": told["first"] - statistics.median(told["taken"]),
+                "first_s": told["first"],
                 **proven(artifact, plan),
                 **checked(plan, name, (small, picture), (odd, large), given.prepared),
                 "ms": statistics.median(ms),
                 "least": min(ms),
                 "most": max(ms),
+                "processor_ms": 1000 * statistics.median(told["worked"]),
                 "rounds": given.rounds,
             },
         )
@@ -437,7 +462,7 @@ def tasks(given: argparse.Namespace) -> Iterator[tuple[str, str, tuple[str, ...]
     for language, way in asked_for.items():
         for name in way.models:
             if name in given.models:
-                yield language, name, given.schedules or way.schedules
+                yield language, name, way.schedules if way.target else given.schedules or way.schedules
     if NODE in given.only:
         for name in FLOATS:
             if name in given.models:

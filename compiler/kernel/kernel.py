@@ -484,3 +484,20 @@ def integer(kernel: Kernel, value: Expr | int) -> int:
     if not -(2**31) <= found < 2**31:
         raise ArithmeticError(f"{found}, which int32 does not hold")
     return found
+
+
+def terms(value: Expr) -> list[tuple[Expr, int]]:
+    """Return the terms of a sum of integers, each with 1 or -1; a difference that is subtracted stays one."""
+    if value.op == "add" and value.type == INT:
+        return [*terms(value.args[0]), *terms(value.args[1])]
+    if value.op == "subtract" and value.type == INT:
+        return [*terms(value.args[0]), (value.args[1], -1)]
+    return [(value, 1)]
+
+
+def total(values: list[tuple[Expr, int]]) -> Expr:
+    """Return the sum of terms, from the left."""
+    (result, _), *rest = values
+    for value, sign in rest:
+        result = Expr("add" if sign > 0 else "subtract", (result, value), INT)
+    return result

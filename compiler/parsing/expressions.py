@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS
-from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name, parts
-from .canonical import terms, total
+from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name, parts, terms, total
 from .grammar import BINARY, COMPARED, PRODUCTS, SHIFTS
 from .reader import Reader, Unread
 
@@ -51,7 +50,10 @@ class Expressions(Reader):
         self._check_vectors("?", chosen)
         if condition.type.lanes > 1 and not self.language.casts:
             raise Unread("a vector of conditions in front of ?")
-        return self._made("select", condition, chosen, *self._form(": E"))
+        (other,) = self._form(": E")
+        if condition.op in ("less", "greater") and condition.args == (chosen, other):
+            return self._made("minimum" if condition.op == "less" else "maximum", other, chosen)
+        return self._made("select", condition, chosen, other)
 
     def _binary(self, level: int) -> Expr:
         """Read operators of a level, from the left."""
@@ -80,7 +82,7 @@ class Expressions(Reader):
         if self._has("-"):
             value = self._unary()
             self._check_vectors("-", value)
-            return self._made("negative", value)
+            return const(-value.value, value.type) if value.op == "const" else self._made("negative", value)
         if self.in_floats and self._has("*", "("):
             self._has("const")
             self._form("wamnet_vector * ) (")

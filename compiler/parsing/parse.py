@@ -2,7 +2,7 @@
 
 1. What surrounds the statements is compared word for word [frames.py]; statements and expressions have the
    closed grammar below, in which each language has few words of its own [grammar.py].
-2. A kernel that was read is in canonical form [canonical.py], and is verified.
+2. A kernel that was read is verified.
 3. Nothing is guessed: a name without declaration, a call that is not in the language's list, a number that is
    written in another way raise an `Unread`.
 """
@@ -18,7 +18,6 @@ from typing import Any, Literal
 from ..kernel import kernel as tree
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.verify import KernelError, verify
-from .canonical import canonical
 from .expressions import Expressions, rounds
 from .frames import COMMENT, FRAMES, frame, lines_of, parts_of
 from .grammar import CALLS, CONSTANT, FUNCTION, LANGUAGES, PRODUCTS
@@ -51,7 +50,7 @@ def parse(
     bounded: bool = False,
     passes: Passes | None = None,
 ) -> tree.Kernel:
-    """Return the canonical kernel of a source.
+    """Return the kernel of a source.
 
     `channels` of the images and of the result by name, where the source does not state them: of textures.
     `bounded`: it must say what an error bound rests on, where its language lets it. `passes`: what a manifest
@@ -86,7 +85,7 @@ def parse(
     parser = Parser(LANGUAGES[language], parts, dict(channels or {}))
     parser.bounded, parser.passes = bounded, passes
     try:
-        kernel = canonical(parser.kernel())
+        kernel = parser.kernel()
         verify(kernel)
     except (KernelError, RecursionError) as error:
         raise Unread(str(error)) from error
@@ -108,7 +107,7 @@ class Parser(Expressions):
     # ---- the whole ---------------------------------------------------------------------------------------
 
     def kernel(self) -> tree.Kernel:
-        """Return the kernel, not yet in canonical form."""
+        """Return the kernel."""
         parts = self.parts
         images = self._images(parts["images"])
         constants = tuple(map(self._constant, parts.get("constants", "").splitlines()))
@@ -201,9 +200,7 @@ class Parser(Expressions):
         self._take("{")
         if not FUNCTION.fullmatch(key) or key in self.functions:
             raise Unread(f"{key!r} is not a function of a kernel, or its second one")
-        body, result = [], None
-        while self._now() not in ("return", "}"):
-            body.append(self._statement())
+        body, result = self._statements("return", "}"), None
         if kind:
             self._take("return")
             result = self._of(self._expression(), kind, key)
@@ -213,7 +210,7 @@ class Parser(Expressions):
             self._take(";")
         self._take("}")
         self.scope = outer
-        self.functions[key] = tree.Function(key, tuple(takes), tuple(body), result)
+        self.functions[key] = tree.Function(key, tuple(takes), body, result)
 
     def _argument(self) -> tuple[str, tree.Type]:
         """Read an argument's name and type."""
@@ -271,16 +268,28 @@ class Parser(Expressions):
         self.depth += 1
         if self.depth > DEEPEST:
             raise Unread(f"more than {DEEPEST} blocks in each other")
-        statements: list[tree.Statement] = []
-        while self._now() != end:
-            statements.append(self._statement())
+        statements = self._statements(end)
         if end:
             self._take(end)
             if not statements:
                 raise Unread("an empty block")
         self.scope = outer
         self.depth -= 1
-        return tuple(statements)
+        return statements
+
+    def _statements(self, *ends: str) -> tree.Body:
+        """Read statements up to one of some words; what one declares and another one sets is a variable."""
+        statements: list[tree.Statement] = []
+        while self._now() not in ends:
+            pixel = self.at < len(self.tokens) and self.tokens[self.at][0] == "pixel"
+            statements += self._written() if pixel else [self._statement()]
+        stored = {each.array for each in tree.walk(tuple(statements)) if isinstance(each, tree.Store)}
+        return tuple(
+            tree.Array(each.name, each.value.type, value=each.value)
+            if isinstance(each, tree.Let) and each.name in stored
+            else each
+            for each in statements
+        )
 
     def _statement(self) -> tree.Statement:
         """Read a statement."""
@@ -288,8 +297,6 @@ class Parser(Expressions):
             self.at += 1
             if self._now() != "for":
                 raise Unread("an unrolled statement that is not a loop")
-        if self.at < len(self.tokens) and self.tokens[self.at][0] == "pixel":
-            return self._written()
         if self._has("{"):
             return tree.Block(self._body())
         if self._has("for", "("):
@@ -306,7 +313,7 @@ class Parser(Expressions):
         self._take(";")
         return statement
 
-    def _written(self) -> tree.Write:
+    def _written(self) -> list[tree.Store]:
         """Read how a pixel of the result is written at once."""
         self._take()
         values: list[tree.Expr] = []
@@ -314,7 +321,7 @@ class Parser(Expressions):
             values += self._form(f"color [ {len(values)} ] = E ;")
             self._check_order("color", values[-1], "")
         column, row = self._form("imageStore ( result , ivec2 ( E , E ) , color ) ;")
-        return tree.Write(row, column, tuple(values))
+        return [tree.Store(RESULT, (row, column, tree.const(c)), value) for c, value in enumerate(values)]
 
     def _for(self) -> tree.For:
         """Read a counted loop."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...refimpl.reading import read_file
-from ..kernel.interface import IMAGE, ITEMS, RESULT
+from ..kernel.interface import IMAGE, ITEMS, RESULT, WEIGHTS
 from ..kernel.kernel import (
     INT,
     Array,
@@ -267,7 +267,7 @@ def parsed(source: str, manifest: Any) -> Kernel:
 def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
     """Refuse a kernel of other images, channels or work items than hosts have for it."""
     schedule = manifest["schedule"]
-    arrays = {array.name: int(array.shape[-1]) for array in kernel.interface.arrays}
+    arrays = {a.name: int(a.shape[-1]) for a in kernel.interface.arrays if a.name != WEIGHTS}
     wanted = {f"{IMAGE}{name}": n for name, n in claim.images}
     if list(arrays.items()) != [*wanted.items(), (RESULT, int(manifest["output"]["channels"]))]:
         raise Wrong("its arguments are not the images, the weights, the result, width and height")

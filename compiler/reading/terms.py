@@ -68,7 +68,7 @@ class Term:
     `kind` is its type. `literal`: what a constant is. `factors`: of a product with that, which is a term of a
     sum if need be. `span`: of an integer, whose value is that of its `sums`, with signs in both rows, and of
     a float that is one. `leaf`: shapes of an integer that differs between lanes and is these numbers plus its
-    `sums`. `compared`: a and b of a < b. `folded`: the same for all lanes, once it has been made.
+    `sums`. `folded`: the same for all lanes, once it has been made.
     """
 
     shape: Words | None
@@ -79,7 +79,6 @@ class Term:
     factors: tuple[Term, Term] | None = None
     span: Span | None = None
     leaf: Words | None = None
-    compared: tuple[Term, Term] | None = None
     folded: Term | None = None
 
     @property
@@ -235,15 +234,7 @@ def expression(name: str, *operands: Term, commutes: bool = False) -> Words:
 
 
 def select(where: Term, a: Term, b: Term) -> Term:
-    """Return one of two numbers by a truth of numbers: the minimum or the maximum, if these were compared.
-
-    Of NaN they differ; no number of a certified program is NaN.
-    """
-    if where.compared:
-        less, more = (part.known for part in where.compared)
-        for one, other, name in ((less, more, "minimum"), (more, less, "maximum")):
-            if np.all(a.known == one) and np.all(b.known == other):
-                return Term(expression(name, a, b, commutes=True), kind=a.kind)
+    """Return one of two numbers by a truth of numbers."""
     return Term(expression("select", where, a, b), kind=a.kind)
 
 
@@ -251,8 +242,7 @@ def compared(what: str, a: Term, b: Term) -> Term:
     """Return the truth of a comparison."""
     if what.startswith("greater"):
         a, b, what = b, a, what.replace("greater", "less")
-    order = (a, b) if what == "less" else None
-    return Term(expression(what, a, b), kind="bool", compared=order)
+    return Term(expression(what, a, b), kind="bool")
 
 
 def chosen(where: NDArray[np.bool_], a: Term, b: Term) -> Term:

@@ -31,8 +31,8 @@ from wamnet.compiler.kernel.kernel import (
 )
 from wamnet.compiler.kernel.run import run
 from wamnet.compiler.kernel.verify import KernelError, verify
+from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.languages.renderer import Renderer
-from wamnet.compiler.parsing.canonical import canonical
 from wamnet.compiler.parsing.parse import Unread, parse
 from wamnet.compiler.targets import language_named
 
@@ -259,7 +259,7 @@ def read_back(source: Any, kernel: Kernel, language: str, what: str, likely: str
     told = f"the {language} source of {what}"
     channels = {array.name: 1 for array in kernel.interface.arrays}
     try:
-        found = parse(whole, language, channels)
+        found = canonical(parse(whole, language, channels))
     except (Unread, RecursionError) as error:
         likely = next((why for word, why in OF_SOURCES.items() if word in str(error)), likely)
         raise Wrong("KER-26", told, body.strip(), f"{source.strip()[:200]}: {error}", likely) from None

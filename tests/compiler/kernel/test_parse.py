@@ -35,6 +35,7 @@ from wamnet.compiler.kernel.kernel import (
     name,
 )
 from wamnet.compiler.languages.c import C
+from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.languages.cuda import CUDA
 from wamnet.compiler.languages.glsl import GLSL
 from wamnet.compiler.languages.glsl_buffers import Vulkan
@@ -42,7 +43,6 @@ from wamnet.compiler.languages.metal import Metal
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.languages.wgsl import WGSL
-from wamnet.compiler.parsing.canonical import canonical
 from wamnet.compiler.parsing.expressions import binds
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import Unread, parse
@@ -66,7 +66,8 @@ X, Y, F, G, N, M = name("x"), name("y"), *(name(n, FLOAT) for n in "fg"), *map(n
 def read(source, target, kernel):
     """Return a source's kernel; textures do not state their channels."""
     arrays = kernel.interface.arrays
-    return parse(source, target, {a.name: a.shape[-1] for a in arrays} if target == "opengl" else None)
+    found = parse(source, target, {a.name: a.shape[-1] for a in arrays} if target == "opengl" else None)
+    return canonical(found)
 
 
 def tiled(program, target, lanes=4, pixels=3, vectors=2):
@@ -132,7 +133,7 @@ def read_back(source, target, kernel, passes=None):
     """Return a source's kernel; some languages' textures do not state their channels."""
     channels = {a.name: a.shape[-1] for a in kernel.interface.arrays}
     rounds = "dot4" not in str(kernel.body)
-    return parse(source, target, channels if GRAMMARS[target].texels else None, rounds, passes)
+    return canonical(parse(source, target, channels if GRAMMARS[target].texels else None, rounds, passes))
 
 
 # ---- what no schedule says ---------------------------------------------------------------------------------
@@ -357,7 +358,7 @@ def test_refused(tiny, old, new, reason):
     kernel = replace(kernel, constants=(*kernel.constants, Constant("PIXELS", const(3))))
     source = rendered(kernel, "opencl", pack(tiny))
     channels = {"image_a": 1}
-    assert parse(source, "opencl", channels) == canonical(kernel)
+    assert canonical(parse(source, "opencl", channels)) == canonical(kernel)
     with pytest.raises(Unread, match=reason):
         parse(source.replace(old, new, 1), "opencl", channels)
 

@@ -1,4 +1,4 @@
-"""The one form of kernels that differ only in what their sources do not show [parse.py].
+"""The one form of kernels that differ only in what their sources do not show [parsing/parse.py].
 
 Comments, order of operations that is kept, loops that compilers must unroll; the interface's integers and the
 place of the weights; sums of indices, which are written from the left; a value that a variable has for good;
@@ -16,9 +16,6 @@ import numpy as np
 from ..kernel import kernel as tree
 from ..kernel.interface import DENOISE, IMAGE, RESULT, Interface
 from ..kernel.kernel import integer
-
-Terms = list[tuple[tree.Expr, int]]
-"""Terms of a sum of integers, each with 1 or -1."""
 
 
 def canonical(kernel: tree.Kernel) -> tree.Kernel:
@@ -135,19 +132,19 @@ def _value(value: tree.Expr, names: Collection[str]) -> tree.Expr:
         return tree.Expr("load", (), value.type, value.value)
     value = replace(value, args=tuple(_value(each, names) for each in value.args))
     if value.op in ("add", "subtract") and value.type == tree.INT:
-        return total(terms(value))
+        return tree.total(tree.terms(value))
     if (
         value.op == "load"
         and value.value.startswith(IMAGE)
         and len(value.args) == 2
         and value.type == tree.FLOAT
     ):
-        first, *beyond = terms(
+        first, *beyond = tree.terms(
             value.args[1]
         )  # a row's position, as the pixel's column and a distance from it
         scaled = first[0].op == "multiply" and first[0].args[1].op == "const"
         column = first[0].args[0] if scaled else first[0]
-        return replace(value, args=(value.args[0], column, total(beyond)))
+        return replace(value, args=(value.args[0], column, tree.total(beyond)))
     return _shortened(value)
 
 
@@ -167,20 +164,3 @@ def _shortened(value: tree.Expr) -> tree.Expr:
     if op == "exp2" and args[0].op == "multiply" and args[0].args[1].op == "log2":
         return tree.Expr("power", (args[0].args[1].args[0], args[0].args[0]), value.type)
     return value
-
-
-def terms(value: tree.Expr) -> Terms:
-    """Return the terms of a sum of integers; a difference that a term has to subtract stays one."""
-    if value.op == "add" and value.type == tree.INT:
-        return [*terms(value.args[0]), *terms(value.args[1])]
-    if value.op == "subtract" and value.type == tree.INT:
-        return [*terms(value.args[0]), (value.args[1], -1)]
-    return [(value, 1)]
-
-
-def total(values: Terms) -> tree.Expr:
-    """Return the sum of terms, from the left."""
-    (result, _), *rest = values
-    for value, sign in rest:
-        result = tree.Expr("add" if sign > 0 else "subtract", (result, value), tree.INT)
-    return result

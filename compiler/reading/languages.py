@@ -11,17 +11,18 @@ TITLES: Mapping[str, str] = {
 }  # fmt: skip
 """What a language's name in manifests begins with."""
 
-GROUPS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group",))
-"""Languages of which work groups are read, with floats and with integers."""
+BUFFERS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group", "tile"))
+"""Languages of which work groups and register tiles are read."""
 
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
-    **GROUPS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "opengl": ("fftpasses",),
-    "glsl-vulkan": ("group", "fftpasses"),
+    **BUFFERS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed",),
+    "opengl": ("group", "fftpasses"), "glsl-vulkan": ("group", "tile", "fftpasses"),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 
 OF_INTEGERS: Mapping[str, tuple[str, ...]] = {
-    **GROUPS, "opencl": ("tile", "vector", "group", "dot"), "c": ("tile", "dot"),
+    **BUFFERS, "opencl": ("tile", "vector", "group", "dot"), "c": ("tile", "dot"),
+    "glsl-vulkan": ("group",), "wgsl": ("group",),
 }  # fmt: skip
 """The same of networks of integers."""
 

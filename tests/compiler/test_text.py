@@ -43,14 +43,27 @@ def test_plain_texts_compute_what_is_certified(target, size, border, tmp_path):
 
 @pytest.mark.product
 @pytest.mark.parametrize(
-    ("target", "schedule"), [("c", "tile:8"), ("opencl", "tile:8"), ("opencl", "tile:16")]
-)
+    ("target", "schedule"),
+    [
+        ("c", "tile:8"), ("opencl", "tile:8"), ("opencl", "tile:16"), ("cuda", "tile:4"),
+        ("glsl-vulkan", "tile:4"), ("metal", "tile:4"), ("wgsl", "tile:4"),
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize("activation", ["sine", "relu"])
 def test_register_tiles_compute_what_is_certified(target, schedule, activation, tmp_path):
     path = kernel(tmp_path, target, schedule, activation=activation)
     pixels = json.loads((tmp_path / "manifest.json").read_text())["schedule"]["pixels"]
     assert pixels > 1
     assert check_text(path)["sums"] == pixels * 9
+
+
+@pytest.mark.parametrize(
+    ("target", "schedule"), [("glsl-es", "packed"), ("opengl", "group:1"), ("opengl", "group:4")]
+)
+def test_shaders_with_weights_in_texels_or_groups_compute_what_is_certified(target, schedule, tmp_path):
+    """TXT-7: every schedule of a language whose weights are read."""
+    pixels = 4 if schedule == "group:4" else 1
+    assert check_text(kernel(tmp_path, target, schedule))["sums"] == pixels * 9
 
 
 @pytest.mark.parametrize("target", ["c", "cuda", "opencl", "opengl", "wgsl"])

@@ -1,8 +1,8 @@
 """Integers that a text adds up, and words of 32 bits that hold four of them as bytes.
 
 1. An integer with a span [terms.py] lies in it, in every lane, and its two field elements are that integer's.
-   Its sums and products with known integers stay exact while they stay in 32 bits, which the span shows
-   [`operate`]. Nothing rounds: what cancels may, so that both rows have signs.
+   Its sums stay exact while they stay in 32 bits, which the span shows [`operate`]. Nothing rounds: both rows
+   have signs.
 2. The weights of such kernels are known: they are read bit by bit, as what a text takes them for [`Stored`].
 3. A word is a vector of its four bytes, with signs, the lowest first [`packed`].
 4. What instructions add to a sum is four products of bytes [`dots`].
@@ -17,7 +17,6 @@ import base64
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -56,44 +55,25 @@ def spans(ok: NDArray[np.bool_], low: Any, high: Any) -> Span | None:
     return (np.where(ok, low, 1), np.where(ok, high, 0)) if ok.any() else None
 
 
-def ends(what: str, a: Span, b: Span, kind: Any = np.int64) -> Span:
-    """Return the least and the largest sum, difference or product."""
-    (p, q), (r, s) = ([end.astype(kind) for end in span] for span in (a, b))
-    if what == "add":
-        return p + r, q + s
-    if what == "subtract":
-        return p - s, q - r
-    corners = [x * y for x in (p, q) for y in (r, s)]
-    return reduce(np.minimum, corners), reduce(np.maximum, corners)
-
-
 def operate(what: str, a: Term, b: Term, fold: Callable[[Term], Term], wrong: Wrongs) -> Term:
-    """Return the sum, difference or product of two integers: exact where their spans show that it is."""
+    """Return the sum, difference or product of two integers: a sum is exact where their spans show it."""
     kind = "uint32" if "uint32" in (a.kind, b.kind) else "int32"
-    if a.span is None or b.span is None or what == "multiply" or b.is_wide or a.leaf is None:
+    if what != "add" or a.span is None or b.span is None or b.is_wide or a.leaf is None:
         a, b = fold(a), fold(b)
     shape = expression(what, a, b, commutes=what != "subtract")
-    if a.span is None or b.span is None or a.sums is None or b.sums is None:
+    if what != "add" or a.span is None or b.span is None or a.sums is None or b.sums is None:
         return Term(shape, kind=kind)
-    both = (a.span[0] <= a.span[1]) & (b.span[0] <= b.span[1])
-    far = ends(what, a.span, b.span, np.float64)
-    fits = (far[0] >= LIMITS[kind][0]) & (far[1] <= LIMITS[kind][1])
+    low, high = (x + y for x, y in zip(a.span, b.span, strict=True))
+    both, (least, most) = (a.span[0] <= a.span[1]) & (b.span[0] <= b.span[1]), LIMITS[kind]
     if kind == "int32":
-        wrong(both & ~fits, "an integer may be beyond what int32 holds")
-    both = both & fits
-    if what == "multiply":
-        both = both & ((a.span[0] == a.span[1]) | (b.span[0] == b.span[1]))
-    sums: Words
-    if what == "multiply":
-        sums = aligned(lambda x, y: x % P * (y % P) % P, a.sums, b.sums)
-    else:
-        other = b.sums if what == "add" else P - b.sums % P
-        sums = aligned(np.add, a.sums, other) % P
+        wrong(both & ((low < least) | (high > most)), "an integer may be beyond what int32 holds")
+    both = both & (low >= least) & (high <= most)
     if not both.all():
         if a.leaf is not None:
             return operate(what, fold(a), b, fold, wrong)
-        sums = np.where(both, sums, drawn(shape))
-    return Term(shape, sums, kind=kind, span=spans(both, *ends(what, a.span, b.span)), leaf=a.leaf)
+        return Term(shape, kind=kind)
+    sums = aligned(np.add, a.sums, b.sums) % P
+    return Term(shape, sums, kind=kind, span=(low, high), leaf=a.leaf)
 
 
 # ---- conversions ------------------------------------------------------------------------------------------
@@ -112,29 +92,19 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     if not ranges.stated or (term.span is None and not whole):
         term = fold(term)
     span = term.span if whole or not ranges.stated else term.span or ranges.of(term.known)
-    good = np.zeros(term.known.shape, bool) if span is None else within(span, LIMITS[kind])
-    good = good & (term.shape is not None or whole)
-    if term.is_wide and not good.all():
-        return convert(replace(fold(term), span=span), kind, ranges, fold)
-    shape = expression("convert", term)
-    leaf = term.leaf
-    sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
-    if term.is_wide and not whole:
-        leaf = term.shape
-    if kind == "uint8" and not good.all():
+    good = span is not None and bool(within(span, LIMITS[kind]).all())
+    good = good and (term.shape is not None or whole)
+    if kind == "uint8" and not good:
         raise Wrong("it makes a byte of an integer that is none")
-    if sums is None or not good.any():
+    shape, leaf = expression("convert", term), term.leaf if whole or not term.is_wide else term.shape
+    sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
+    if sums is None or not good:
         return Term(shape, kind=kind)
-    if not good.all():
-        sums = np.where(good, sums, drawn(shape))
-    low, high = span or (1, 0)
-    return Term(shape, sums, kind=kind, span=spans(good, low, high), leaf=leaf)
+    return Term(shape, sums, kind=kind, span=span, leaf=leaf)
 
 
 def as_float(term: Term, found: Callable[[Term], Term], wrong: Wrongs) -> Term:
     """Return an integer as a float, which holds it; a sum may be one of the program's."""
-    if term.literal is not None:
-        return constant(term.literal)
     shape = expression("convert", term)
     if term.span is None:
         return Term(shape)
@@ -182,8 +152,8 @@ def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:
         assert one.span is not None
         row = (byte % np.int64(P)).astype(np.uint64)
         sums = (sums + aligned(lambda x, y: x * y % P, np.stack([row, row]), one.sums % P)) % P
-        first, last = ends("multiply", (byte, byte), one.span)
-        low, high = low + first, high + last
+        ends = byte * one.span[0], byte * one.span[1]
+        low, high = low + np.minimum(*ends), high + np.maximum(*ends)
     return Term(hashed("sum", *sums), sums, kind="int32", span=(low, high))
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS, NODE, inputs_of, places
 from ..proof.sine_checker import sine
-from .field import P, Words, drawn, hashed, literal, zero
+from .field import P, Words, drawn, hashed, literal
 from .integers import Ranges, Stored, filled, stated
 from .lanes import Lanes, Unread
 from .spectra import Tiles, patches
@@ -84,7 +84,7 @@ class Claim:
     ) -> None:
         self.text, self.lanes, self.pixels, self.stride = str(held["program"]), lanes, pixels, stride
         self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
-        self.exact = held["schema"] == INTEGERS
+        self.exact, self.count = held["schema"] == INTEGERS, len(raw)
         self.sine = self._sine(held)
         self.stated = stated(held)
         arrays = self.stated or (self._arrays(raw) if self.exact else {})
@@ -115,12 +115,13 @@ class Claim:
     def _arrays(self, raw: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
         """Return the parameters' numbers, all of which the file holds."""
         return {
-            name: raw[places(name, place, len(raw))].reshape(place["shape"])
+            name: raw[places(name, place, self.count)].reshape(place["shape"])
             for name, place in self.parameters.items()
         }
 
     def _weights(self, raw: NDArray[np.float32]) -> Term:
-        """Return all weights (1, n) of the file: those of the program as unknowns, others as they are."""
+        """Return all weights (1, n + 1) of the file, and 0: the program's as unknowns, others as they are."""
+        raw = np.append(raw, np.float32(0))
         shape = hashed("weight", np.arange(len(raw)))
         value = drawn(shape)
         owned = np.zeros(len(raw), dtype=bool)
@@ -129,7 +130,7 @@ class Claim:
                 if self.tiles is None:
                     raise Unread("weights that the file does not hold")
                 continue
-            owned[places(name, place, len(raw)).ravel()] = True
+            owned[places(name, place, self.count).ravel()] = True
         if self.tiles:
             owned[self.tiles.owned.ravel()] = True
             owned[self.tiles.bias if self.tiles.bias is not None else []] = True
@@ -144,31 +145,19 @@ class Claim:
 
     def parameter(self, name: str) -> Term:
         """Return a parameter's numbers, (1, outputs * inputs) or (1, outputs); of integers `filled`."""
-        number = self._parameter(name)
-        if not self.exact:
-            return number
-        shape = self.parameters[name]["shape"]
-
-        def each(values: Words, nothing: Any) -> Words:
-            return filled(self.text, name, values.reshape(shape), nothing).ravel()
-
-        sums, draw = (
-            None if rows is None else np.stack([each(row, 0) for row in rows])[:, None]
-            for rows in (number.sums, number.draw)
-        )
-        return Term(each(number.known, zero())[None], sums, draw)
-
-    def _parameter(self, name: str) -> Term:
-        """Return a parameter's numbers as they are."""
         if self.stated:
-            array = self.stated[name].ravel()[None]
-            return known_integers(array, "float32") if self.stated[name].ndim > 1 else known_floats(array)
-        if "base64" in self.parameters[name]:
+            array = filled(self.text, name, self.stated[name])
+            flat = array.ravel()[None]
+            return known_integers(flat, "float32") if array.ndim > 1 else known_floats(flat)
+        place = self.parameters[name]
+        if "base64" in place:
             if self.tiles is None:
                 raise Unread("weights that the file does not hold")
-            text = base64.b64decode(self.parameters[name]["base64"])
-            return known_floats(np.frombuffer(text, "<f4")[None])
-        return self._stored(places(name, self.parameters[name], self.weights.known.shape[-1]).ravel())
+            return known_floats(np.frombuffer(base64.b64decode(place["base64"]), "<f4")[None])
+        at = places(name, place, self.count)
+        if self.exact:
+            at = filled(self.text, name, at.reshape(place["shape"]), self.count)
+        return self._stored(at.ravel())
 
     def _input(self) -> Term:
         """Return the windows (1, pixels * n) of all pixels, folded: tap by tap, all images' channels."""

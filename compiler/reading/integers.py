@@ -95,7 +95,7 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     good = span is not None and bool(within(span, LIMITS[kind]).all())
     good = good and (term.shape is not None or whole)
     if kind == "uint8" and not good:
-        raise Wrong("it makes a byte of an integer that is none")
+        raise Wrong("it makes a byte of an integer that is not one")
     shape, leaf = expression("convert", term), term.leaf if whole or not term.is_wide else term.shape
     sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
     if sums is None or not good:
@@ -130,7 +130,7 @@ def packed(four: Sequence[Term], wrong: Wrongs) -> Term:
     for each in four:
         wrong(
             True if each.span is None else ~within(each.span, LIMITS["int8"]),
-            "it makes a byte of an integer that is none",
+            "it makes a byte of an integer that is not one",
         )
     return replace(stacked([replace(each, kind="int32") for each in four]), kind="word")
 
@@ -164,7 +164,7 @@ class Stored:
     """The file of weights, bit by bit."""
 
     def __init__(self, raw: NDArray[np.float32]) -> None:
-        self.raw, self.size = np.ascontiguousarray(raw), len(raw)
+        self.raw = np.ascontiguousarray(raw)
 
     def at(self, place: NDArray[np.int64], kind: str) -> Term:
         """Return its numbers at places, as those of a kind."""

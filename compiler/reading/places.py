@@ -78,6 +78,8 @@ class Place:
             found = cls(va // b if what == "divide" else va % b, fa, axis)
         else:
             raise Unread(f"{what} of coordinates")
+        if axis is not None and not found.form.any():
+            raise Wrong("coordinates that cancel")
         if max(-found.values.min(), found.values.max()) > lanes.least:
             large = np.abs(found.values) > lanes.most[:, None]
             if (large if mask is None else large & mask).any():

@@ -41,8 +41,6 @@ class Fold:
         factors = self.factors[:, slot]
         if factors.ndim == 1:
             return hashed("fold", np.einsum("...lt,l->...t", shape, factors))
-        if shape.shape[-1] == 1:
-            return hashed("fold", np.einsum("...l,lt->...t", shape[..., 0], factors))
         return hashed("fold", np.einsum("...lt,lt->...t", shape, factors))
 
     def term(self, term: Term, slot: Any) -> Term:
@@ -160,15 +158,9 @@ def stacked(terms: Sequence[Term]) -> Term:
         raise Unread("a vector of numbers of several kinds")
     if kind != "float32" and all(term.span for term in terms):
         return _integers(terms, together)
-    if any(term.shape is None for term in terms):
-        return Term(None, together([term.term for term in terms], 1), kind=kind)
-    shape = together([term.known for term in terms], 0)
-    sums = draw = None
-    if any(term.sums is not None for term in terms) and kind == "float32":
-        sums = together([term.term for term in terms], 1)
-    elif any(term.draw is not None for term in terms):
-        draw = together([term.value for term in terms], 1)
-    return Term(shape, sums, draw, kind)
+    if any(term.begins for term in terms):
+        raise Unread("a vector of weights, or of sums on their way")
+    return Term(together([term.known for term in terms], 0), kind=kind)
 
 
 def _integers(terms: Sequence[Term], together: Callable[[Sequence[Any], int], Any]) -> Term:

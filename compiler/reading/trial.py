@@ -338,10 +338,6 @@ class Trial(Values):
         for memory in self.shared:
             memory.wait()
 
-    def _run_break(self, statement: Any) -> None:
-        """Refuse."""
-        raise Unread("a loop that ends in its body")
-
     def _run_call(self, statement: Call) -> None:
         """Run a function on views."""
         function = self.functions[statement.function]
@@ -416,9 +412,8 @@ class Trial(Values):
         if place.ndim and place.shape[0] != 1:
             raise Wrong("the weights have an index that differs between lanes")
         weights, spectra = self.claim.weights, self.claim.spectra
-        size = weights.size if isinstance(weights, Stored) else weights.known.shape[-1]
-        bad = (place < 0) | (place > size - kind.lanes)
-        self._wrong(bad, f"the weights are read at {np.max(place)}: there are {size}")
+        bad = (place < 0) | (place > self.claim.count - kind.lanes)
+        self._wrong(bad, f"the weights are read at {np.max(place)}: there are {self.claim.count}")
         place = np.where(bad, 0, place).reshape(1, -1)
         at = place + np.arange(kind.lanes)[:, None]
         at = at if kind.lanes == 1 else at[:, None]

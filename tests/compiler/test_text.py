@@ -88,6 +88,7 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
         ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
         ("* 3 + c]", "* 2 + c]", "two numbers of channels"),
         ("bool inside = row", "bool inside = x * 3 + width >= x * 3 + 1 && row", "more than the channels"),
+        ("bool inside = row", "bool inside = (width - width) % 2 == 0 && row", "coordinates that cancel"),
     ],
 )
 def test_faults_are_named(plain, old, new, why):

@@ -174,8 +174,8 @@ def test_deep_sources_are_not_checked(plain, new):
 def test_a_source_that_never_ends_is_not_checked(plain, monkeypatch):
     monkeypatch.setattr("wamnet.compiler.reading.limits.SECONDS", 1)
     source, *others = plain("c")
-    loops = "".join(f"for (int {k} = 0; {k} < 3000; ++{k}) {{ " for k in "abcd") + "}" * 4
-    endless = source.replace("    float v1[6];", f"    {loops}\n    float v1[6];", 1)
+    loops = "".join(f"for (int {k} = 0; {k} < 3000; ++{k}) {{ " for k in "abcd") + "v1[0] = 0.0f; }}}}"
+    endless = source.replace("    float v1[6];", f"    float v1[6];\n    {loops}", 1)
     with pytest.raises(Unread, match="more than 1 s"):
         limited(run_text, endless, *others)
 

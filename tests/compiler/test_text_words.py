@@ -53,7 +53,7 @@ def test_texts_of_bytes_compute_what_is_certified(target, schedule, border, size
     ("old", "new", "why"),
     [
         (" + 128);", " + 127);", "never made|by more than an image's"),
-        (" + 128);", " + 129);", "a byte of an integer that is none|before it is written"),
+        (" + 128);", " + 129);", "a byte of an integer that is not one|before it is written"),
         ("sum[p][0] = w[18];", "sum[p][0] = w[19];", "beyond 16777216|never made"),
         ("(four).s1, 16)", "(four).s1, 8)", NO_MARKER),
         ("(four).s1, 16)", "(four).s0, 16)", NO_MARKER),
@@ -163,7 +163,7 @@ def test_words_are_made_of_bytes_with_signs():
     word = integers.packed(parts, refuse)
     assert all(np.array_equal(word.part(k).sums, part.sums) for k, part in enumerate(parts))
     for other in (number(0, 128), number(-129, 0), number(2, 1)):
-        with pytest.raises(Wrong, match="a byte of an integer that is none"):
+        with pytest.raises(Wrong, match="a byte of an integer that is not one"):
             integers.packed([*parts[:3], other], refuse)
     weights = terms.known_integers(np.array([[0x7F00FE01]]), "int32")
     found = integers.dots(weights, word, refuse)

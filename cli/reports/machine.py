@@ -7,6 +7,8 @@ from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
+from ...kernels.memory import cores
+
 
 def describe() -> dict[str, str]:
     """Return processor, cores that this process may use, memory, system and Python."""
@@ -17,11 +19,6 @@ def describe() -> dict[str, str]:
         "system": f"{platform.system()} {platform.machine()}",
         "Python": platform.python_version(),
     }
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def versions(others: Sequence[str] = ()) -> dict[str, str]:

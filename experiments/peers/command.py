@@ -19,6 +19,7 @@ from wamnet.kernels.bench.fresh import empty_caches
 from wamnet.kernels.bench.workload import check_size, paper_model
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.measure import Entry, environment, take_turns
+from wamnet.kernels.memory import cores
 from wamnet.models.data.scene_source import scene_source
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.render import Job
@@ -101,7 +102,7 @@ def render(
     wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16
     """
     kinds, shown = names_of("--by", by, paths.BY), parse_names(scenes) or [scenes]
-    usual = f"1,{machine.cores()}"
+    usual = f"1,{cores()}"
     processes = counts_of("--workers", usual if workers is None else workers, "1,2")
     check_counts([size], spp=(spp, 2), depth=(depth, 6), repeats=(repeats, 5))
     job = Job(size, size, spp, settings=Settings(max_depth=depth - 1))

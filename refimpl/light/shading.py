@@ -97,34 +97,21 @@ def scattered(
     materials: Materials, at: Site, hit: Hit, u0: Floats, u1: Floats, u_choice: Floats
 ) -> Scattered:
     """Return how paths continue, each by the material of its surface, for three uniform numbers (...)."""
-    first, others = _ask(materials, at, hit, lambda kind, own: kind.sample(own, u0, u1, u_choice))
-    direction, beta, pdf, through = first
-    for is_kind, other in others:
-        direction = vectors.choose(is_kind, other.direction, direction)
-        beta = vectors.choose(is_kind, other.beta, beta)
-        pdf = np.where(is_kind, other.pdf, pdf)
-        if through is not None or other.through is not None:
-            through = np.where(is_kind, _or_nobody(other.through), _or_nobody(through))
-    return Scattered(direction, beta, pdf, through)
+    return Scattered(*_ask(materials, at, hit, lambda kind, own: kind.sample(own, u0, u1, u_choice)))
 
 
 def value(
     materials: Materials, at: Site, hit: Hit, wi: Directions, cos_surface: Floats
 ) -> tuple[Colors, Floats]:
     """Return a colour (..., 3) and a factor (...) whose product is beta f cos for light from wi (..., 3)."""
-    (color, factor), others = _ask(materials, at, hit, lambda kind, own: kind.value(own, wi, cos_surface))
-    for is_kind, (other_color, other_factor) in others:
-        color = vectors.choose(is_kind, other_color, color)
-        factor = np.where(is_kind, other_factor, factor)
+    color, factor = _ask(materials, at, hit, lambda kind, own: kind.value(own, wi, cos_surface))
     return color, factor
 
 
 def pdf(materials: Materials, at: Site, hit: Hit, wi: Directions, cos_surface: Floats) -> Floats:
     """Return the density (...), in 1/sr, with which [`scattered`] finds wi (..., 3)."""
     density: Floats
-    density, others = _ask(materials, at, hit, lambda kind, own: kind.pdf(own, wi, cos_surface))
-    for is_kind, other in others:
-        density = np.where(is_kind, other, density)
+    (density,) = _ask(materials, at, hit, lambda kind, own: (kind.pdf(own, wi, cos_surface),))
     return density
 
 
@@ -147,16 +134,23 @@ def follows(materials: Materials, hit: Hit) -> Truths:
 
 def _ask(
     materials: Materials, at: Site, hit: Hit, question: Callable[[type[Material], Site], Any]
-) -> tuple[Any, list[tuple[Any, Any]]]:
-    """Return the first kind's answer, and (who is of the kind, answer) of the others."""
+) -> list[Any]:
+    """Return the parts of all kinds' answers, each that of the surface's own kind."""
     answers = []
     for kind, parameters in zip(materials.kinds, materials.parameters, strict=True):
         own = None if parameters is None else vectors.look_up(parameters, hit.surface)
         answers.append(question(kind, at._replace(parameter=own)))
-    others = zip(materials.is_kind[1:], answers[1:], strict=True)
-    return answers[0], [(vectors.look_up(is_kind, hit.surface), answer) for is_kind, answer in others]
+    found = [*answers[0]]
+    others = [vectors.look_up(is_kind, hit.surface) for is_kind in materials.is_kind[1:]]
+    for is_kind, answer in zip(others, answers[1:], strict=True):
+        found = [_either(is_kind, *parts) for parts in zip(answer, found, strict=True)]
+    return found
 
 
-def _or_nobody(through: Truths) -> Any:
-    """Return who passes through: nobody, where a material says nothing."""
-    return False if through is None else through
+def _either(is_kind: Truths, a: Any, b: Any) -> Any:
+    """Return a (...) or (..., 3) where is_kind (...) holds, else b; None, who passes through, is nobody."""
+    if a is None and b is None:
+        return None
+    a, b = (False if part is None else part for part in (a, b))
+    is_vector = getattr(a, "ndim", 0) > is_kind.ndim
+    return vectors.choose(is_kind, a, b) if is_vector else np.where(is_kind, a, b)

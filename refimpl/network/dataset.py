@@ -328,7 +328,8 @@ def normalization_of(frames: Sequence[Frame], exposure_stops: float = 0.0) -> No
     """
     depths = _layers(frames, "depth", "seen_depth")
     far = max((float(np.max(d, initial=0.0, where=d < FARTHEST_DEPTH)) for d in depths), default=0.0)
-    hits = list(map(_hits, _layers(frames, "position", "seen_position")))
+    points = (p.reshape(-1, 3).astype(np.float64) for p in _layers(frames, "position", "seen_position"))
+    hits = [each[np.any(each != 0.0, axis=-1)] for each in points]
     axes = np.array([_reach([points[:, axis] for points in hits]) for axis in range(3)])
     x, y, z = (float(value) for value in axes.mean(axis=1))
     extent = float((axes[:, 1] - axes[:, 0]).max()) / 2
@@ -350,12 +351,6 @@ def _reach(parts: Sequence[Array]) -> tuple[float, float]:
 def _layers(frames: Sequence[Frame], *names: str) -> list[Array]:
     """Return the layers (H, W, C) of these names that frames have."""
     return [frame[name] for frame in frames for name in names if name in frame.layers]
-
-
-def _hits(position: Array) -> Array:
-    """Return as float64 (N, 3) the positions (H, W, 3) of pixels that hit something: not 0."""
-    points: Array = position.reshape(-1, 3).astype(np.float64)
-    return points[np.any(points != 0.0, axis=-1)]
 
 
 def feature_image(frame: Frame, features: Sequence[str], normalization: Normalization) -> NDArray[np.float32]:

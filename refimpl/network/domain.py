@@ -165,7 +165,8 @@ def domain_of(images: Iterable[NDArray[Any]], features: Sequence[str]) -> Domain
     if len(descriptions) < LEAST_FRAMES:
         return None
     threshold, rate = threshold_of(distances_left_out(descriptions))
-    middle, scale = (_rows(numbers) for numbers in _middle_and_scale(descriptions))
+    rows = ([map(_rounded, row) for row in each.tolist()] for each in _middle_and_scale(descriptions))
+    middle, scale = (tuple(map(tuple, each)) for each in rows)
     return Domain(tuple(features), len(descriptions), middle, scale, _rounded(threshold), _rounded(rate))
 
 
@@ -210,11 +211,6 @@ def measure_frame(domain: Domain, model: Model, frame: Frame) -> Distance:
 def _rounded(number: float) -> float:
     """Return a number with so many digits as a text has."""
     return float(f"{number:.{DIGITS}g}")
-
-
-def _rows(numbers: Array) -> Rows:
-    """Return numbers (3, C) as they are written."""
-    return tuple(tuple(_rounded(float(number)) for number in row) for row in numbers)
 
 
 def to_json(domain: Domain) -> str:

@@ -1,15 +1,13 @@
 """The command `wamnet`: its commands, and the one place where errors become a line and an exit status.
 
-1. Commands are registered with typer in the order of a first session [`COMMANDS`], then those of other
-   distributions [`_join`]; the module of a command is imported when it is the one that runs
-   [`application`].
+1. Commands are registered with typer in the order of `options.ini`, then those of other distributions
+   [`_join`]; the module of a command is imported when it is the one that runs [`application`].
 2. [`main`] runs one of them. Whatever a user can cause ends in one line on standard error and status 2;
    Ctrl-C ends in status 130 and SIGTERM in 143; anything else is a bug and shows its traceback.
 
 A list of all commands appears at once: no module of a command is imported for it.
 """
 
-import ast
 import inspect
 import os
 import signal
@@ -19,43 +17,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..models.writing import signals_wait
 from ..refimpl.errors import InputError, WamnetError
+from .common import signatures
 from .common.default_command import CommandWithOthers
-from .common.request import spread
+from .common.request import spread, table, texts_of
 from .common.terminal import tell
+
+HELP = {"-h", "--help"}
+"""The options that run no command, but print its text."""
 
 VERSION = "--version"
 """The option that runs no command."""
-
-COMMANDS: Mapping[str, tuple[str, str]] = {
-    "render": ("render", "render"),
-    "scene": ("render", "scene"),
-    "dataset": ("dataset", "dataset"),
-    "train": ("train", "train"),
-    "import": ("networks.importing", "import_model"),
-    "compile": ("compile", "compile_model"),
-    "listing": ("compile", "listing"),
-    "export": ("export", "export"),
-    "certify": ("certify", "certify"),
-    "denoise": ("denoise", "denoise"),
-    "compare": ("compare", "compare"),
-    "triage": ("triage", "triage"),
-    "animate": ("animate", "animate"),
-    "view": ("view", "view"),
-    "tune": ("tune", "tune"),
-    "executors": ("denoise", "executors"),
-    "conformance": ("conformance", "conformance"),
-    "demo": ("demo", "demo"),
-    "bench": ("bench", "bench"),
-    "bench exports": ("measure", "exports"),
-}
-"""Each command's module in `commands`, and function; one of a group follows the group."""
 
 INTERRUPTED, TERMINATED = 130, 143
 """Exit statuses after Ctrl-C and SIGTERM, as shells report them: 128 + the signal."""
@@ -84,37 +61,31 @@ GROUPS: Mapping[str, Mapping[str, Any]] = {
 def application(arguments: Sequence[str] = ()) -> typer.Typer:
     """Return the command line, with only the command that `arguments` begin with, or else a list of all.
 
-    Importing all commands takes longer than denoising a frame.
+    Importing all commands takes longer than denoising a frame. A help text needs signatures only.
     """
     app = typer.Typer(
         name="wamnet",
         add_completion=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": [*HELP]},
     )
     app.callback(invoke_without_command=True)(root)
-    first = arguments[0] if arguments and arguments[0] in (*COMMANDS, *DISTRIBUTIONS, VERSION) else None
-    groups = {"": app}
-    for path, (module, function) in COMMANDS.items():
+    commands = {path: lines for path, lines in table().items() if "call" in lines}
+    first = arguments[0] if arguments and arguments[0] in (*commands, *DISTRIBUTIONS, VERSION) else None
+    groups, package = {"": app}, signatures.package() if HELP & {*arguments} else f"{__package__}.commands"
+    for path, lines in commands.items():
         if first == path.partition(" ")[0]:
+            module, function = lines["call"].split(".")
             # Modules in C turn an interrupt of their import into errors of their own.
             with signals_wait():
-                imported = import_module(f".commands.{module}", __package__)
+                imported = import_module(f"{package}.{module}")
             _register(groups, path, getattr(imported, function))
         elif first is None and " " not in path:
-            app.command(path, help=_help_of(_docstring(module, function))[0])(lambda: None)
+            app.command(path, help=_help_of(lines["help"])[0])(lambda: None)
     if first is None or any(first == path.partition(" ")[0] for path in DISTRIBUTIONS):
         _join(groups, first, " ".join(arguments[:2]))
     return app
-
-
-def _docstring(module: str, function: str) -> str:
-    """Return the docstring of a command without importing its module: a list of commands appears at once."""
-    path = Path(__file__).parent / "commands" / f"{module.replace('.', '/')}.py"
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    named = (each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name == function)
-    return ast.get_docstring(next(named)) or ""
 
 
 def _join(groups: dict[str, typer.Typer], name: str | None, line: str) -> None:
@@ -128,7 +99,7 @@ def _join(groups: dict[str, typer.Typer], name: str | None, line: str) -> None:
         remedy = f"install it: pip install {DISTRIBUTIONS[path]}"
         raise InputError("command", path, f"distribution {DISTRIBUTIONS[path]} is not installed", remedy)
     for entry in installed.values():
-        if entry.name == name or (name is None and entry.name not in COMMANDS):
+        if entry.name == name or (name is None and entry.name not in table()):
             module = entry.load()
             for each, function in module.COMMANDS.items():
                 _register(groups, each, getattr(module, function))
@@ -137,14 +108,14 @@ def _join(groups: dict[str, typer.Typer], name: str | None, line: str) -> None:
 def _register(groups: dict[str, typer.Typer], path: str, function: Callable[..., None]) -> None:
     """Add a command to its group; a group joins the others."""
     group, _, name = path.rpartition(" ")
-    shown, epilog = _help_of(inspect.getdoc(function) or "")
+    shown, epilog = _help_of(texts_of(function, path).get("help") or inspect.getdoc(function) or "")
     how: dict[str, Any] = {"help": shown, "epilog": epilog}
     if path in GROUPS:
         groups[path] = typer.Typer(invoke_without_command=True, **GROUPS[path])
-        groups[path].callback(**how)(spread(function))
+        groups[path].callback(**how)(spread(function, path))
         groups[group].add_typer(groups[path], name=name)
     else:
-        groups[group].command(name, **how)(spread(function))
+        groups[group].command(name, **how)(spread(function, path))
 
 
 def _help_of(docstring: str) -> tuple[str, str | None]:
@@ -228,7 +199,13 @@ def _run(arguments: Sequence[str] | None) -> int:
         words = list(sys.argv[1:] if arguments is None else arguments)
         # A shell that completes a line has it in a variable.
         typed = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", ""))
-        status = application(words or typed.split()[1:])(words, prog_name="wamnet", standalone_mode=False)
+        arguments = words or [*typed.split()[1:], *HELP]
+        form = {"prog_name": "wamnet", "standalone_mode": False}
+        try:
+            status = application(arguments)(words, **form)
+        except NotImplementedError:
+            # What asks for help is the value of an option or an argument.
+            status = application(arguments[:1])(words, **form)
     except WamnetError as error:
         return _fail(str(error))
     except MemoryError:

@@ -42,7 +42,6 @@ from ..common.domain import Watch
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import learned_scene, load_model, model_path, unlike_training
-from ..common.options import option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import images, movie
 from ..files.alone import working_in
@@ -65,46 +64,29 @@ class Shot:
 class Film:
     """What is rendered: times, a size, samples of the reference (0: none), and rays of the features."""
 
-    start: float = option("Start time of the animation, in seconds.", 0.0)
-    seconds: float = option("Duration in seconds; minicubes rotate in 8 s.", 8.0)
-    fps: float = option("Frames per second.", 10.0)
-    size: int = option("Width and height of each image, in pixels.", 128)
-    reference_spp: int = option("Paths per pixel of a reference image shown alongside; 0 for none.", 0)
-    seed: int = option("seed", 0)
-    feature_spp: int | None = option(
-        "N  Stratified camera rays per pixel for the features. [default: equivalent to those in training]"
-    )
+    start: float = 0.0
+    seconds: float = 8.0
+    fps: float = 10.0
+    size: int = 128
+    reference_spp: int = 0
+    seed: int = 0
+    feature_spp: int | None = None
 
 
 def animate(
-    model: Path = option("model", ...),
-    scene: str | None = option(
-        "Canonical scene, or scene file (.json), which is static. [default: the model's training scene]"
-    ),
-    output: Path = option(
-        "-o --output PATH  Output: animation (.mp4, .gif) or folder of images.", Path("animation")
-    ),
+    model: Path,
+    scene: str | None = None,
+    output: Path = Path("animation"),
     *,
     wanted: Film,
-    parameters: list[str] | None = option("parameters"),
+    parameters: list[str] | None = None,
     view: options.View,
-    executor: options.ExecutorChoice = option("executor", "auto"),
-    renderer: options.ExecutorChoice = option("renderer", "auto"),
-    rank: int = option("rank", 0),
-    context: options.ContextName | None = option("context"),
+    executor: options.ExecutorChoice = "auto",
+    renderer: options.ExecutorChoice = "auto",
+    rank: int = 0,
+    context: options.ContextName | None = None,
 ) -> None:
-    """Render and denoise an animation: noisy, denoised and reference images side by side.
-
-    After an interruption, the same command resumes where it stopped.
-
-    Examples:
-    wamnet animate model.safetensors -o turning.mp4
-    wamnet animate minicubes --seconds 2 --fps 5 -o turning.gif
-    wamnet animate model.safetensors --seconds 2 --fps 5 --reference-spp 64 -o turning.gif
-    wamnet animate minicubes --yaw 20 --light 1=1,0.3,0.3 --seconds 2 -o turning.mp4
-    wamnet animate mine.safetensors --scene mine.json --yaw 10 --seconds 2 -o noise.mp4
-    wamnet animate small.safetensors --rank 16 --executor opencl --renderer opencl -o turning.mp4
-    """
+    """Render and denoise an animation: noisy, denoised and reference images side by side."""
     is_film = output.suffix.lower() in movie.WRITERS
     folder = output.with_name(output.name + ".frames") if is_film else output
     _check_names(output, model, wanted.fps)

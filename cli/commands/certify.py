@@ -13,7 +13,6 @@ from ...compiler.reading.lanes import Unread
 from ...compiler.reading.trusted import trusted_lines
 from ...refimpl.errors import InputError
 from ...refimpl.reading import read_file
-from ..common.options import argument, option
 from ..common.terminal import STATUS_WRONG, progress, say, table
 
 ASSUMED = (
@@ -24,26 +23,11 @@ ASSUMED = (
 
 
 def certify(
-    file: Path = argument("FILE  Certificate (denoise.certificate.json), or the kernel's folder."),
-    source: Path | None = option("FILE  Check this source file instead, for example one edited by hand."),
-    text: bool = option("Also check that the kernel's source computes the certified program.", True),
+    file: Path,
+    source: Path | None = None,
+    text: bool = True,
 ) -> None:
-    """Check the proof of a kernel's error bound, and that its source computes the certified program.
-
-    The checker derives every value again from the weights and the program, and prints each layer's
-    contribution. The source checker then parses the source, executes it symbolically for images of any size,
-    and compares every sum and every operation with the program's. Both checkers share only the definitions of
-    kernels and instructions with the compiler, and print how many lines they have, with all that they import.
-    They assume that compiler and device keep to the language's standard and to IEEE 754's float32, rounded to
-    nearest, and that the host calls the kernel as the manifest states, with finite values in the stated
-    ranges. Exit status 0: the proof holds, and the source computes the program; 1: a step fails, and is
-    named; 2: the file is not a certificate; 3: the source was not checked, and the reason is printed.
-
-    Examples:
-    wamnet certify kernel-opencl/denoise.certificate.json
-    wamnet certify kernel-opencl
-    wamnet certify kernel-c --source denoise-mine.h
-    """
+    """Check the proof of a kernel's error bound, and that its source computes the certified program."""
     inside = [file / CERTIFICATE_NAME, file / "denoise" / CERTIFICATE_NAME] if file.is_dir() else [file]
     path = next(filter(Path.is_file, inside), inside[0])
     if not path.is_file():

@@ -13,36 +13,21 @@ from ...kernels.run import curve
 from ...kernels.run.curve import Curve, Limits
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.network.denoise import Model
-from ..common.options import option
 from ..common.request import KernelRequest, given
 from ..common.terminal import progress, say
 from ..files import dataset_files
-
-SMALLEST_PX, LARGEST_PX = 16, 4096
-"""Sides of pictures on which times are taken."""
 
 
 @dataclass(frozen=True)
 class Request:
     """What a choice is asked to keep, and where its curve comes from; None for what is not given."""
 
-    max_error: float | None = option(
-        "E  Choose the fastest variant whose measured error is at most E: the largest difference in "
-        "display-encoded colour (0 to 1) from the full float64 network, over the frames. [default: no limit]"
-    )
-    max_ms: float | None = option(
-        "T  Choose the most accurate variant that takes at most T milliseconds on this machine. [default: no "
-        "limit]"
-    )
-    max_loss_db: float | None = option(
-        "D  Choose the fastest variant whose PSNR over the frames is at most D dB below the full network's. "
-        "[default: no limit]"
-    )
-    curve: Path | None = option(
-        "FILE  Choose from the measured points in this file (.json). [default: measured and cached]"
-    )
-    frames: Path | None = option("FOLDER  Data set; errors are measured on its test frames.")
-    size: int | None = option("N  Frame size for the times: N x N pixels. [default: 1024]")
+    max_error: float | None = None
+    max_ms: float | None = None
+    max_loss_db: float | None = None
+    curve: Path | None = None
+    frames: Path | None = None
+    size: int | None = None
 
     @property
     def limits(self) -> Limits:
@@ -66,9 +51,6 @@ class Request:
         if self.curve is not None and (self.frames is not None or self.size is not None):
             rule = "its points are measured already"
             raise InputError("--curve", str(self.curve), rule, "leave out --frames and --size")
-        if self.size is not None and not SMALLEST_PX <= self.size <= LARGEST_PX:
-            rule = f"must be from {SMALLEST_PX} to {LARGEST_PX}"
-            raise InputError("--size", self.size, rule, "for example --size 1024")
         curve.check_limits(self.limits)
 
     def choose(self, model: Model, network: KernelRequest, executor: str) -> KernelRequest:

@@ -17,61 +17,39 @@ from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.inputs import load_scene
-from ..common.options import ExecutorName, argument, option
+from ..common.options import ExecutorName
 from ..common.terminal import STATUS_WRONG, progress, say, table, tell
 from ..files.images import read_image
 from ..reports.scores import as_data, measure
 
-PANEL = "Paths"
-"""Title of the options that go with `--paths`."""
-
 
 def compare(
-    context: typer.Context,
-    image: Path | None = argument("IMAGE  Image to compare (.exr or .png).", None),
-    reference: Path | None = argument("REFERENCE  Reference image.", None),
-    as_json: bool = option("--json  Print JSON instead of a table.", False),
-    exposure: float = option("exposure", 0.0),
-    paths: str | None = option(
-        "SCENE  Compare a kernel's paths in this scene with the reference's, instead of two images.",
-        rich_help_panel=PANEL,
-    ),
-    executor: ExecutorName = option("", ExecutorName.opencl, rich_help_panel=PANEL),
-    width: int = option("Width in pixels.", 64, rich_help_panel=PANEL),
-    height: int = option("Height in pixels.", 64, rich_help_panel=PANEL),
-    sample: int = option("Index of the sample to compare.", 0, rich_help_panel=PANEL),
-    spp: int = option("Paths per pixel of the reference image.", 64, rich_help_panel=PANEL),
-    seed: int = option("Random seed.", 0, rich_help_panel=PANEL),
-    max_depth: int = option("max_depth", 5, rich_help_panel=PANEL),
-    time: float | None = option("time"),
-    parameters: list[str] | None = option("parameters"),
+    command: typer.Context,
+    image: Path | None = None,
+    reference: Path | None = None,
+    as_json: bool = False,
+    exposure: float = 0.0,
+    paths: str | None = None,
+    executor: ExecutorName = ExecutorName.opencl,
+    width: int = 64,
+    height: int = 64,
+    sample: int = 0,
+    spp: int = 64,
+    seed: int = 0,
+    max_depth: int = 5,
+    time: float | None = None,
+    parameters: list[str] | None = None,
 ) -> None:
-    """Compare an image with its reference, or a kernel's paths with the reference path tracer's.
-
-    MSE, PSNR and SSIM compare displayed colours (sRGB-encoded, clipped to white); relMSE and SMAPE compare
-    linear radiance.
-
-    With --paths every step of every path has a rounding-error bound; a larger difference is
-    [bold]unexplained[/]. A step whose decision is within the bound of its threshold is
-    [bold]undecided[/], and [bold]different[/] if the reference decides otherwise. [bold]parted[/] counts the
-    paths that have diverged; [bold]moved[/] is the largest change of the others' vertices. Welch's test
-    compares the images. The exit status is 1 if a difference is unexplained or the test fails.
-
-    Examples:
-    wamnet compare denoised.png reference.png
-    wamnet compare noisy.exr reference.exr --json
-    wamnet compare --paths minicubes
-    wamnet compare --paths cornell --executor opengl --width 32 --height 32 --max-depth 3
-    """
+    """Compare an image with its reference, or a kernel's paths with the reference path tracer's."""
     if paths is None:
         of_paths = ("executor", "width", "height", "sample", "spp", "seed", "max_depth", "time", "parameters")
-        options.refuse_given(context, of_paths, "without --paths SCENE")
+        options.refuse_given(command, of_paths, "without --paths SCENE")
         if image is None or reference is None:
             rule = "needs IMAGE and REFERENCE, or --paths SCENE"
             raise InputError("wamnet compare", NO_VALUE, rule, "see wamnet compare --help")
         compare_pictures(image, reference, exposure, as_json)
         return
-    options.refuse_given(context, ("image", "reference", "exposure"), "with --paths")
+    options.refuse_given(command, ("image", "reference", "exposure"), "with --paths")
     job = Job(width, height, spp, seed, Settings(max_depth=max_depth), first_sample=sample)
     compare_paths(paths, executor.value, job, time, parameters or [], as_json)
 

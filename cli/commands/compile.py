@@ -27,7 +27,7 @@ from ...refimpl.light.transport import Settings
 from ...refimpl.reading import parse_json, read_file
 from ..common.effort import said_of_compiling
 from ..common.inputs import MODEL_PREFIX, load_model, load_scene
-from ..common.options import Sampler, Target, argument, option
+from ..common.options import Sampler, Target
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import say
 from ..files.outputs import check_output, check_parent, unwritable, visible, write_text
@@ -38,11 +38,11 @@ from .choose import Request
 class OfScene:
     """What only the kernel of a scene has."""
 
-    time: float | None = option("time")
-    parameters: list[str] | None = option("parameters")
-    max_depth: int | None = option("Maximum number of bounces per path (scenes only). [default: 5]")
-    sampler: Sampler | None = option("Sampler (scenes only). [default: pcg4d]")
-    lanes: int | None = option("Paths per work item (scenes only): 16 suits CPUs, 1 suits GPUs. [default: 1]")
+    time: float | None = None
+    parameters: list[str] | None = None
+    max_depth: int | None = None
+    sampler: Sampler | None = None
+    lanes: int | None = None
 
     def compiled(self, name: str, language: Language, network: KernelRequest) -> Artifact:
         """Return the kernel of a scene's paths; of a large scene it is said first how long it takes."""
@@ -56,36 +56,16 @@ class OfScene:
 
 
 def compile_model(
-    model: str = argument(
-        "MODEL  Trained model (.safetensors), model:NAME, canonical scene or scene file (.json)."
-    ),
-    target: Target = option("Target language (export has more).", ...),
-    output: Path | None = option("-o --output FOLDER  Output folder. [default: TARGET]"),
+    model: str,
+    target: Target,
+    output: Path | None = None,
     *,
     of_scene: OfScene,
     network: KernelRequest,
-    here: bool = option(
-        "--here  Use the best schedule for this machine: the tuned one, or else the built-in choice.", False
-    ),
+    here: bool = False,
     limits: Request,
 ) -> None:
-    """Compile a model or a scene to a kernel: source, weights, and a manifest of its interface.
-
-    The source is human-readable, for pasting into another program. A model's kernel denoises, with a
-    proven error bound; a scene's kernel traces paths. No device is needed, except for --here and for
-    limits (--max-error, --max-ms, --max-loss-db): they choose the variant from a speed-error curve that
-    is measured once per device.
-
-    Examples:
-    wamnet compile model.safetensors --target glsl -o kernel-glsl
-    wamnet compile model:minicubes --target opencl -o kernel-minicubes
-    wamnet compile model.safetensors --target opencl --profile native -o kernel-opencl
-    wamnet compile model.safetensors --target opencl --variant window8+rank16 -o kernel-small
-    wamnet compile model.safetensors --target opencl --max-loss-db 0.1 --frames cubes -o kernel-fast
-    wamnet compile model.safetensors --target c --variant whole8 -o kernel-c
-    wamnet compile minicubes --time 2.5 --target glsl -o scene-glsl
-    wamnet compile mine.json --target opencl --lanes 16 -o scene-opencl
-    """
+    """Compile a model or a scene to a kernel: source, weights, and a manifest of its interface."""
     folder, language = output or Path(target), language_named(target)
     if is_scene(model):
         of_models = given(network, "schedule", "variant") | {"--here": here or None} | given(limits)
@@ -184,19 +164,12 @@ def write_kernel(kernel: Artifact, folder: Path) -> tuple[Path, ...]:
 
 
 def listing(
-    model: str = argument("MODEL  Trained model (.safetensors), canonical scene or scene file (.json)."),
-    target: Target = option("Target language.", ...),
-    output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
-    profile: str = option("profile", "ieee"),
+    model: str,
+    target: Target,
+    output: Path | None = None,
+    profile: str = "ieee",
 ) -> None:
-    """Print a kernel interleaved with the lines of the reference that it came from.
-
-    Denoisers use the plain schedule; scenes trace one path at a time. Only -o writes a file.
-
-    Examples:
-    wamnet listing model.safetensors --target glsl
-    wamnet listing minicubes --target opencl --profile native -o minicubes.txt
-    """
+    """Print a kernel interleaved with the lines of the reference that it came from."""
     if output is not None:
         check_output(output, inputs=[Path(model)])
     language = language_named(target)

@@ -30,52 +30,40 @@ from ...models.data.frame_plan import KINDS, FramePlan, Request, Task, plan
 from ...models.data.scene_source import SceneSource, scene_source
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.frame import Frame
+from ...refimpl.light.scenes import CANONICAL
 from ..common import cluster, options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import check_input
-from ..common.options import argument, option
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files, exr
 
 PASSES = ("color", "albedo", "normal", "depth", "position")
 """Layers of a noisy picture of Blender: what Cycles has passes of."""
 
-LIMITS = "LOW:HIGH"
-"""How a range is written."""
-
 
 @dataclass(frozen=True)
 class Frames:
     """The fields of a request that mean the same for a scene and for a Blender file."""
 
-    frames: int = option("Number of training frames.", 8)
-    test_frames: int = option("--test  Number of test frames, sampled separately within the same ranges.", 2)
-    outside_frames: int = option(
-        "--outside  Put test frames outside the training range: in the held-out --arc, 10 degrees beyond "
-        "--yaw, or beyond --saturation.",
-        0,
-    )
-    spp: int = option("Paths per pixel of each target; noisy frames have 1.", 64)
-    test_spp: int = option("Paths per pixel of each test target. [default: same as --spp]", 0)
-    arc_s: float = option("--arc  Seconds at the end of the animation to hold out from training.", 0.0)
-    seed: int = option("seed", 0)
+    frames: int = 8
+    test_frames: int = 2
+    outside_frames: int = 0
+    spp: int = 64
+    test_spp: int = 0
+    arc_s: float = 0.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
 class Ranges:
     """What frames of a scene draw their cameras and lights from, as texts."""
 
-    yaw_deg: str = option(f"--yaw {LIMITS}  Range of camera orbit angles, in degrees.", "0:0")
-    pitch_deg: str = option(f"--pitch {LIMITS}  Range of camera elevation angles, in degrees.", "0:0")
-    distance: str = option(f"{LIMITS}  Range of factors applied to the camera distance.", "1:1")
-    saturation: str | None = option(
-        f"{LIMITS}  Randomise the hue of each light, with a saturation in this range (brightness unchanged). "
-        "[default: the scene's colours]"
-    )
-    power: str | None = option(
-        f"{LIMITS}  Range of factors applied to each light's power. [default: the scene's powers]"
-    )
+    yaw_deg: str = "0:0"
+    pitch_deg: str = "0:0"
+    distance: str = "1:1"
+    saturation: str | None = None
+    power: str | None = None
 
     def limits(self) -> dict[str, tuple[float, float] | None]:
         """Return the ranges by field; None for the scene's own colours and powers."""
@@ -89,69 +77,45 @@ class Ranges:
 class OfScene:
     """Further fields of a request that only a scene has."""
 
-    size_px: int = option("--size  Width and height in pixels.", 64)
-    feature_spp: int = option("feature_spp", 0)
-    seen: bool = option("seen", False)
-    shadow_rays: int = option("shadow_rays", 0)
-    start_s: float = option("--start  Start time of the animation, in seconds.", 0.0)
-    seconds: float = option("Duration of the animation, in seconds; minicubes rotate in 8 s.", 8.0)
-    before: int = option(
-        "N  Earlier frames (24 per second) to accumulate into history layers of each noisy frame.", 0
-    )
-    max_depth: int = option("max_depth", 5)
-    executor: options.ExecutorChoice = option("renderer", "auto")
-    sampler: options.Sampler = option("sampler", "pcg4d")
+    size_px: int = 64
+    feature_spp: int = 0
+    seen: bool = False
+    shadow_rays: int = 0
+    start_s: float = 0.0
+    seconds: float = 8.0
+    before: int = 0
+    max_depth: int = 5
+    executor: options.ExecutorChoice = "auto"
+    sampler: options.Sampler = "pcg4d"
 
 
 @dataclass(frozen=True)
 class OfBlender:
     """What means nothing without --from-blender."""
 
-    noisy_spp: int = option("Paths per pixel of a noisy Blender frame.", 1)
-    percent: int = option("Percentage of the Blender file's render resolution.", 100)
-    view_layer: str = option("NAME  View layer of the Blender file to render. [default: the only one]", "")
-    blender: str | None = option(
-        "PROGRAM  Path of the Blender program. [default: the bpy package, or blender on the PATH]"
-    )
+    noisy_spp: int = 1
+    percent: int = 100
+    view_layer: str = ""
+    blender: str | None = None
 
 
 def dataset(
     command: typer.Context,
-    scene: str | None = argument(
-        f"SCENE  Canonical scene ({options.SCENES}) or scene file (.json); --check needs none.", None
-    ),
-    output: Path = option("-o --output FOLDER  Data set folder.", Path("dataset")),
+    scene: str | None = None,
+    output: Path = Path("dataset"),
     *,
     frames: Frames,
     of_scene: OfScene,
     ranges: Ranges,
-    parameters: list[str] | None = option("parameters"),
-    context: options.ContextName | None = option("context"),
-    workers: int | None = option("Number of worker processes. [default: one per core]"),
-    scheduler: str | None = option("ADDRESS  Address of a running Dask scheduler; its workers are used."),
-    from_blender: Path | None = option("FILE  Render frames of this Blender file instead of a scene."),
+    parameters: list[str] | None = None,
+    context: options.ContextName | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    from_blender: Path | None = None,
     of_blender: OfBlender,
-    only_check: bool = option("--check  Verify the files' checksums without changing anything.", False),
+    only_check: bool = False,
 ) -> None:
-    """Render a data set: noisy frames and their targets over an animation.
-
-    Each frame samples a time, and a camera and lights from the given ranges. A test frame that repeats
-    another frame's view is rejected. The manifest in the folder lists the samples, seeds and checksums.
-    After an interruption, the same command resumes, and replaces damaged files. The files do not depend
-    on the number of workers.
-
-    Examples:
-    wamnet dataset minicubes -o cubes
-    wamnet dataset minicubes --frames 64 --size 256 --feature-spp 4 --executor opencl -o cubes
-    wamnet dataset minicubes --frames 64 --yaw -45:45 --pitch -15:20 --saturation 0:0.7 --outside 4 -o moving
-    wamnet dataset minicubes --frames 64 --saturation 0:0.9 --power 0.5:1.5 -o lights
-    wamnet dataset minicubes --frames 64 --before 8 -o sequence
-    wamnet dataset mine.json --frames 60 --yaw -24:24 --pitch -5:10 --distance 0.9:1.15 -o mine
-    wamnet dataset minicubes --frames 1000 --test 100 --size 1024 --spp 1024 -o large
-    wamnet dataset minicubes --frames 1000 --scheduler tcp://10.0.0.1:8786 -o large
-    wamnet dataset --from-blender hall.blend --frames 12 --percent 50 --spp 256 -o hall
-    wamnet dataset --check -o cubes
-    """
+    """Render a data set: noisy frames and their targets over an animation."""
     blender = [field.name for field in dataclasses.fields(OfBlender)]
     if only_check:
         check(output, scene)
@@ -163,7 +127,7 @@ def dataset(
             make_from_blender(output, from_blender, **vars(of_blender), **vars(frames))
     else:
         if scene is None:
-            raise InputError("argument SCENE", NO_VALUE, "missing", f"choose one of {options.SCENES}")
+            raise InputError("argument SCENE", NO_VALUE, "missing", f"choose one of {', '.join(CANONICAL)}")
         source = scene_source(scene, options.parse_parameters(parameters or []))
         options.refuse_given(command, blender, "without --from-blender")
         if source.still is not None:

@@ -41,9 +41,7 @@ from ...refimpl.light.shading import build, ever_follows
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.train import PRESETS, TrainState, model_of
 from ...refimpl.reading import read_file
-from ..common import options
 from ..common.effort import said_of_learning
-from ..common.options import option
 from ..common.packages import need
 from ..common.terminal import hint_on_interrupt, progress, say, table
 from ..files import dataset_files, exr, images
@@ -54,7 +52,7 @@ from ..reports import report
 from ..reports.report import Plan, Results, Unseen
 from ..reports.runs import Run, run_all
 from ..reports.scores import Score, measure
-from . import bench, bench_forms, bench_frames, dataset, train
+from . import bench, bench_frames, dataset, train
 from .compile import write_kernel
 
 Pair = tuple[Frame, Frame]
@@ -90,27 +88,12 @@ TRAIN_FRAMES_OF_NUMPY = 12
 
 
 def demo(
-    scene: str = option(f"Canonical scene ({options.SCENES}) or scene file (.json).", Plan.scene),
-    output: Path | None = option(
-        f"-o --output FOLDER  Output folder. [default: {FOLDER}, or {QUICK_FOLDER} with --quick]"
-    ),
-    size: int | None = option(
-        "Width and height of the frames, in pixels; cannot be combined with --quick. [default: "
-        f"{Plan.size_px}]"
-    ),
-    quick: bool = option(
-        "--quick  Use tiny frames, as a quick check that everything works (one to two minutes).", False
-    ),
+    scene: str = "minicubes",
+    output: Path | None = None,
+    size: int | None = None,
+    quick: bool = False,
 ) -> None:
-    """Render, train, compile, denoise unseen frames and write a report, in about six minutes.
-
-    Then open FOLDER/report.html. After Ctrl-C, the same command resumes where it stopped.
-
-    Examples:
-    wamnet demo
-    wamnet demo --size 384 -o out/large
-    wamnet demo --scene mine.json -o out/mine
-    """
+    """Render, train, compile, denoise unseen frames and write a report, in about six minutes."""
     for module in ("matplotlib", "jinja2"):
         need(module, "to draw the report")
     if quick and size is not None:
@@ -311,9 +294,11 @@ def measure_speed(plan: Plan, results: Results, output: Path) -> dict[str, Any]:
     model, forms = results.model, []
     shown = bench_frames.of_folder(output / DATA_SET, model)
     if plan.trainer != "numpy":
-        wanted = bench_forms.planned(model, bench_forms.QUICK_FORMS, 1000)
+        wanted = bench_frames.planned(model, bench_frames.QUICK_FORMS, 1000)
         pairs = bench_frames.of_folder(output / DATA_SET, model, "train").pairs
-        forms = bench_forms.trained(model, wanted, pairs, bench_forms.folder_of(model, output), plan.trainer)
+        forms = bench_frames.trained(
+            model, wanted, pairs, bench_frames.folder_of(model, output), plan.trainer
+        )
     facts: dict[str, Any] = {"pairs": shown.pairs, "frames": shown.as_data(), "name": f"demo, {plan.scene}"}
     request = Request(model, plan.size_px, REPEATS, budget_s=3.0, quick=True, **facts)
     return bench.measure(request, command="wamnet demo", forms=forms)

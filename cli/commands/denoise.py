@@ -26,7 +26,7 @@ from ..common import options
 from ..common.domain import check_domain
 from ..common.executors import chosen
 from ..common.inputs import load_model, model_path
-from ..common.options import ExecutorName, argument, option
+from ..common.options import ExecutorName
 from ..common.request import KernelRequest
 from ..common.sequence import frames_of, is_many, outputs_of, overlapped
 from ..common.terminal import hint_on_interrupt, progress, say, table, tell
@@ -38,15 +38,9 @@ from ..files.outputs import check_output
 class Layers:
     """What of a frame is read and kept."""
 
-    anyway: bool = option(
-        "--anyway  Denoise frames of other programs even if they lie outside the training domain.", False
-    )
-    keep_layers: bool = option(
-        "--keep-layers  Also copy all layers of FRAME, and write the result as layer wamnet.", False
-    )
-    view_layer: str = option(
-        "NAME  View, part or view layer of FRAME to denoise. [default: the first view]", ""
-    )
+    anyway: bool = False
+    keep_layers: bool = False
+    view_layer: str = ""
 
 
 @dataclass
@@ -104,41 +98,17 @@ class Job:
 
 
 def denoise(
-    model: Path = option("model", ...),
-    frames: list[Path] = argument(
-        "FRAME...  Noisy frames with the layers that the model reads (.exr); shot.*.exr and shot.%04d.exr "
-        "are sequences."
-    ),
-    output: Path = option(
-        "-o --output FILE  Output: linear colour (.exr) or display-encoded image (.png); for several "
-        "frames, a folder or a pattern with %04d for the frame number.",
-        Path("denoised.png"),
-    ),
-    executor: options.ExecutorChoice = option("executor", "auto"),
+    model: Path,
+    frames: list[Path],
+    output: Path = Path("denoised.png"),
+    executor: options.ExecutorChoice = "auto",
     *,
     kernel: KernelRequest,
-    rank: int = option("rank", 0),
+    rank: int = 0,
     layers: Layers,
-    context: options.ContextName | None = option("context"),
+    context: options.ContextName | None = None,
 ) -> None:
-    """Denoise frames with a trained model.
-
-    The schedule is the fastest known for the device, unless --schedule names one. An integer network
-    (--variant whole8) gives a bit-identical result on every backend, and its digest is printed for
-    comparison. Kernels are cached: a second run compiles nothing. In a sequence, existing results are not
-    computed again.
-
-    Examples:
-    wamnet denoise model.safetensors noisy.exr -o denoised.png
-    wamnet denoise minicubes noisy.exr -o denoised.png
-    wamnet denoise model.safetensors noisy.exr --executor opencl -o denoised.exr
-    wamnet denoise model.safetensors 'shot.%04d.exr' --executor opencl -o denoised
-    wamnet denoise model.safetensors shot.*.exr --executor c -o denoised/shot.%04d.png
-    wamnet denoise model.safetensors noisy.exr --executor opencl --variant window8+rank16
-    wamnet denoise model.safetensors noisy.exr --executor c --variant whole8
-    wamnet denoise hall.safetensors frame0001.exr --keep-layers -o for-the-compositor.exr
-    wamnet denoise small.safetensors noisy.exr --executor opencl --rank 16
-    """
+    """Denoise frames with a trained model."""
     paths = frames_of(frames)
     outputs = outputs_of(paths, output)
     many, suffixes = is_many(paths, output), (".exr",) if layers.keep_layers else (".exr", ".png")
@@ -235,11 +205,7 @@ def read_origin(path: Path) -> str | None:
 
 
 def executors() -> None:
-    """List the available backends, and what the others need.
-
-    Example:
-    wamnet executors
-    """
+    """List the available backends, and what the others need."""
     found = [probe(name.value) for name in ExecutorName]
     heads = ("name", "state", "schedule", "device, or what is missing")
     table("Executors", heads, found, texts=4)

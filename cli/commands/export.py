@@ -9,18 +9,16 @@ import typer
 from ...compiler.artifact import schedule_text
 from ...kernels.export import check as checking
 from ...kernels.export import speed
-from ...kernels.export.hosts.host import HOSTS, host_named
+from ...kernels.export.hosts.host import host_named
 from ...kernels.export.motion import TIME, Motion
 from ...kernels.export.package import Export, Request, with_speed
 from ...kernels.export.package import export as exported
-from ...kernels.export.targets import NAMES
 from ...models.data.frame_plan import animation_times
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.light.scene import Scene
 from ...refimpl.light.transport import Settings
 from ..common import options
 from ..common.inputs import load_model, load_scene
-from ..common.options import option
 from ..common.request import KernelRequest, given, refuse
 from ..common.terminal import STATUS_WRONG, say
 from ..files.outputs import check_new_folder, making_folder
@@ -37,36 +35,22 @@ SECONDS, FPS = 8.0, 10.0
 class Kernel(KernelRequest):
     """How the denoiser is compiled, for another machine than this one."""
 
-    schedule: str | None = option(
-        "NAME  Kernel schedule of the denoiser: plain is human-readable, the others are faster. [default: "
-        "the fastest for this target and model]"
-    )
-    weights: str | None = option(
-        "PLACE  Storage of the weights: inline, uniform, texture or buffer, depending on the target. "
-        "[default: the target's default]"
-    )
+    schedule: str | None = None
+    weights: str | None = None
 
 
 @dataclass(frozen=True)
 class Shown:
     """The scene whose path tracer comes along, and what of it moves."""
 
-    scene: str | None = option(
-        "SCENE  Also export the path tracer for this scene: a canonical scene or a file (.json). [default: "
-        "denoiser only]"
-    )
-    time: float | None = option("time")
-    parameters: list[str] | None = option("parameters")
-    max_depth: int = option("max_depth", 5)
-    sampler: options.Sampler = option("sampler", "pcg4d")
-    moving: str | None = option(
-        "LIST  Scene parameters to pass at run time instead of baking in: time, camera, lights, positions. "
-        "[default: none: the scene is baked in]"
-    )
-    seconds: float | None = option(
-        f"Duration covered by the animation table, in seconds. [default: {SECONDS:g}]"
-    )
-    fps: float | None = option(f"Table entries per second. [default: {FPS:g}]")
+    scene: str | None = None
+    time: float | None = None
+    parameters: list[str] | None = None
+    max_depth: int = 5
+    sampler: options.Sampler = "pcg4d"
+    moving: str | None = None
+    seconds: float | None = None
+    fps: float | None = None
 
     def check(self) -> None:
         """Refuse options that mean nothing without others."""
@@ -103,10 +87,8 @@ class Shown:
 class Into:
     """What is exported for; one of the two is needed."""
 
-    target: str | None = option(
-        f"NAME  Target language or format: {', '.join((*NAMES, HTML))}. [default: the host's target]"
-    )
-    host: str | None = option(f"NAME  Complete host program to generate: {', '.join(HOSTS)}. [default: none]")
+    target: str | None = None
+    host: str | None = None
 
     @property
     def language(self) -> str:
@@ -120,38 +102,16 @@ class Into:
 
 
 def export(
-    model: Path = option("model", ...),
+    model: Path,
     *,
     into: Into,
-    output: Path | None = option("-o --output FOLDER  New output folder. [default: HOST or TARGET]"),
+    output: Path | None = None,
     shown: Shown,
     kernel: Kernel,
-    check: bool = option(
-        "--check  Compile and run the export here, and compare its output with the reference.", False
-    ),
-    measure: bool = option(
-        "--measure  Measure the time per frame on this machine and report it in the README.", False
-    ),
+    check: bool = False,
+    measure: bool = False,
 ) -> None:
-    """Export a denoiser for another program: kernels, a manifest, a README and a reference test image.
-
-    --host adds a complete program around them; see "Run it" in its README.
-
-    Every target's files have been compiled by the target's own tools, run, and checked against the bound
-    in the manifest. --scene also exports the path tracer and its feature encoding; --target html writes
-    a web page with all of them.
-
-    Examples:
-    wamnet export model.safetensors --target wgsl -o for-webgpu
-    wamnet export model.safetensors --scene minicubes --target glsl-es -o for-webgl
-    wamnet export model.safetensors --scene minicubes --host c -o program
-    wamnet export model.safetensors --target c --weights inline --check -o header
-    wamnet export model.safetensors --target opencl --measure -o timed
-    wamnet export model.safetensors --target cuda --schedule plain -o to-read
-    wamnet export model.safetensors --target hlsl --variant window8+rank16 -o for-direct3d
-    wamnet export model.safetensors --scene minicubes --moving time,camera --target c -o turning
-    wamnet export model.safetensors --scene minicubes --target html -o page
-    """
+    """Export a denoiser for another program: kernels, a manifest, a README and a reference test image."""
     target, host = into.language, into.host
     folder = output or Path(host or target)
     if target == HTML:

@@ -6,7 +6,6 @@ distribution `wamnet-peers` (experiments/peers/command.py).
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -19,10 +18,8 @@ from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.light.scene import Scene
 from ...refimpl.network.denoise import Model
 from ..common.inputs import load_model
-from ..common.options import SCENES, option, parse_names, usage
+from ..common.options import parse_names
 from ..common.terminal import STATUS_WRONG, say
-
-SceneShown = Annotated[str, usage(f"NAME  Canonical scene ({SCENES}) or scene file.")]
 
 
 def names_of(option: str, text: str, known: Iterable[str]) -> tuple[str, ...]:
@@ -48,23 +45,12 @@ def row(*cells: str, after: str = "") -> None:
 
 
 def exports(
-    model: Path | None = option(
-        "MODEL  Trained model (.safetensors) or bundled model. [default: a small network with random weights]"
-    ),
-    scene: SceneShown = "minicubes",
-    targets: str | None = option("NAME,...  Export targets to measure. [default: all]"),
-    places: bool = option("--places  Export every weight storage, without the path tracer.", False),
+    model: Path | None = None,
+    scene: str = "minicubes",
+    targets: str | None = None,
+    places: bool = False,
 ) -> None:
-    """Export for every target, compile, run, check against the bound, and print the verdicts.
-
-    Each target is compiled by its own tools and run by the closest available runtime, and its image is
-    compared with the reference. A missing tool is reported in the table. The exit status is 1 if the image of
-    a target is wrong.
-
-    Examples:
-    wamnet bench exports
-    wamnet bench exports --model model.safetensors --scene minicubes --targets wgsl,c --places
-    """
+    """Export for every target, compile, run, check against the bound, and print the verdicts."""
     # Of a scene that moves, a time when its parts are turned.
     shown = scene_source(scene).at(1.0)
     chosen = tuple(NAMES) if targets is None else names_of("--targets", targets, NAMES)

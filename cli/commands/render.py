@@ -15,52 +15,35 @@ from ..common import options
 from ..common.effort import said_of_rendering
 from ..common.executors import chosen
 from ..common.inputs import load_scene
-from ..common.options import FloatType, option
+from ..common.options import FloatType
 from ..common.terminal import progress, say
 from ..files import exr, images
 from ..files.outputs import check_output, write_text
 
 
 def render(
-    scene: str = option("scene", ...),
-    output: Path | None = option(
-        "-o --output FILE  Output: frame with all layers (.exr), or its colour only (.png). [default: "
-        "SCENE.exr]"
-    ),
-    width: int = option("Width in pixels.", 256),
-    height: int = option("Height in pixels.", 256),
-    spp: int = option("Paths per pixel: 1 is noisy, 1024 is smooth.", 1),
-    feature_spp: int = option("feature_spp", 0),
-    seen: bool = option("seen", False),
-    shadow_rays: int = option("shadow_rays", 0),
-    seed: int = option("seed", 0),
-    time: float | None = option("time"),
-    parameters: list[str] | None = option("parameters"),
+    scene: str,
+    output: Path | None = None,
+    width: int = 256,
+    height: int = 256,
+    spp: int = 1,
+    feature_spp: int = 0,
+    seen: bool = False,
+    shadow_rays: int = 0,
+    seed: int = 0,
+    time: float | None = None,
+    parameters: list[str] | None = None,
     *,
     view: options.View,
-    max_depth: int = option("max_depth", 5),
-    sampler: options.Sampler = option("sampler", "pcg4d"),
-    dtype: FloatType = option("Floating-point type of the computation; files store float32.", "float32"),
-    executor: options.ExecutorChoice = option("renderer", "auto"),
-    context: options.ContextName | None = option("context"),
-    workers: int | None = option("Number of worker processes (NumPy only). [default: one per core]"),
-    exposure: float = option("exposure", 0.0),
+    max_depth: int = 5,
+    sampler: options.Sampler = "pcg4d",
+    dtype: FloatType = "float32",
+    executor: options.ExecutorChoice = "auto",
+    context: options.ContextName | None = None,
+    workers: int | None = None,
+    exposure: float = 0.0,
 ) -> None:
-    """Path-trace a scene: colour, albedo, normal, depth, position and ray direction.
-
-    The same scene, size, samples and seed give the same frame, whatever the number of workers. Compiled
-    backends (OpenCL, OpenGL, C) give the same frame up to rounding, and are much faster.
-
-    Examples:
-    wamnet render minicubes
-    wamnet render minicubes --feature-spp 4 -o noisy.exr
-    wamnet render glossy --seen -o mirrors.exr
-    wamnet render minicubes --feature-spp 4 --shadow-rays 4 -o shadows.exr
-    wamnet render minicubes --time 2.5 --spp 64 --width 512 --height 512 -o reference.exr
-    wamnet render minicubes --yaw 20 --light 1=1,0.3,0.3 --light 2=0.3,0.6,1
-    wamnet render minicubes --spp 1024 --executor opencl -o reference.exr
-    wamnet render furnace --set albedo=0.8 --max-depth 20 -o furnace.png
-    """
+    """Path-trace a scene: colour, albedo, normal, depth, position and ray direction."""
     loaded = load_scene(scene, time, parameters or [], view)
     path = output or Path(f"{Path(scene).stem}.exr")
     check_output(path, (".exr", ".png"), [Path(scene)])
@@ -84,20 +67,14 @@ def render(
 
 
 def scene(
-    name: str = option("scene", ...),
-    output: Path | None = option("-o --output FILE  Output file. [default: the terminal]"),
-    time: float | None = option("time"),
-    parameters: list[str] | None = option("parameters"),
+    name: str,
+    output: Path | None = None,
+    time: float | None = None,
+    parameters: list[str] | None = None,
     *,
     view: options.View,
 ) -> None:
-    """Write a scene as a JSON file that you can edit and render.
-
-    Examples:
-    wamnet scene minicubes
-    wamnet scene minicubes --time 2.5 --set warm=1,0.5,0.2 -o mine.json
-    wamnet render mine.json
-    """
+    """Write a scene as a JSON file that you can edit and render."""
     text = to_json(load_scene(name, time, parameters or [], view))
     if output is None:
         typer.echo(text, nl=False)

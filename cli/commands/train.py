@@ -23,7 +23,7 @@ from ...refimpl.network.train import PRESETS, Recipe, TrainState, check_recipe, 
 from ..common import options
 from ..common.executors import chosen
 from ..common.inputs import CHECKPOINT_MARK, load_model
-from ..common.options import Preset, option
+from ..common.options import Preset
 from ..common.request import given
 from ..common.terminal import hint_on_interrupt, progress, say
 from ..files import dataset_files, exr
@@ -38,42 +38,24 @@ CHECKPOINT_INTERVAL_S = 30.0
 class Pairs:
     """What is trained on: single frames, or a data set."""
 
-    inputs: list[Path] | None = option("-i --input FILE  Noisy frame (.exr). Repeatable.")
-    targets: list[Path] | None = option(
-        "-t --target FILE  Reference of each noisy frame, in the same order. Repeatable."
-    )
-    dataset: Path | None = option("FOLDER  Data set to train on, instead of single frames.")
+    inputs: list[Path] | None = None
+    targets: list[Path] | None = None
+    dataset: Path | None = None
 
 
 @dataclass(frozen=True)
 class Wanted:
     """The recipe; None for what the preset, or the checkpoint, has."""
 
-    preset: Preset | None = option(
-        "Training preset: best, mirrors (mirrors and glass), paper (the paper's), short, or sky (under an "
-        "environment). [default: best]"
-    )
-    features: str | None = option(
-        "Input features, separated by commas: color, highlights, normal, albedo, seen_albedo, ... [default: "
-        "the preset's]"
-    )
-    rank: int | None = option(
-        "Rank of the first layer: 16 needs a fifth of the operations; 0 is full rank. [default: the preset's]"
-    )
-    begin: Path | None = option(
-        "--from MODEL  Start from this model's weights, reduced to --rank or --variant, instead of random "
-        "ones."
-    )
-    variant: str | None = option(
-        "NAME  Fine-tune this variant of the model given by --from, for example window8+rank16. whole8 and "
-        "whole10 round the weights to integers at the end; with --from and without --steps they only round."
-    )
-    whole: bool = option("--whole  Short for --variant whole8: an 8-bit integer network.", False)
-    activation: str | None = option(
-        "NAME  Hidden-layer activation: sine or relu. [default: the preset's: sine]"
-    )
-    steps: int | None = option("Number of training steps. [default: the preset's]")
-    seed: int | None = option("Random seed of the initial weights and of sampling.")
+    preset: Preset | None = None
+    features: str | None = None
+    rank: int | None = None
+    begin: Path | None = None
+    variant: str | None = None
+    whole: bool = False
+    activation: str | None = None
+    steps: int | None = None
+    seed: int | None = None
 
     def recipe(self, state: TrainState | None) -> Recipe:
         """Return the recipe, checked."""
@@ -98,34 +80,13 @@ class Wanted:
 def train(
     *,
     pairs: Pairs,
-    output: Path = option("-o --output FILE  Model to write (.safetensors).", Path("model.safetensors")),
+    output: Path = Path("model.safetensors"),
     wanted: Wanted,
-    resume: bool = option(
-        "--resume  Resume from the checkpoint next to the model, with the checkpoint's recipe.", False
-    ),
-    restart: bool = option("--restart  Start again and overwrite the checkpoint of an earlier run.", False),
-    executor: options.TrainerName = option(
-        "Backend that trains: numpy is the reference, opencl a compiled training step; [bold]auto[/] is the "
-        "fastest available.",
-        "auto",
-        envvar=options.EXECUTOR_VARIABLE,
-    ),
+    resume: bool = False,
+    restart: bool = False,
+    executor: options.TrainerName = "auto",
 ) -> None:
-    """Train a network on noisy frames and their references, or on a data set.
-
-    A checkpoint is kept next to the model. After Ctrl-C, --resume continues from it with bit-identical
-    results. With more --steps it continues past the end; the learning rate, which decays over the run,
-    then jumps back up, so the model differs from one trained for this many steps from the start.
-
-    Examples:
-    wamnet train -i noisy.exr -t reference.exr -o model.safetensors
-    wamnet train --dataset cubes --steps 20000 --executor opencl
-    wamnet train -i n0.exr -t r0.exr -i n1.exr -t r1.exr --features color,normal --steps 4000
-    wamnet train -i noisy.exr -t reference.exr --resume --steps 20000
-    wamnet train --dataset cubes --from model.safetensors --variant window8+rank16 --steps 2000
-    wamnet train --dataset cubes --from model.safetensors --rank 12 --executor opencl -o small.safetensors
-    wamnet train --dataset cubes --from model.safetensors --whole -o integers.safetensors
-    """
+    """Train a network on noisy frames and their references, or on a data set."""
     inputs, targets, begin = pairs.inputs or [], pairs.targets or [], wanted.begin
     check_output(output, (".safetensors",), [*inputs, *targets])
     saved = checkpoint_path(output)

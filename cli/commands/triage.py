@@ -40,11 +40,11 @@ from ...refimpl.network.dataset import FEATURES
 from ...refimpl.network.denoise import Model
 from ...refimpl.reading import SIZES, parse_json, read_file, refusing
 from ..common.inputs import load_model, model_path
-from ..common.options import argument, option
 from ..common.terminal import STATUS_WRONG, progress, say, table
 from ..files import exr
 from ..files.outputs import check_new_folder, making_folder, write_text
 from ..reports import machine
+from ..reports.pages import filled
 
 SCHEMA = "wamnet-triage-1"
 """Name and version of the report's form; described in spec/triage.md."""
@@ -57,40 +57,20 @@ REPORT, README, MODEL, FRAME = "report.json", "README.md", "model.safetensors", 
 class Chosen:
     """The kernels that run."""
 
-    executor: list[str] | None = option(
-        "NAME  Run only this backend; opengl means opengl-egl and opengl-osmesa. Repeatable. [default: all "
-        "available]"
-    )
-    profile: str = option("profile", "ieee")
-    schedules: str = option(
-        "NAME  Schedules: [bold]picked[/] (each backend's default), [bold]all[/] of its target, or a name.",
-        "picked",
-    )
-    kernel: Path | None = option(
-        "FOLDER  Run this kernel's files instead of compiling for its target and schedule."
-    )
+    executor: list[str] | None = None
+    profile: str = "ieee"
+    schedules: str = "picked"
+    kernel: Path | None = None
 
 
 def triage(
-    model: Path = option("model", ...),
-    frame: Path = argument("FRAME  Frame with the layers that the model reads (.exr)."),
+    model: Path,
+    frame: Path,
     *,
     chosen: Chosen,
-    output: Path = option(
-        "-o --output FOLDER  Output folder for the reproducer, if a kernel deviates.", Path("triage")
-    ),
+    output: Path = Path("triage"),
 ) -> None:
-    """Run a model on every backend, and find the one that exceeds its error bound.
-
-    Each kernel is compared with the float64 reference, within its schedule's bound for this frame. If
-    one deviates, FOLDER gets the first deviating stage and the smallest part of the frame that
-    reproduces it, with the kernel's source. The exit status is 1 if a kernel deviates.
-
-    Examples:
-    wamnet triage model.safetensors noisy.exr
-    wamnet triage model.safetensors noisy.exr --schedules all
-    wamnet triage model.safetensors noisy.exr --executor opencl --executor numpy -o odd
-    """
+    """Run a model on every backend, and find the one that exceeds its error bound."""
     check_new_folder(output)
     profile_named(chosen.profile)
     model = model_path(model)
@@ -217,7 +197,9 @@ def keep(folder: Path, task: Task, verdicts: Sequence[Verdict], found: Reduced, 
         report = _report(task, verdicts, found)
         text = json.dumps(report, indent=2, sort_keys=True, allow_nan=False) + "\n"
         write_text(new / REPORT, text)
-        write_text(new / README, _readme(task, report, odd))
+        kept, made = ([shlex.join(_command(task, kernel, it)) for kernel in odd] for it in (True, False))
+        text = filled("triage.md.jinja", conclusion=report["conclusion"], kept=kept, made=made, report=REPORT)
+        write_text(new / README, text)
 
 
 def part_of(task: Task, box: Box) -> Frame:
@@ -288,30 +270,6 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
 def _number(value: float) -> float | str:
     """Return a number for JSON, or its name: nan, inf, -inf."""
     return value if math.isfinite(value) else str(value)
-
-
-def _readme(task: Task, report: dict[str, Any], odd: Sequence[Kernel]) -> str:
-    """Return the text that says what this is, and the commands that repeat it."""
-    kept, made = ("\n".join(shlex.join(_command(task, kernel, it)) for kernel in odd) for it in (True, False))
-    return f"""\
-# A kernel beyond its bound
-
-{report["conclusion"]}.
-
-In this folder:
-
-```sh
-{kept}
-```
-
-With the kernel that the compiler makes now, in place of the kept one:
-
-```sh
-{made}
-```
-
-{REPORT} holds what was found, expected and promised, devices and versions.
-"""
 
 
 def _command(task: Task, kernel: Kernel, kept: bool) -> list[str]:

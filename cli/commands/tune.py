@@ -9,41 +9,23 @@ from ...kernels import cache as cache_folders
 from ...kernels import open_executor
 from ...kernels.bench.workload import paper_model
 from ...kernels.run.tune import Subject, Table, Tuning
-from ...refimpl.errors import InputError
 from ..common import options
 from ..common.inputs import load_model
-from ..common.options import ExecutorName, argument, option
+from ..common.options import ExecutorName
 from ..common.terminal import say, table
 from ..files.alone import alone_in
 
-LARGEST_SIZE = 2**13
-"""Largest width and height that is measured: a picture of 64 million pixels takes gigabytes."""
-
 
 def tune(
-    model: Path | None = argument(
-        "MODEL  Trained model (.safetensors). [default: a network of the paper's size]", None
-    ),
-    executor: ExecutorName = option("Backend that runs the kernel.", ExecutorName.opencl),
-    size: int = option("Width and height of the image, in pixels.", 512),
-    rank: int = option("rank", 0),
-    context: options.ContextName | None = option("context"),
-    force: bool = option("--force  Ignore cached measurements.", False),
-    cache: Path | None = option(
-        "--cache DIR  Folder for the measurements; other commands use it if WAMNET_CACHE names it. [default: "
-        "~/.cache/wamnet]"
-    ),
+    model: Path | None = None,
+    executor: ExecutorName = ExecutorName.opencl,
+    size: int = 512,
+    rank: int = 0,
+    context: options.ContextName | None = None,
+    force: bool = False,
+    cache: Path | None = None,
 ) -> None:
-    """Measure which schedule of the denoiser is fastest on this machine, and cache the result.
-
-    Schedules are checked against the reference first. Other commands use the result for similar networks.
-
-    Examples:
-    wamnet tune
-    wamnet tune model.safetensors --executor opengl --size 512 --force
-    """
-    if not 1 <= size <= LARGEST_SIZE:
-        raise InputError("--size", size, f"must be from 1 to {LARGEST_SIZE}", "for example --size 512")
+    """Measure which schedule of the denoiser is fastest on this machine, and cache the result."""
     if cache is not None:
         os.environ["WAMNET_CACHE"] = str(cache)
     network = load_model(model) if model else paper_model()

@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from ...refimpl.errors import InputError
-from ..common import options
-from ..common.options import option
 from ..common.terminal import say
 from ..files.outputs import check_output, write_text
 from ..reports.webpage import page_of
@@ -35,33 +33,15 @@ far less."""
 
 
 def view(
-    model: Path = option("model", ...),
-    scene: str | None = option(
-        f"SCENE  Canonical scene ({options.SCENES}) or scene file (.json). [default: the model's training "
-        "scene]"
-    ),
-    fast: Path | None = option(
-        "MODEL  Model for the fast variant, fine-tuned at rank 16; its first layer is reduced to rank 16. "
-        "[default: same as MODEL]"
-    ),
-    parameters: list[str] | None = option("parameters"),
-    port: int = option("Port to serve the page on; 0 picks a free one.", 0),
-    browser: bool = option("Open a browser.", True),
-    output: Path | None = option(
-        "-o --output FILE  Write the page (.html) instead of serving it. [default: serve the page]"
-    ),
+    model: Path,
+    scene: str | None = None,
+    fast: Path | None = None,
+    parameters: list[str] | None = None,
+    port: int = 0,
+    browser: bool = True,
+    output: Path | None = None,
 ) -> None:
-    """Show a model in the browser: the scene, path-traced live, its normals, and the denoised image.
-
-    The page is a single file that needs WebGL 2 and no server; -o writes it.
-
-    Examples:
-    wamnet view model.safetensors
-    wamnet view model.safetensors --fast model-16.safetensors --scene minicubes --port 8080
-    wamnet view model.safetensors -o page.html
-    """
-    if not 0 <= port <= 65535:
-        raise InputError("--port", port, "must be from 0 to 65535", "for example --port 8080")
+    """Show a model in the browser: the scene, path-traced live, its normals, and the denoised image."""
     if output is not None:
         check_output(output, (".html", ".htm"), [path for path in (model, fast) if path])
     page = page_of(model, scene, parameters or [], fast)

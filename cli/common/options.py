@@ -1,4 +1,4 @@
-"""The options that several commands share, each defined once, and the parsing of their values.
+"""The types of options, and the parsing of their values; their names and texts are in cli/options.ini.
 
 Ranges are not repeated here: what a number may be is said by the function of the reference that takes it.
 """
@@ -8,9 +8,8 @@ from __future__ import annotations
 import colorsys
 import math
 import os
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,12 +19,6 @@ from ...refimpl.errors import InputError
 
 if TYPE_CHECKING:
     from ...refimpl.light.scene import Scene, Vector
-
-SCENES = "minicubes, glossy, vitrine, daylight, cornell, furnace, lone_light, empty"
-"""Canonical scenes by name, for help texts; equal to the registry in refimpl, which they do not import."""
-
-MODELS = "minicubes, cornell, glossy, minicubes-basic, cornell-basic, glossy-basic"
-"""Names of the models that ship with the package, for help texts; equal to the files in models."""
 
 
 def _finite(value: float | None) -> float | None:
@@ -52,14 +45,6 @@ def _context(command: typer.Context, value: ContextName | None) -> ContextName |
             os.environ[CONTEXT_VARIABLE] = before
 
     command.call_on_close(restore)
-    return value
-
-
-def _stops(value: float) -> float:
-    """Refuse an exposure that is not a number or that leaves no picture."""
-    # Far past a factor of 2**64 float32 ends.
-    if not abs(value) <= 64.0:
-        raise InputError("--exposure", value, "must be from -64 to 64 stops", "for example --exposure 1")
     return value
 
 
@@ -94,79 +79,8 @@ Preset = Literal["best", "mirrors", "mirrors-shadows", "shadows", "paper", "shor
 """Training protocols by name; equal to the registry in refimpl."""
 
 
-def usage(line: str, kind: Any = typer.Option, **how: Any) -> Any:
-    """Return an option, or an argument, from its line of help: `-o --output FILE  Model. [default: a name]`.
-
-    Names and metavar end at the first two spaces; without names it is called as its parameter. The default
-    is what is shown instead of the parameter's.
-    """
-    parts = re.fullmatch(r"(?:(\S.*?)  )?(.*?)(?: \[default: (.*)\])?", line)
-    assert parts is not None, "everything in it may be missing"
-    head, text, default = parts.groups()
-    words = (head or "").split()
-    names = [word for word in words if word.startswith("-")]
-    metavar = " ".join(words[len(names) :]) or None
-    return kind(*names, metavar=metavar, help=text or None, show_default=default or True, **how)
-
-
-def option(line: str, default: Any = None, kind: Any = typer.Option, **how: Any) -> Any:
-    """Return an option [`usage`] for a field of a request, or for a command's parameter [`request.spread`].
-
-    The line may be the name of one in [`SHARED`]. The default `...` means that it is needed.
-    """
-    default = MISSING if default is ... else default
-    how = {"kind": kind, **HOW.get(line, {}), **how}
-    return field(default=default, metadata={"option": usage(SHARED.get(line, line), **how)})
-
-
-def argument(line: str, default: Any = ..., **how: Any) -> Any:
-    """Return an argument in the same way."""
-    return option(line, default, typer.Argument, **how)
-
-
-EXECUTOR_VARIABLE = "WAMNET_EXECUTOR"
-"""Environment variable that names the executor where the caller does not, for results that must not depend on
-the machine."""
-
-SHARED: Mapping[str, str] = {
-    "model": f"MODEL  Trained model (.safetensors), or bundled model ({MODELS}).",
-    "scene": f"SCENE  Canonical scene ({SCENES}) or scene file (.json).",
-    "executor": "--executor  Backend that runs the kernel: [bold]auto[/] is the fastest that [bold]wamnet "
-    "executors[/] lists.",
-    "renderer": "Backend that traces the paths: [bold]auto[/] is the fastest available.",
-    "context": "--context  OpenGL context: [bold]egl[/] needs no display; [bold]osmesa[/] renders in main "
-    "memory. [default: the first one available, or WAMNET_OPENGL_CONTEXT]",
-    "profile": "--profile  Numerical profile: [bold]ieee[/] has its own sine and a proven error bound, "
-    "[bold]ieee-sine7[/] a sine of degree 7 (3 to 13), [bold]native[/] uses the target's sine.",
-    "rank": "--rank R  Short for --variant rankR: reduce the first layer to rank R and run it as two passes, "
-    "rows then columns. Loses little quality after fine-tuning. [default: no cut]",
-    "seed": "--seed  Random seed.",
-    "time": "--time  Time in the animation, in seconds. [default: 0]",
-    "exposure": "--exposure  Exposure in stops; +1 doubles the brightness.",
-    "parameters": "--set NAME=VALUE  Parameter of a canonical scene: one number, or three separated by "
-    "commas. Repeatable.",
-    "max_depth": "Maximum number of bounces per path.",
-    "sampler": "--sampler  Sampler: independent (pcg4d) or low-discrepancy (sobol), with less noise at many "
-    "samples.",
-    "feature_spp": "--feature-spp N  Stratified camera rays per pixel for the features; 4 give smooth edges, "
-    "and each costs a fraction of a path. [default: same as --spp]",
-    "shadow_rays": "--shadow-rays N  Also write the layer direct (with --seen seen_direct too): direct light "
-    "with its soft shadows, by N shadow rays per camera ray.",
-    "seen": "--seen  Also write specular features, traced through mirrors and glass: seen_albedo, "
-    "seen_normal, ...",
-}
-"""Lines of help that several commands have, by name."""
-
-HOW: Mapping[str, Mapping[str, Any]] = {
-    "model": {"kind": typer.Argument},
-    "scene": {"kind": typer.Argument},
-    "executor": {"envvar": EXECUTOR_VARIABLE},
-    "renderer": {"envvar": EXECUTOR_VARIABLE},
-    "context": {"callback": _context},
-    "time": {"callback": _finite},
-    "exposure": {"callback": _stops},
-}
-"""What else typer knows of them."""
+CALLBACKS: Mapping[str, Callable[..., Any]] = {"context": _context, "time": _finite}
+"""What is done with the values of these parameters as soon as they are read."""
 
 
 def parse_parameters(texts: Sequence[str]) -> dict[str, float | tuple[float, ...]]:
@@ -200,15 +114,10 @@ def parse_limits(option: str, text: str) -> tuple[float, float]:
 class View:
     """What is asked of camera and lamps: degrees, a factor of the distance, texts like `1=1,0.5,0.2`."""
 
-    yaw_deg: float = option("--yaw DEG  Orbit the camera around its target, in degrees.", 0.0)
-    pitch_deg: float = option(
-        "--pitch DEG  Raise the camera around its target, in degrees (negative: lower it).", 0.0
-    )
-    distance: float = option("X  Scale the camera distance; 2 moves it twice as far away.", 1.0)
-    lights: list[str] | None = option(
-        "--light N=R,G,B  Hue and saturation of light N (from 1), in linear RGB; its brightness is "
-        "unchanged. Repeatable. [default: as in the scene]"
-    )
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    distance: float = 1.0
+    lights: list[str] | None = None
 
     def of(self, scene: Scene) -> Scene:
         """Return the scene from there and under these lamps; its info says so."""

@@ -4,14 +4,13 @@ A record is made of the rows (experiments/publish.py); progress is on standard e
 """
 
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from functools import partial
 from importlib import metadata
-from typing import Annotated
 
-from wamnet.cli.commands.measure import SceneShown, head, names_of, row
-from wamnet.cli.common.options import SCENES, option, parse_names, usage
+from wamnet.cli.commands.measure import head, names_of, row
+from wamnet.cli.common.options import parse_names
 from wamnet.cli.common.terminal import progress, say
 from wamnet.cli.reports import machine
 from wamnet.kernels import EXECUTORS, open_executor
@@ -40,9 +39,6 @@ MOST = 1 << 20
 NUMPY = f"NumPy {metadata.version('numpy')}"
 """NumPy's version, with its name."""
 
-Repeats = Annotated[int, usage("Number of interleaved rounds.")]
-Square = Annotated[int, usage("Width and height in pixels.")]
-
 
 def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
     """Return the integers of a text like `256,512`, or refuse it."""
@@ -56,16 +52,6 @@ def counts_of(option: str, text: str, example: str) -> tuple[int, ...]:
     return counts
 
 
-def check_counts(sizes: Iterable[int] = (), **counts: tuple[int, int]) -> None:
-    """Refuse sizes of which no picture is made, and numbers of things that make none: (value, example)."""
-    for size in sizes:
-        check_size(size)
-    for name, (value, example) in counts.items():
-        if not 1 <= value <= MOST:
-            option = f"--{name}"
-            raise InputError(option, value, f"must be from 1 to {MOST}", f"for example {option} {example}")
-
-
 def say_facts(*others: str) -> None:
     """Print what is said of the machine, then what else was given."""
     say(", ".join([*(f"{name} {value}" for name, value in machine.describe().items()), *others]))
@@ -76,35 +62,20 @@ def extent(values: Sequence[float], digits: int) -> str:
     return f"{min(values):.{digits}f} - {max(values):.{digits}f}"
 
 
-Spp = Annotated[int, usage("Samples per pixel.")]
-
-
 def render(
-    scenes: str = option(f"NAME,...  Canonical scenes ({SCENES}) or scene files.", "minicubes,cornell"),
-    by: str = option(
-        "--by --executors NAME,...  Renderers to measure: numpy, opencl, opengl, c, mitsuba.", "numpy"
-    ),
-    workers: str | None = option("N,...  Processes for the NumPy reference. [default: 1, and one per core]"),
-    size: Square = 512,
-    spp: Spp = 2,
-    depth: int = option("Maximum path length, including the camera ray.", 6),
-    repeats: Repeats = 5,
+    scenes: str = "minicubes,cornell",
+    by: str = "numpy",
+    workers: str | None = None,
+    size: int = 512,
+    spp: int = 2,
+    depth: int = 6,
+    repeats: int = 5,
 ) -> None:
-    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3.
-
-    Each renders its first frame with empty compiler caches, then all are interleaved. The table has the
-    median and the range, samples (paths) per second, and the ratio to the last row's. A second table
-    compares each mean colour with that of the first renderer, in standard errors. [bold]pip install
-    mitsuba[/] adds Mitsuba, which also needs libLLVM.
-
-    Examples:
-    wamnet bench render --size 512 --spp 2 --repeats 5
-    wamnet bench render --scenes minicubes --by numpy,opencl,mitsuba --workers 2 --spp 16
-    """
+    """Measure samples per second: the reference renderer, its kernels, Mitsuba 3."""
     kinds, shown = names_of("--by", by, paths.BY), parse_names(scenes) or [scenes]
     usual = f"1,{cores()}"
     processes = counts_of("--workers", usual if workers is None else workers, "1,2")
-    check_counts([size], spp=(spp, 2), depth=(depth, 6), repeats=(repeats, 5))
+    check_size(size)
     job = Job(size, size, spp, settings=Settings(max_depth=depth - 1))
     tables = [paths.renderers(name, job, kinds, processes) for name in shown]
     entries = [entry for found in tables for entry in found]
@@ -136,29 +107,17 @@ def _say_agreement(entries: Sequence[Entry]) -> None:
 
 
 def primitives(
-    executors: str = option(
-        "NAME,...  Path tracers to measure: opencl, opengl, c, mitsuba.", "opencl,opengl"
-    ),
-    kinds: str = option("NAME,...  Kinds of primitives: shared, turned, spheres, quads, mixture.", "mixture"),
-    counts: str = option("N,...  Number of primitives.", "10,30,100,300"),
-    size: Square = 128,
-    spp: Spp = 4,
-    repeats: Repeats = 5,
+    executors: str = "opencl,opengl",
+    kinds: str = "mixture",
+    counts: str = "10,30,100,300",
+    size: int = 128,
+    spp: int = 4,
+    repeats: int = 5,
 ) -> None:
-    """Measure scenes of many primitives in all forms: unrolled statements, tables with a loop, a tree.
-
-    The table has the lines and size of the source, the seconds to trace and emit it, the seconds until
-    the driver has built it and traced a first row of paths (without disk caches), and million samples
-    per second: median and range of the interleaved rounds. A star marks the form that the compiler
-    chooses; a tree is measured only if it is expected to pay off.
-
-    Examples:
-    wamnet bench primitives
-    wamnet bench primitives --executors opencl,mitsuba --kinds spheres --counts 30,3000
-    """
+    """Measure scenes of many primitives in all forms: unrolled statements, tables with a loop, a tree."""
     given = names_of("--executors", executors, paths.BUILT)
     scenes, numbers = names_of("--kinds", kinds, paths.KINDS), counts_of("--counts", counts, "30,100")
-    check_counts([size], spp=(spp, 4), repeats=(repeats, 5))
+    check_size(size)
     say_facts(NUMPY, f"{size}x{size}, {spp} spp")
     head("backend", "scene", "form", "lines", "kB", "trace, s", "build, s", "Msamples/s", "range")
     part = Part(size, size, 0, size, 0, spp, 0)
@@ -187,32 +146,17 @@ def _show(by: str, scene: str, entry: Entry, samples: int) -> None:
 
 
 def train(
-    presets: str = option(f"NAME,...  Training presets: {', '.join(PRESETS)}.", "paper,short"),
-    trainers: str | None = option(
-        "NAME,...  Trainers to measure: numpy, opencl, torch. [default: all that are installed]"
-    ),
-    size: Square = 256,
-    frames: int = option("Number of noise frames to train on.", 4),
-    seconds: float = option("S  Approximate time per measurement, in seconds.", 1.0),
-    repeats: Repeats = 5,
+    presets: str = "paper,short",
+    trainers: str | None = None,
+    size: int = 256,
+    frames: int = 4,
+    seconds: float = 1.0,
+    repeats: int = 5,
 ) -> None:
-    """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch.
-
-    The trainers are interleaved with a product of two large matrices, on noise frames, minibatch sampling
-    included and compilation excluded. The table has the median and the range, GFLOP/s of the matrix
-    products, their share of the large product's rate, and the time that all steps would take. [bold]pip
-    install torch[/] adds PyTorch.
-
-    Examples:
-    wamnet bench train --presets paper,short --repeats 5
-    wamnet bench train --trainers numpy,opencl,torch --presets paper
-    """
+    """Measure milliseconds per training step: the reference, the compiled trainer, PyTorch."""
     names = names_of("--presets", presets, PRESETS)
     given = training.trainers() if trainers is None else names_of("--trainers", trainers, training.TRAINERS)
-    check_counts([size], frames=(frames, 4), repeats=(repeats, 5))
-    if not 0.0 < seconds <= 600.0:
-        rule = "must be above 0 and at most 600"
-        raise InputError("--seconds", seconds, rule, "for example --seconds 1")
+    check_size(size)
     packages = [f"{name} {value}" for name, value in machine.versions().items()]
     say_facts(*packages, f"{frames} frames of {size}x{size}")
     pairs = training.noise(frames, size)
@@ -234,33 +178,22 @@ def train(
 
 
 def pipeline(
-    scene: SceneShown = "minicubes",
-    executors: str = option("NAME,...  Backends to measure: numpy, opencl, opengl, c.", "opencl,opengl"),
-    sizes: str = option("N,...  Image sizes (width and height), in pixels.", "256,512"),
-    features: str = option("NAME,...  Input features of the network.", "color,normal"),
-    hidden: str = option("N,...  Width of each hidden layer, in neurons.", "32,32,32,32"),
-    window: int = option("Width and height of the window, in pixels.", 12),
-    feature_rays: int = option("N  Camera rays per pixel for the features; 0 uses the paths themselves.", 0),
-    repeats: Repeats = 5,
-    peers: str = option("NAME,...  Other renderers to include: mitsuba, cycles. [default: none]", ""),
+    scene: str = "minicubes",
+    executors: str = "opencl,opengl",
+    sizes: str = "256,512",
+    features: str = "color,normal",
+    hidden: str = "32,32,32,32",
+    window: int = 12,
+    feature_rays: int = 0,
+    repeats: int = 5,
+    peers: str = "",
 ) -> None:
-    """Measure full frames of an animated scene: one path per pixel, and denoising.
-
-    [bold]ours, moving[/] is one pipeline on a device in which every frame has a different time; the table
-    has its stages. [bold]separate[/] traces, reads back, encodes, uploads, denoises and reads back.
-    [bold]mitsuba[/] is Mitsuba 3 with Open Image Denoise, [bold]cycles[/] Blender's renderer with its
-    own (package bpy). All are interleaved. The first frame includes compiling its path kernel; with empty
-    caches, in a separate process, all kernels. The network has random weights.
-
-    Examples:
-    wamnet bench pipeline --sizes 256,512 --executors opencl,opengl --repeats 5
-    wamnet bench pipeline --executors opencl,opengl,c --sizes 256,512,1024,2048 --peers mitsuba,cycles
-    wamnet bench pipeline --scene cornell --features color,albedo,normal --hidden 32,32
-    """
+    """Measure full frames of an animated scene: one path per pixel, and denoising."""
     scene_source(scene)
     given, widths = names_of("--executors", executors, EXECUTORS), counts_of("--sizes", sizes, "256,512")
     others = names_of("--peers", peers, table.makers) if peers else ()
-    check_counts(widths, window=(window, 12), repeats=(repeats, 5))
+    for width in widths:
+        check_size(width)
     seen, layers = names_of("--features", features, FEATURES), counts_of("--hidden", hidden, "32,32")
     model = paper_model(seen, window, layers, depth_scale=20.0, position_scale=10.0)
     rays = f", features of {feature_rays} rays" if feature_rays > 1 else ""

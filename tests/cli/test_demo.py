@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from wamnet.cli.commands import bench, bench_forms, demo
+from wamnet.cli.commands import bench, bench_frames, demo
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.cli.main import main
@@ -234,7 +234,7 @@ def test_the_report_compares_trained_forms_on_the_unseen_frames(
     trained, given = [], []
     monkeypatch.setattr(bench, "measure", lambda request, **more: given.append((request, more)) or {})
     monkeypatch.setattr(
-        bench_forms,
+        bench_frames,
         "trained",
         lambda model, wanted, pairs, *_: trained.append((wanted, len(pairs))) or ["form"],
     )

@@ -4,8 +4,9 @@ import json
 
 import pytest
 
-from wamnet.cli.commands import export as command
+from wamnet.cli.common.request import table
 from wamnet.kernels.export import check, targets
+from wamnet.kernels.export.hosts.host import HOSTS
 
 
 def test_an_export_is_a_folder_that_certify_takes(wamnet, samples, tmp_path):
@@ -66,12 +67,10 @@ def test_a_wrong_export_ends_with_status_1(wamnet, samples, monkeypatch):
     assert "wrong: off by 1, 9 times the bound" in outcome.out
 
 
-def test_help_names_every_target():
-    assert command.TARGETS.replace(" ", "").split(",") == [
-        *(name for name in targets.NAMES if name != "onnx"),
-        "onnx",
-        "html",
-    ]
+def test_help_names_every_target_and_host():
+    names = table()["names"]
+    assert names["targets"].split(", ") == [*targets.NAMES, "html"]
+    assert names["hosts"].split(", ") == list(HOSTS)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ import pytest
 
 from wamnet.cli import main as module
 from wamnet.cli.common import options
+from wamnet.cli.common.request import table
 from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.kernels import EXECUTORS
 from wamnet.refimpl.errors import TrainingError
@@ -80,7 +81,8 @@ def test_choices_equal_the_registries() -> None:
     assert [name.value for name in options.ExecutorName] == list(EXECUTORS)
     assert set(get_args(options.Preset)) == set(PRESETS)
     assert list(get_args(options.Sampler)) == list(SAMPLERS)
-    assert options.SCENES.split(", ") == list(CANONICAL)
+    assert table()["names"]["scenes"].split(", ") == list(CANONICAL)
+    assert table()["names"]["presets"].split(", ") == sorted(PRESETS)
     assert {language_named(target).name for target in get_args(options.Target)} <= set(DENOISERS)
 
 
@@ -187,15 +189,22 @@ def test_ctrl_c_in_a_process_leaves_nothing(tmp_path, whole_group) -> None:
 
 
 def test_help_imports_nothing_heavy(tmp_path) -> None:
-    """A help text appears at once: no NumPy, no plots, no device."""
+    """Help texts appear at once, those of commands too: no NumPy, no plots, no device."""
+    commands = ["", *(path for path, lines in table().items() if "call" in lines)]
     code = (
-        "import sys; from wamnet.cli.main import main; main(['--help']); "
+        f"import sys; from wamnet.cli.main import main; [main([*c.split(), '--help']) for c in {commands}]; "
         "sys.exit(bool({'numpy', 'matplotlib', 'pyopencl', 'OpenEXR', 'PIL'} & set(sys.modules)))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=False, timeout=60
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=False, timeout=120
     )
     assert done.returncode == 0
+    assert done.stdout.count(b"Usage: ") == len(commands)
+
+
+def test_help_may_be_a_value(refused) -> None:
+    """The command that has it runs."""
+    assert "output file '--help': must end in .exr or .png" in refused("render", "minicubes", "-o", "--help")
 
 
 def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:

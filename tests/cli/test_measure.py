@@ -58,7 +58,7 @@ def test_a_command_prints_its_table(wamnet, name) -> None:
         ("render minicubes", "Got unexpected extra argument"),
         ("train --presets long", "--presets 'long': must be one or more of best, mirrors, "),
         ("train --trainers abacus", "--trainers 'abacus': must be one or more of numpy, opencl, torch"),
-        ("train --seconds nan", "--seconds nan: must be above 0 and at most 600"),
+        ("train --seconds nan", "--seconds nan: must be from 0.001 to 600 seconds"),
         ("train --frames 0", "--frames 0: must be from 1 to"),
         ("pipeline --scene nowhere", "scene 'nowhere': unknown (choose one of"),
         ("pipeline --executors abacus", "--executors 'abacus': must be one or more of numpy, opencl"),

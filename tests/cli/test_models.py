@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from wamnet import models
-from wamnet.cli.common import options
 from wamnet.cli.common.inputs import load_model
+from wamnet.cli.common.request import table
 from wamnet.refimpl import metrics
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.frame import Frame
@@ -18,7 +18,7 @@ from wamnet.refimpl.light.variation import ranges_from_json
 from wamnet.refimpl.network.denoise import denoise, learned_shadow_rays
 from wamnet.refimpl.network.train import recipe_from_json
 
-NAMES = options.MODELS.split(", ")
+NAMES = table()["names"]["models"].split(", ")
 
 LARGEST_BYTES = 300_000
 """What a model in the package may take."""

@@ -16,11 +16,11 @@ import io
 import re
 import token
 import tokenize
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
-SUFFIXES = (".md", ".py")
+SUFFIXES = (".ini", ".md", ".py")
 """The kinds of files that are looked at [`prose`]."""
 
 GENERATED = ("kernels/shelf/README.md", "spec/vectors/README.md")
@@ -116,16 +116,10 @@ USERS = (
 """Texts that users meet: a name of a file, or a folder's with a slash."""
 
 PROGRAMS = ("cli/", "compiler/", "kernels/", "refimpl/", "wamnet/")
-"""Folders whose messages users meet, and whose help."""
+"""Folders whose messages users meet."""
 
-LATER = ("cli/course/", "cli/commands/course/", "cli/commands/verify/", "kernels/verify/")
-"""Folders that move elsewhere with the next change: their messages are swept there."""
-
-ERRORS = (
-    *("InputError", "CompileError", "TrainingError", "ExecutorUnavailable", "WamnetError"),
-    *("option", "argument", "usage"),
-)
-"""Calls whose texts are messages, or lines of help [`messages`]."""
+ERRORS = ("InputError", "CompileError", "TrainingError", "ExecutorUnavailable", "WamnetError")
+"""Calls whose texts are messages [`messages`]."""
 
 RULES = ("rule", "way_out", "fix")
 """Names of the parts of messages [`messages`]."""
@@ -140,6 +134,10 @@ NOT_PROSE = (
 """What nobody reads as prose in Markdown."""
 
 
+NAMES = re.compile(r"^\[.*\]$|^\w+ = (?:-\S+ )*", re.MULTILINE)
+"""What nobody reads as prose in a table of options: sections and names."""
+
+
 def blank(text: str) -> str:
     """Return spaces of the same length and lines."""
     return re.sub(r"[^\n]", " ", text)
@@ -150,7 +148,7 @@ def prose(suffix: str, text: str) -> str:
     """Return a file's prose where it was, and spaces in place of all else."""
     if suffix == ".py":
         return prose_of_python(text)
-    for pattern in NOT_PROSE:
+    for pattern in NOT_PROSE if suffix != ".ini" else (NAMES,):
         text = pattern.sub(lambda match: blank(match[0]), text)
     return text
 
@@ -199,8 +197,8 @@ def prose_of_field(text: str, code: str | None) -> str:
     return blank(text) if code is None else f" {prose_of_python(f'({code})')[1:-1]} "
 
 
-def messages(text: str, commands: Sequence[str] = ()) -> set[int]:
-    """Return the lines of Python that have messages, help, or the docstring of one of the commands."""
+def messages(text: str) -> set[int]:
+    """Return the lines of Python that have messages."""
     shown: set[int] = set()
     for node in ast.walk(ast.parse(text)):
         parts: list[ast.AST] = []
@@ -210,21 +208,9 @@ def messages(text: str, commands: Sequence[str] = ()) -> set[int]:
             parts = [node.value]
         elif isinstance(node, ast.keyword) and node.arg in ("help", "show_default"):
             parts.append(node.value)
-        elif isinstance(node, ast.FunctionDef) and node.name in commands:
-            parts = node.body[:1]
         for part in parts:
             shown.update(range(part.lineno, (part.end_lineno or part.lineno) + 1))  # type: ignore[attr-defined]
     return shown
-
-
-def commands_of(source: str) -> Mapping[str, list[str]]:
-    """Return the names of the functions whose docstrings are help, by file, from the text of cli/main.py."""
-    found: dict[str, list[str]] = {}
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.AnnAssign) and getattr(node.target, "id", "") == "COMMANDS" and node.value:
-            for module, function in ast.literal_eval(node.value).values():
-                found.setdefault(f"cli/commands/{module.replace('.', '/')}.py", []).append(function)
-    return found
 
 
 @cache
@@ -262,14 +248,13 @@ def test_words_are_plain(house):
 def test_texts_that_users_meet_have_the_words_of_the_field(house):
     """Spec, records, notes of vectors and comments of kernels are not among them."""
     wrong = []
-    commands = commands_of((house.root / "cli/main.py").read_text(encoding="utf-8"))
     for path in house.files():
         name = path.relative_to(house.root).as_posix()
         text = path.read_text(encoding="utf-8") if path.suffix in SUFFIXES else ""
-        if name.startswith(USERS) and path.suffix == ".md":
+        if path.suffix == ".ini" or (name.startswith(USERS) and path.suffix == ".md"):
             wrong += wrong_words(name, text, GLOSSARY)
-        elif name.startswith(PROGRAMS) and not name.startswith(LATER) and path.suffix == ".py":
-            shown = messages(text, commands.get(name, ()))
+        elif name.startswith(PROGRAMS) and path.suffix == ".py":
+            shown = messages(text)
             found = wrong_words(name, text, GLOSSARY)
             wrong += [line for line in found if int(line.split(":")[1]) in shown]
     house.refuse(sorted(wrong), "A text that users meet has the words of the field: take the better one.")

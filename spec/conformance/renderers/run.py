@@ -21,14 +21,8 @@ from .renderers import Renderer
 PICTURES = 8
 """Pictures of a shot: with 7 degrees of freedom, means of thousands of paths decide about a few per cent."""
 
-LEAST_PICTURES = 4
-"""Fewest pictures: with 3 degrees of freedom only gross deviations show."""
-
 AGAIN = 1 << 20
 """Added to seeds when a question is asked again."""
-
-LARGEST_SEED = (1 << 31) - 1 - AGAIN - 1000
-"""Largest first seed: renderers read seeds as signed numbers of 32 bits."""
 
 
 def shots_of(questions: Sequence[Question]) -> list[Shot]:

@@ -3,45 +3,24 @@
 import math
 from pathlib import Path
 
-from ....models.importing.network import Found, import_network
-from ....models.model_file import save_model
-from ....refimpl.errors import InputError
-from ...common.inputs import check_input
-from ...common.options import argument, option
-from ...common.terminal import say
-from ...files.outputs import check_output
+from ...models.importing.network import Found, import_network
+from ...models.model_file import save_model
+from ...refimpl.errors import InputError
+from ..common.inputs import check_input
+from ..common.terminal import say
+from ..files.outputs import check_output
 
 SUFFIX = ".safetensors"
 """How the names of models end."""
 
 
 def import_model(
-    network: Path = argument("NETWORK  ONNX network (.onnx)."),
-    output: Path | None = option(
-        "-o --output FILE  Model to write (.safetensors). [default: the network's name]"
-    ),
-    ranges: list[str] | None = option(
-        "--range [INPUT=]LOW:HIGH  Range of one input's values, or of all other inputs; bounds hold within "
-        "it. [default: 0:1]"
-    ),
-    border: str | None = option(
-        "RULE  Border rule for networks that pad intermediate layers: zero or clamp. [default: the network's "
-        "own padding]"
-    ),
+    network: Path,
+    output: Path | None = None,
+    ranges: list[str] | None = None,
+    border: str | None = None,
 ) -> None:
-    """Import a small ONNX network as a model that compile, export and certify accept.
-
-    Gemm, MatMul, Conv, sums, scales, Sin, Relu, LeakyRelu and Clip are supported, as PyTorch exports
-    them. A convolution becomes a layer on a window; the border rule of the image is that of the
-    network's own padding. An operator that cannot become part of a kernel is rejected with its node's
-    name.
-
-    Examples:
-    wamnet import network.onnx -o network.safetensors
-    wamnet import coordinates.onnx --range -1:1
-    wamnet import guided.onnx --range 0:1 --range normal=-1:1
-    wamnet import filter.onnx --border zero
-    """
+    """Import a small ONNX network as a model that compile, export and certify accept."""
     check_input(network)
     if network.suffix == SUFFIX:
         raise InputError("network", str(network), "holds weights, no graph", "use torch.onnx.export")

@@ -204,7 +204,8 @@ def _render(
     said_of_rendering(shown, total, pixels, request.executor, workers)
     with progress("rendering", total, "samples") as advance:
         if scheduler is None and workers == 1:
-            cluster.do_here(tasks, lambda task: before.carry_out(task, advance), store.put)
+            for task in tasks:
+                store.put(task, before.carry_out(task, advance))
             return
 
         def keep(task: Task, band: Frame) -> None:

@@ -1,10 +1,9 @@
-"""Independent tasks in this process, on processes of this machine, or on a running Dask scheduler.
+"""Independent tasks on processes of this machine, or on a running Dask scheduler.
 
-1. One process does the tasks in their order [`do_here`]; it yields results one by one.
-2. A cluster does them in any order [`do_on_cluster`]: workers of this machine, or those that a scheduler at
+1. A cluster does them in any order [`do_on_cluster`]: workers of this machine, or those that a scheduler at
    an address has [`open_client`]. A task whose worker is lost is done again by another; the scheduler does
    that.
-3. Only a few more tasks than there are workers are under way at a time, so that neither the scheduler nor
+2. Only a few more tasks than there are workers are under way at a time, so that neither the scheduler nor
    this process keeps many results.
 """
 
@@ -29,14 +28,6 @@ PURPOSE = "to share the work (one process, --workers 1, needs it not)"
 
 CONNECT_S = 10.0
 """Seconds in which a scheduler must answer and have a worker: longer than a network's hiccup."""
-
-
-def do_here(
-    tasks: Sequence[_Task], do: Callable[[_Task], _Result], on_result: Callable[[_Task, _Result], None]
-) -> None:
-    """Do the tasks one after another."""
-    for task in tasks:
-        on_result(task, do(task))
 
 
 def do_on_cluster(

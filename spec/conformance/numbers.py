@@ -75,37 +75,24 @@ def to_json(value: Any) -> Any:
 
 def from_json(value: Any, what: str) -> NDArray[Any]:
     """Return nested lists of numbers as an array: float64, or int64 where all are integers, or bool."""
-    try:
-        flat = list(_leaves(value))
-    except RecursionError:
-        raise InputError(what, NO_VALUE, "is nested too deeply", "give a list of numbers") from None
-    if flat and all(isinstance(leaf, bool) for leaf in flat):
-        return np.array(value, np.bool_)
-    if flat and all(isinstance(leaf, int) and not isinstance(leaf, bool) for leaf in flat):
-        return _array(value, int, np.int64, what)
-    return _array(value, lambda leaf: _float(leaf, what), np.float64, what)
-
-
-def _leaves(value: Any) -> Any:
-    """Return all that is not a list, in order."""
-    if isinstance(value, list):
-        for item in value:
-            yield from _leaves(item)
-    else:
-        yield value
-
-
-def _array(value: Any, convert: Any, dtype: Any, what: str) -> NDArray[Any]:
-    """Return an array of converted leaves, or refuse lists of unequal lengths."""
+    kinds = set[type]()
 
     def converted(item: Any) -> Any:
-        return [converted(part) for part in item] if isinstance(item, list) else convert(item)
+        if isinstance(item, list):
+            return [converted(part) for part in item]
+        kinds.add(type(item))
+        return item if isinstance(item, int) else _float(item, what)
 
     try:
-        return np.array(converted(value), dtype)
-    except InputError:
-        raise
-    except (ValueError, OverflowError, RecursionError):
+        tree = converted(value)
+        if bool in kinds and len(kinds) > 1:
+            # A boolean is not a number.
+            _float(True, what)
+        dtype = np.bool_ if kinds == {bool} else np.int64 if kinds == {int} else np.float64
+        return np.array(tree, dtype)
+    except RecursionError:
+        raise InputError(what, NO_VALUE, "is nested too deeply", "give a list of numbers") from None
+    except (ValueError, OverflowError):
         rule = "lists must be of one length on each axis, integers below 2**63"
         raise InputError(what, value, rule, "answer with the shape that the format page states") from None
 

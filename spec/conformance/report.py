@@ -54,18 +54,9 @@ def counts(verdicts: Sequence[Verdict]) -> list[Kinds]:
     return found
 
 
-ELEMENTARY = (
-    "random.pcg4d", "random.float", "random.block", "random.scrambled", "random.point", "random.", "vector",
-    "sampling.tangent_frame", "sampling.to_world", "sampling.", "camera.axes", "camera.",
-    "intersection.slabs", "intersection.sphere", "intersection.quad", "intersection.box",
-    "intersection.turned_box", "intersection.room", "intersection.nearest", "intersection.",
-    "material.mirror", "material.lambertian", "material.ggx", "material.schlick", "material.visible_normal",
-    "material.refracted", "material.fresnel", "material.", "transport.lamp", "transport.light_pdf",
-    "transport.", "sky.share", "sky.", "encoding.srgb", "encoding.exposed", "encoding.", "image.smoothed",
-    "image.", "file.camera", "file.scene", "file.", "path.start", "path.arrive", "path.scatter",
-    "path.shadow", "path.whole", "sine", "network.", "adam.", "whole.sine", "whole.forward", "whole.",
-    "metric.", "picture.denoised", "picture.exact", "picture.",
-)  # fmt: skip
+ELEMENTARY: Sequence[str] = json.loads(
+    (Path(__file__).parent / "kinds/order.json").read_text(encoding="utf-8")
+)
 """How kinds begin, those that others are made of first: what fails there makes the others fail."""
 
 

@@ -161,8 +161,8 @@ def test_quality_comes_from_a_data_set(wamnet, here) -> None:
 
 def small_scene(monkeypatch) -> None:
     """Let training frames be few and tiny, and NumPy render and train: no device is needed."""
-    monkeypatch.setattr(bench_frames, "fastest", lambda **_options: "numpy")
-    monkeypatch.setattr(bench, "fastest", lambda **_options: "numpy")
+    monkeypatch.setattr(bench_frames, "chosen", lambda **_options: "numpy")
+    monkeypatch.setattr(bench, "chosen", lambda **_options: "numpy")
     monkeypatch.setattr(bench_frames, "TRAINING_FRAMES", 2)
     monkeypatch.setattr(bench_frames, "TRAINING_SPP", 2)
     monkeypatch.setattr(bench_frames, "TRAINING_PX", 12)

@@ -30,13 +30,6 @@ def gather(results: dict):
     return keep
 
 
-def test_here_tasks_keep_their_order() -> None:
-    """One after another."""
-    results: dict = {}
-    cluster.do_here(TASKS, neg, gather(results))
-    assert list(results.items()) == [(task, -task) for task in TASKS]
-
-
 def test_on_a_scheduler_and_its_refusals(monkeypatch) -> None:
     """Processes of this machine found by their scheduler's address; a worker's error is this process's."""
     with cluster.open_client(1, None) as own:

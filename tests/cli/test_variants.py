@@ -6,8 +6,6 @@ import shutil
 import numpy as np
 import pytest
 
-from wamnet.cli.commands import choose
-from wamnet.cli.commands.choose import Request
 from wamnet.cli.files import exr
 from wamnet.cli.files.images import read_png
 from wamnet.compiler import variants
@@ -15,7 +13,6 @@ from wamnet.kernels import cache, denoise_on, open_executor
 from wamnet.kernels.run.curve import Curve, Point
 from wamnet.models.model_file import load_model
 from wamnet.refimpl import encoding
-from wamnet.refimpl.errors import InputError
 
 
 @pytest.fixture
@@ -144,8 +141,9 @@ def test_a_data_set_without_test_frames_measures_nothing(refused, wamnet, here) 
     assert "--frames 's': has no test frames" in line
 
 
-def test_sizes_that_are_the_ends_of_the_range_are_allowed() -> None:
-    for size in (choose.SMALLEST_PX, choose.LARGEST_PX):
-        Request(max_ms=1.0, size=size).check(None)
-    with pytest.raises(InputError, match="--size 4097"):
-        Request(max_ms=1.0, size=choose.LARGEST_PX + 1).check(None)
+def test_sizes_that_are_the_ends_of_the_range_are_allowed(refused, here) -> None:
+    for size in (16, 4096):
+        assert "a choice needs --max-error" in refused(*COMPILE, "--size", size)
+    message = "must be from 16 to 4096 (for example --size 1024)"
+    for size in (15, 4097):
+        assert f"--size {size}: {message}" in refused(*COMPILE, "--max-ms", 3, "--size", size)

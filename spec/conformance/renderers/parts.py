@@ -10,10 +10,12 @@
 
 from __future__ import annotations
 
+import base64
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
+from wamnet.refimpl.encoding import LEVELS, srgb_decode
 from wamnet.refimpl.light.materials import Conductor, Dielectric, Material, Mirror
 from wamnet.refimpl.light.scene import Box, Camera, Room, Scene, Sphere
 from wamnet.refimpl.light.shapes.quad import light_radiance
@@ -127,6 +130,11 @@ class Mesh:
     look: Look
     front: bool
     thick: float = 0.0
+
+    @property
+    def colors(self) -> NDArray[np.float32]:
+        """The reflectance of each point (N, 3)."""
+        return np.tile(np.array(self.look.reflectance, np.float32), (len(self.points), 1))
 
 
 def room_walls(room: Room) -> list[tuple[Any, Any, Any]]:
@@ -283,12 +291,61 @@ def request_of(shot: Shot, seed: int) -> dict[str, int]:
     return {"width": shot.size, "height": shot.size, "samples": shot.spp, "depth": shot.depth, "seed": seed}
 
 
+def arrays_of(meshes: Sequence[Mesh]) -> dict[str, Any]:
+    """Return accessors, views and the buffer of glTF; all components have four bytes, and so are aligned."""
+    accessors: list[dict[str, Any]] = []
+    views, parts, start = [], [], 0
+    for mesh, name in product(meshes, ("points", "normals", "corners")):
+        array = getattr(mesh, name)
+        data = array.astype(array.dtype.newbyteorder("<")).tobytes()
+        # What a view is for: numbers of corners, or points and normals.
+        target = 34963 if name == "corners" else 34962
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data), "target": target})
+        accessor = {"bufferView": len(accessors), "type": "VEC3", "componentType": 5126, "count": len(array)}
+        if name == "corners":
+            accessor |= {"type": "SCALAR", "componentType": 5125, "count": array.size}
+        if name == "points":
+            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        accessors.append(accessor)
+        parts.append(data)
+        start += len(data)
+    text = base64.b64encode(b"".join(parts)).decode("ascii")
+    buffer = {"byteLength": start, "uri": f"data:application/octet-stream;base64,{text}"}
+    return {"accessors": accessors, "bufferViews": views, "buffers": [buffer]}
+
+
 def physical(look: Look) -> tuple[float, float]:
     """Return roughness and metalness, as materials of game engines have them; glass may have no tint."""
     if look.kind == GLASS and any(channel != 1.0 for channel in look.reflectance):
         raise NotExpressed("tinted glass")
     rough = {METAL: math.sqrt(look.number), MATTE: 1.0}.get(look.kind, 0.0)
     return rough, 1.0 if look.kind in (METAL, MIRROR) else 0.0
+
+
+LEVEL_SLACK = 5e-4
+"""Most that an emission in levels may be off, in its largest channel: a quarter of the slack of an answer."""
+
+
+def levels_of(emission: Sequence[float]) -> tuple[int, float]:
+    """Return three levels of eight bits as one number, and the intensity that makes them an emission.
+
+    Of all levels of the largest channel the one is taken for which the others are nearest to theirs. Raises
+    NotExpressed where that is off by more than LEVEL_SLACK of the largest.
+    """
+    largest = max(emission)
+    if largest <= 0.0:
+        return 0, 1.0
+    linear = srgb_decode(np.arange(LEVELS + 1) / LEVELS)
+    shares = np.array(emission) / largest
+    wanted = shares * linear[1:, None]
+    nearest = np.argmin(np.abs(linear - wanted[..., None]), axis=-1)
+    errors = np.abs(linear[nearest] / linear[1:, None] - shares).max(axis=-1)
+    # The brightest of the best.
+    best = LEVELS - 1 - int(np.argmin(errors[::-1]))
+    if errors[best] > LEVEL_SLACK:
+        raise NotExpressed(f"emission of {', '.join(f'{c:g}' for c in emission)} in eight-bit levels")
+    red, green, blue = map(int, nearest[best])
+    return red << 16 | green << 8 | blue, float(largest / linear[best + 1])
 
 
 def mirrored(vector: Iterable[float]) -> str:
@@ -311,8 +368,20 @@ def forms() -> Any:
         trim_blocks=True,
         keep_trailing_newline=True,
     )
-    functions = (parts_of, frame_of, axes_of, refuse, math.radians, math.sqrt, tuple)
+    functions: list[Any] = [
+        parts_of,
+        meshes_of,
+        sky_of,
+        arrays_of,
+        frame_of,
+        axes_of,
+        matrix_of,
+        request_of,
+        levels_of,
+    ]
+    functions += [physical, refuse, math.radians, math.sqrt, tuple]
     found.globals |= {each.__name__: each for each in functions}
+    found.policies["json.dumps_kwargs"] = {"allow_nan": False}
     found.filters |= {"numbers": text, "mirrored": mirrored, "any": any}
     return found
 

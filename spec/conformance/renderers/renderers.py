@@ -30,7 +30,6 @@ from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import to_json
 from wamnet.refimpl.light.transport import Settings
 
-from . import write_gltf, write_three
 from .cases import Shot
 from .judgement import FAILED, UNTESTED, Missing, Picture
 from .parts import NotExpressed, written
@@ -76,10 +75,10 @@ FORMATS: Mapping[str, Format] = {
     "blender": Format(".py", partial(written, "blender")),
     "povray": Format(".pov", partial(written, "povray")),
     "luxcore": Format(".py", partial(written, "luxcore")),
-    "gltf": Format(".gltf", write_gltf.write, ("schlick-metals",)),
-    "three": Format(".json", write_three.write, ("schlick-metals",)),
+    "gltf": Format(".gltf", partial(written, "gltf"), ("schlick-metals",)),
+    "three": Format(".json", partial(written, "three"), ("schlick-metals",)),
 }
-"""Forms of scene files by name: a new one is a file in `forms` or a module, and a line here."""
+"""Forms of scene files by name: a new one is a file in `forms` and a line here."""
 
 
 class Renderer(Protocol):

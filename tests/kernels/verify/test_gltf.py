@@ -14,9 +14,8 @@ from triangles import U32, U64, ReadFile, ReadSurface, areas, differences, volum
 from wamnet.refimpl.light.materials import Dielectric, Mirror
 from wamnet.refimpl.light.scene import Quad, Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
-from wamnet_verify import write_gltf
 from wamnet_verify.cases import Shot, questions
-from wamnet_verify.parts import NotExpressed
+from wamnet_verify.parts import NotExpressed, written
 from wamnet_verify.run import shots_of
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
@@ -265,7 +264,7 @@ def without_sky(found, scene):
 def test_a_shot_is_well_formed_and_reads_back(name):
     """All that glTF's specification demands of what is used, and all numbers of the scene."""
     shot = SHOTS[name]
-    data = json.loads(write_gltf.write(shot, SEED))
+    data = json.loads(written("gltf", shot, SEED))
     assert [*wrong(data)] == []
     assert [*differences(without_sky(read(data), shot.scene), shot, SEED)] == []
 
@@ -295,10 +294,10 @@ def refused(**parts):
 )
 def test_what_gltf_cannot_say(shot, words):
     with pytest.raises(NotExpressed, match=words):
-        write_gltf.write(shot, SEED)
+        written("gltf", shot, SEED)
 
 
 def test_a_scene_without_surfaces_has_no_lists():
     """An empty list is against the specification."""
-    data = json.loads(write_gltf.write(Shot("empty", Scene("empty", empty().camera)), SEED))
+    data = json.loads(written("gltf", Shot("empty", Scene("empty", empty().camera)), SEED))
     assert set(data) == {"asset", "scene", "scenes", "nodes", "cameras"}

@@ -17,11 +17,9 @@ from wamnet.refimpl.encoding import srgb_decode
 from wamnet.refimpl.light.materials import Dielectric
 from wamnet.refimpl.light.scene import Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
-from wamnet_verify import write_three
 from wamnet_verify.cases import Shot, questions
-from wamnet_verify.parts import NotExpressed
+from wamnet_verify.parts import LEVEL_SLACK, NotExpressed, levels_of, written
 from wamnet_verify.run import shots_of
-from wamnet_verify.write_three import LEVEL_SLACK, levels_of
 
 SHOTS = {shot.name: shot for shot in shots_of(questions())}
 WRITTEN = [name for name in SHOTS if name != "glass-ball-2.4"]
@@ -112,7 +110,7 @@ def sky_of(data):
 @pytest.mark.parametrize("name", WRITTEN)
 def test_a_shot_reads_back(name):
     shot = SHOTS[name]
-    found, sky = read(json.loads(write_three.write(shot, SEED)))
+    found, sky = read(json.loads(written("three", shot, SEED)))
     assert [*differences(found, shot, SEED, 8 * U64)] == []
     assert sky == shot.scene.background
 
@@ -194,7 +192,7 @@ def test_three_loads_what_was_written(tmp_path):
     """All shots by three's own ObjectLoader: the same triangles, materials, camera, sky, and no warning."""
     files = [tmp_path / f"{name}.json" for name in WRITTEN]
     for file in files:
-        file.write_text(write_three.write(SHOTS[file.stem], SEED), encoding="utf-8")
+        file.write_text(written("three", SHOTS[file.stem], SEED), encoding="utf-8")
     for name, found in zip(WRITTEN, loaded(files), strict=True):
         shot = SHOTS[name]
         assert [*differences(read_loaded(found), shot, SEED, THREE_SLACK)] == [], name
@@ -250,4 +248,4 @@ def test_levels_that_are_far_are_refused():
 )
 def test_what_three_cannot_say(shot, words):
     with pytest.raises(NotExpressed, match=words):
-        write_three.write(shot, SEED)
+        written("three", shot, SEED)

@@ -1,4 +1,4 @@
-"""Lines of Python in the wheel and their limit; `python tests/support/budget.py` prints them per package."""
+"""Lines of source in the wheel and their limit; `python tests/support/budget.py` prints them per package."""
 
 import sys
 from pathlib import Path
@@ -10,9 +10,15 @@ else:
 
 ROOT = Path(__file__).parents[2]
 
-MAX_LINES = 59_006
-"""Most lines of the packages in pyproject.toml, comments counted. It only falls: a change that removes lines
-lowers it in the same commit, and raising it needs an issue that says so."""
+MAX_LINES = 60_800
+"""Most lines of the packages in pyproject.toml, comments counted; 62,568 in the commit 5756b297. It only falls:
+a change that removes lines lowers it in the same commit, and raising it needs an issue that says so."""
+
+SOURCES = (".py", ".ini", ".jinja", ".txt")
+"""Suffixes of sources: Python, and what it reads to print help, reports and programs."""
+
+LEFT_OUT = ("vectors", "shelf")
+"""Folders of what this project writes itself."""
 
 SLACK = 500
 """The limit is at most so far above the count [`tests/meta/test_layering.py`]."""
@@ -30,8 +36,12 @@ def packages() -> dict[str, Path]:
 
 
 def lines(folder: Path) -> int:
-    """Return the number of lines of the Python files in a folder, without those in its subfolders."""
-    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in folder.glob("*.py"))
+    """Return the lines of sources in a package's folder, those in folders of it that have no Python too."""
+    own = [path for path in folder.iterdir() if path.is_file()]
+    inner = [path for path in folder.iterdir() if path.is_dir() and not any(path.glob("*.py"))]
+    inner = [path for path in inner if path.name not in LEFT_OUT]
+    found = [*own, *(path for below in inner for path in below.rglob("*"))]
+    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in found if path.suffix in SOURCES)
 
 
 if __name__ == "__main__":

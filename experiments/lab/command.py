@@ -9,8 +9,10 @@
 from __future__ import annotations
 
 import argparse
+import resource
 import shlex
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -86,3 +88,9 @@ def begin(main: Callable[[Sequence[str] | None], None], arguments: Sequence[str]
     except KeyboardInterrupt:
         sys.stderr.write("wamnet: interrupted\n")
         raise SystemExit(130) from None
+
+
+def spent() -> float:
+    """Return the seconds of processors that this process and its compilers have taken."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime

@@ -80,13 +80,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_state_key] = {}
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Shuffle files, and the tests of each file; pytest then puts those together that share a fixture."""
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> Iterator[None]:
+    """Shuffle files, and the tests of each file; those that share a fixture of a case stay together."""
+    yield
     if (seed := config.getoption("--shuffle")) is not None:
         draw = Random(seed).random
         files = {path: draw() for path in dict.fromkeys(item.path for item in items)}
         items.sort(key=lambda item: (files[item.path], draw()))
+        config.pluginmanager.get_plugin("funcmanage").pytest_collection_modifyitems(items=items)
 
 
 # ---- executors ------------------------------------------------------------------------------------------

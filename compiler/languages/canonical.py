@@ -90,7 +90,7 @@ def _writes(loop: tree.For) -> bool:
     """Return whether a loop does nothing but write channels of the result, which some languages write out."""
     stores = all(isinstance(each, tree.Store) and each.array == RESULT for each in loop.body)
     whole = (loop.start, loop.step, loop.until) == (tree.const(0), tree.const(1), None)
-    return stores and whole and loop.count.op == "const"
+    return stores and whole and loop.count.op == "const" and loop.count.type == tree.INT
 
 
 def _statement(statement: tree.Statement, names: Collection[str]) -> tree.Statement:

@@ -85,6 +85,7 @@ def test_texts_of_integers_compute_what_is_certified(target, size, tmp_path):
         ("t16 * t38", "t16 * t37", "t38 is computed and never read"),
         ("[(y * width + x) * 3 + i] =", "[(y * width + x) * 3 + i * 2 % 3] =", "not the program's"),
         ("i < 3; ++i) {\n        result", "i < 2; ++i) {\n        result", "without a result"),
+        ("i < 3; ++i) {\n        result", "i < 3.5f; ++i) {\n        result", "loop over i has type float32"),
         ("0.318309873f", "0.318309903f", "the sums of %4 are never made"),
         ("* 3 + c]", "* 2 + c]", "two numbers of channels"),
         ("bool inside = row", "bool inside = x * 3 + width >= x * 3 + 1 && row", "more than the channels"),

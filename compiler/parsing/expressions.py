@@ -343,9 +343,12 @@ ROUNDING = ("add", "subtract", "multiply", "divide", "minimum", "maximum", "floo
 """Operations whose order GLSL keeps only where their value is declared so."""
 
 
-def rounds(value: Expr) -> bool:
-    """Return whether there is a sum, a product, or a function of numbers anywhere in a value."""
-    if value.op == "stack":  # one operation by itself has no order
+def rounds(value: Expr, kept: bool = True) -> bool:
+    """Return whether there is a sum, a product, or a function of numbers anywhere in a value.
+
+    One by itself has no order where the value is not `kept` by the item, but written for another launch.
+    """
+    if value.op == "stack" and not kept:
         return any(_rounded(each) > 1 for each in value.args)
     return _rounded(value) > 0
 

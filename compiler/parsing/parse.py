@@ -374,7 +374,8 @@ class Parser(Expressions):
     def _check_order(self, key: str, value: tree.Expr, word: str, add: bool = False) -> None:
         """Refuse a sum, or another value, of which GLSL may change the order of operations."""
         qualifier = self.bounded and self.language.qualifier
-        if qualifier and word != qualifier and ((add and value.type.dtype == "float32") or rounds(value)):
+        rounded = rounds(value, bool(word)) or (add and value.type.dtype == "float32")
+        if qualifier and word != qualifier and rounded:
             raise Unread(f"{key} is not declared {qualifier}")
 
     def _is_weight(self, value: tree.Expr) -> bool:
@@ -470,6 +471,7 @@ class Parser(Expressions):
             value = tree.const(value.value, tree.BYTE)
         value = self._of(value, target.type, target.value)
         product = sign == "+=" and value.op == "multiply" and any(map(self._is_weight, value.args))
+        product = product and not any(map(rounds, value.args))
         if not (product and LAYER.fullmatch(target.value)):
             self._check_order(target.value, value, word, sign != "=")
         if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):

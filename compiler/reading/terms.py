@@ -179,7 +179,8 @@ def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
     """Return a sum, a difference or a product of floats; `dual`: a sum may be an expression as well."""
     sums: Words | None = None
     if name == "multiply":
-        if any(each.shape is not None and _is_zero(each.shape) for each in (a, b)):
+        shapes = [each.shape for each in (a, b) if each.shape is not None]
+        if any(map(_is_zero, shapes)) or _vanishes(a, b) or _vanishes(b, a):
             raise Wrong("a product with 0, which is no number where the other factor is infinite")
         if a.draw is not None or b.draw is not None:
             sums = _product(a, b)
@@ -189,6 +190,8 @@ def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
         for one, other in ((a, b), (b, a)):
             if name == "add" and one.shape is not None and not one.begins and _is_zero(one.shape):
                 return other
+        if _vanishes(a) or _vanishes(b):
+            raise Wrong("a sum with a product with 0, which is no number where the other factor is infinite")
         a, b = (
             each if each.factors is None else Term(each.shape, _product(*each.factors)) for each in (a, b)
         )
@@ -209,6 +212,18 @@ def _product(a: Term, b: Term) -> Words:
 
 def _is_zero(shape: Words) -> bool:
     return bool(shape.flat[0] == zero()) and bool((shape == zero()).all())
+
+
+def _vanishes(term: Term, other: Term | None = None) -> bool:
+    """Return whether a number of a sum is 0 in a turn: a weight that fills up a vector, or its product.
+
+    A vector is where all of its lanes are, or, as a factor of another one, any of them.
+    """
+    if not term.begins or term.kind != "float32":
+        return False
+    nothing = ~(term.term % P).any(axis=0)
+    alike = other is not None and other.known.ndim == 3
+    return bool((nothing if nothing.ndim < 3 or alike else nothing.all(axis=0)).any())
 
 
 def aligned(function: Any, a: Words, b: Words) -> Words:

@@ -80,8 +80,8 @@ def test_a_lost_barrier_is_a_race(one, n, why):
         ("[2 * PLANE + i]", "[3 * PLANE + i]", "beyond its"),
         ("TILE_WIDTH + local_x + dx", "TILE_WIDTH + local_x + dx + 1", "never made|written"),
         ("2 * PLANE + at", "2 * PLANE + at + PLANE", "beyond its"),
-        ("top + i / TILE_WIDTH", "top + i / (TILE_WIDTH - 1)", "never made"),
-        ("at + 2 * GROUP_WIDTH", "at + 3 * GROUP_WIDTH", "never made"),
+        ("top + i / TILE_WIDTH", "top + i / (TILE_WIDTH - 1)", "never made|with 0"),
+        ("at + 2 * GROUP_WIDTH", "at + 3 * GROUP_WIDTH", "never made|with 0"),
         ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH <= width &&", "beyond the picture"),
         ("if (x + 3 * GROUP_WIDTH < width &&", "if (x + 3 * GROUP_WIDTH < width - 1 &&", "without a result"),
         (
@@ -99,6 +99,36 @@ def test_a_lost_barrier_is_a_race(one, n, why):
 def test_faults_of_groups_are_named(four, old, new, why):
     with pytest.raises((Refused, Unread), match=why):
         run_text(*changed(four, old, new))
+
+
+@pytest.mark.parametrize(
+    "new",
+    [
+        "v1_0_0 += (float4)(weights[6] * t);",
+        "float4 m = w[1]; float4 s = m * t; v1_0_0 += (float4)(s.z);",
+        "float4 m = w[1]; float4 s = m * t; float4 z = (float4)(1.0f, 1.0f, 1.0f, s.z); v1_0_0 += z;",
+        "float4 z = (float4)(1.0f, 1.0f, 1.0f, t); v1_0_0 += w[1] * z;",
+    ],
+)
+def test_weights_that_fill_up_vectors_are_in_no_sum(tmp_path, new):
+    """TXT-6: six neurons fill two vectors; a product of a 0 with what is infinite is no number."""
+    given = parts(kernel(tmp_path, "opencl", "group:1"))
+    old = "        v1_0_0 += part_0_0;"
+    line = f"{old}\n        float t = 3.0e+38f * 3.0e+38f;\n        {new}"
+    with pytest.raises((Refused, Unread), match=r"with 0|a vector of weights"):
+        run_text(*changed(given, old, line))
+
+
+def test_operations_on_lanes_and_factors_are_declared_precise(four):
+    """TXT-1: also one for each lane, and the factor of a weight."""
+    whole = "vec4 elementwise_90(vec4 v87)\n{\n"
+    assert whole in four[0]
+    lanes = ", ".join(f"max(v87.{lane}, 0.0f)" for lane in "xyzw")
+    line = f"    vec4 t = vec4({lanes});\n"
+    with pytest.raises(Unread, match="t is not declared PRECISE"):
+        run_text(*changed(four, whole, whole + line))
+    with pytest.raises(Unread, match="v50_0_0 is not declared PRECISE"):
+        run_text(*changed(four, "v50_0_0 += m * v49_0_0.x;", "v50_0_0 += m * max(v49_0_0.x, (-1.0f));"))
 
 
 def test_constants_as_large_as_a_group_are_refused(four):

@@ -1687,26 +1687,26 @@ static double lamp_light(const part *l, v3 point, v3 normal) {
 typedef struct {
     v3 wi, radiance;
     double distance, power;
-} way;
+} to_light;
 
-static way to_lamp(const part *lamp, v3 origin, double u0, double u1) {
+static to_light to_lamp(const part *lamp, v3 origin, double u0, double u1) {
     v3 front = unit(cross(lamp->edge_u, lamp->edge_v));
     v3 point = quad_point(u0, u1, lamp->corner, lamp->edge_u, lamp->edge_v);
     double size = fmax(fabs(origin.c[0]), fmax(fabs(origin.c[1]), fabs(origin.c[2])));
     v3 offset = sub(spawned(point, front, size), origin), wi = scale(offset, 1 / length(offset));
     v3 radiance = dot(front, wi) < 0 ? light_radiance(lamp) : BLACK;
-    return (way){wi, radiance, length(offset), components(light_radiance(lamp))};
+    return (to_light){wi, radiance, length(offset), components(light_radiance(lamp))};
 }
 
 /* ENV-7 */
-static way to_sky(const world *w, v3 normal, double wanted, double sun, double rest, double u1) {
+static to_light to_sky(const world *w, v3 normal, double wanted, double sun, double rest, double u1) {
     const sky *s = &w->from.above;
     if (wanted < sun) {
         v3 wi = to_world(spherical_cauchy(fmin(wanted / fmax(sun, 1e-15), 1), u1, s->concentration), w->sun.sun);
-        return (way){wi, s->sun_irradiance, MISS, components(s->sun_irradiance)};
+        return (to_light){wi, s->sun_irradiance, MISS, components(s->sun_irradiance)};
     }
     v3 wi = to_world(cosine_hemisphere(fmin((wanted - sun) / fmax(rest, 1e-15), 1), u1), normal);
-    return (way){wi, sky_gradient(s, wi), MISS, components(sky_mean(s))};
+    return (to_light){wi, sky_gradient(s, wi), MISS, components(sky_mean(s))};
 }
 
 /* LTR-12 */
@@ -1733,7 +1733,7 @@ static v3 direct(const world *w, const hit *h, v3 reflectance, uint32_t seed, ui
     bool to_above = above->given && wanted >= light;
     if (!(light + sun + rest > 0) || (!chosen && !to_above)) return BLACK;
     v3 origin = spawned(h->point, h->normal, h->t);
-    way to = to_above ? to_sky(w, h->normal, wanted - light, sun, rest, u1) : to_lamp(chosen, origin, u, u1);
+    to_light to = to_above ? to_sky(w, h->normal, wanted - light, sun, rest, u1) : to_lamp(chosen, origin, u, u1);
     if (!(dot(h->normal, to.wi) > 0) || occluded(w, origin, to.wi, to.distance)) return BLACK;
     return scale(mul(reflectance, to.radiance), (light + sun + rest) / (fmax(to.power, 1e-15) * PI * rays));
 }

@@ -105,9 +105,9 @@ def test_the_manifest_names_what_was_made():
 
 def test_more_images_than_a_fragment_draws():
     """PPL-6: eight colour buffers; languages with buffers take any number."""
-    with pytest.raises(CompileError, match=r"encodes 14 features: GLSL 3.30, .* at most 8 images at once"):
+    with pytest.raises(CompileError, match=r"encodes 15 features: GLSL 3.30, .* at most 8 images at once"):
         compile_encode(OF_ONE_PICTURE, SCALES, "opengl")
-    assert len(compile_encode(OF_ONE_PICTURE, SCALES, "opencl").images) == 14
+    assert len(compile_encode(OF_ONE_PICTURE, SCALES, "opencl").images) == 15
 
 
 def test_it_is_written_as_other_kernels_are(tmp_path):

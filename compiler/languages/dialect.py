@@ -72,11 +72,12 @@ class Dialect:
     channel. A path kernel has `path_lanes` paths at once where the target's compiler chooses their number,
     which `at_once` describes; it takes `most_numbers` of a scene. `paints`:
     it may write encoded images in place of sums. `helpers`: functions that operations on vectors call.
-    `scalars`: the types of single numbers. `staged`: a launch is a program, which is compiled if STAGE is
-    its number; `declares_memory`: what launches of a denoiser hand on are arrays like others. `numbers`
-    makes the address of a vector that of its first number. `mixed`: of an array of vectors whose components
-    are read by their own index too the declaration, an element, and an element's address, and
-    `mixed_number` such a component; `linkage` is before the type of a function, `place_type` that of places.
+    `scalars`: the types of single numbers. `one_type`: what is read as vectors is not read as numbers.
+    `staged`: a launch is a program, which is compiled if STAGE is its number; `declares_memory`: what
+    launches of a denoiser hand on are arrays like others. `numbers` makes the address of a vector that of its
+    first number. `mixed`: of an array of vectors whose components are read by their own index too the
+    declaration, an element, and an element's address, and `mixed_number` such a component; `linkage` is
+    before the type of a function, `place_type` that of places.
     """
 
     target: str
@@ -133,6 +134,7 @@ class Dialect:
     tiles: tuple[int, ...] = (4,)
     words: str = ""
     wide: bool = True
+    one_type: bool = False
     calls_vectors: bool = False
     vector_operations: Mapping[str, str] = {}
     weight_vector: str = "w[{index}]"

@@ -119,6 +119,7 @@ class Vulkan(Declared):
     group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
     wait = "barrier();"
     wide = False
+    one_type = True
     words = (
         f"GL_EXT_integer_dot_product where the compiler knows it and {PORTABLE} is not defined, else shifts"
     )

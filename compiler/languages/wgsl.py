@@ -47,6 +47,7 @@ class WGSL(Declared):
     group_place = ("group_place.x", "group_place.y")
     wait = "workgroupBarrier();"
     wide = False
+    one_type = True
     words = "dot4I8Packed, of the language feature packed_4x8_integer_dot_product"
     extensions = ("requires packed_4x8_integer_dot_product;",)
     instructions = WGSL_GROUP

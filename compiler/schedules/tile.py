@@ -334,7 +334,10 @@ class Tile(Stored):
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
-        return super().refusal(program) or shared_matrix(program) or self.beyond_stack(program)
+        single = self.dialect.one_type and any(node.op == "parameter" for node in program.nodes)
+        reason = "it reads a layer's numbers one by one, and weights are vectors in this language"
+        usual = super().refusal(program) or shared_matrix(program) or self.beyond_stack(program)
+        return usual or (reason if single else "")
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""

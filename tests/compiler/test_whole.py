@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -249,6 +250,16 @@ def test_halves_are_no_bytes(schedule, halved) -> None:
     assert (
         picked.get("reason", "its numbers or weights are fractions") == "its numbers or weights are fractions"
     )
+
+
+@pytest.mark.parametrize("language", ["wgsl", "glsl-vulkan", "metal", "opencl"])
+def test_a_tile_reads_weights_as_they_are_declared(language) -> None:
+    """Integers of a layer are read one by one, which a buffer of vectors has no name for."""
+    chosen = compile_program(program(lambda x: forward_whole(network(), x)), language, schedule="tile:4")
+    read = set(re.findall(r"\b(weights|w)\[", chosen.source))
+    pointers = {"w", "weights"} if language in ("metal", "opencl") else {"weights"}
+    assert read <= pointers
+    assert (chosen.manifest["schedule"]["name"] == "tile:4") == (language in ("metal", "opencl"))
 
 
 @pytest.mark.parametrize(

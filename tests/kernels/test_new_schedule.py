@@ -12,7 +12,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import weights
 from wamnet.compiler.kernel.interface import WEIGHTS
 from wamnet.compiler.kernel.kernel import load, rewritten
-from wamnet.compiler.parsing.canonical import canonical
+from wamnet.compiler.languages.canonical import canonical
 from wamnet.compiler.parsing.grammar import LANGUAGES as GRAMMARS
 from wamnet.compiler.parsing.parse import parse
 from wamnet.compiler.plan import plan_program
@@ -70,5 +70,5 @@ def test_it_is_in_every_language_at_once(kit, target):
     source = schedule.renderer(program, True).source(["a schedule of nobody's own"])
     channels = {"image_color": 3, "image_normal": 3, "result": 3}
     found = parse(source, target, channels)
-    assert found == canonical(schedule.kernel(program))
-    assert found != canonical(Plain(dialect).kernel(program))
+    assert canonical(found) == canonical(schedule.kernel(program))
+    assert canonical(found) != canonical(Plain(dialect).kernel(program))

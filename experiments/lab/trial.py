@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 import gc
 import importlib
+import io
 import json
 import os
 import resource
@@ -271,8 +272,9 @@ Modules = tuple[ModuleType, ModuleType]
 def answered(answers: ModuleType, kind: str, case: Case) -> Mapping[str, Any]:
     """Return the reference's answer in the form of the protocol."""
     request = {"kind": kind, "input": dict(case.inputs), "profile": "ieee"}
-    found: Mapping[str, Any] = answers._answered(request, [kind], answers.of_reference)
-    return found
+    found = io.StringIO()
+    answers.serve([json.dumps(request)], found, "", [kind], answers.of_reference)
+    return dict(json.loads(found.getvalue()))
 
 
 def asked(modules: Modules, kind: str, case: Case) -> list[str] | None:

@@ -9,6 +9,9 @@ import mutants
 import pytest
 from lab import mutation, mutation_c, trial, trial_c
 
+from wamnet.spec.conformance import program, run
+from wamnet.spec.conformance.case import FOLDER
+
 pytestmark = pytest.mark.nightly  # it runs with the experiments
 
 SOURCE = '''"""Words."""
@@ -131,3 +134,11 @@ def test_what_names_no_mutant_or_several_is_refused(capsys, words, said):
     with pytest.raises(SystemExit, match="2"):
         mutant.main(words)
     assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_reference_passes_its_own_cases() -> None:
+    """What asks a mutant asks the reference unchanged in the same way."""
+    modules = program, run
+    cases = run.read_vectors(FOLDER)["intersection.sphere"][:3]
+    assert len(cases) == 3
+    assert [trial.asked(modules, "intersection.sphere", case) for case in cases] == [None] * 3

@@ -322,7 +322,7 @@ def languages(records: Records) -> str:
             f"{row['bound']:.1e}",
             f"{row['share']:.2g}",
             "yes" if row["read"] else "no",
-            f"{row['compile_s']:.1f}",
+            f"{row['first_s']:.1f}",
         ]
         for row in found
     ]
@@ -334,7 +334,7 @@ def languages(records: Records) -> str:
         "bound",
         "share of the bound",
         "source read",
-        "compile, s",
+        "first frame, s",
     )
     return tables.markdown(heads, cells)
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...refimpl import encoding
 from ...refimpl.errors import InputError
-from ...refimpl.frame import DIRECT, Floats
+from ...refimpl.frame import DIRECT, SUN, Floats
 from ...refimpl.metrics import penumbra
 from ...refimpl.reading import check_room, read_file
 from ..common.inputs import check_input
@@ -149,7 +149,7 @@ def read_image(path: Path, exposure_stops: float = 0.0, tell: Callable[[str], No
     if suffix == ".exr":
         frame = exr.read_frame(path, tell=tell)
         exr.need_layers(path, frame, ("color",), "pictures are compared by their colour", "export it too")
-        linear, lit = frame["color"], DIRECT in frame and "unshadowed" in frame
+        linear, lit = frame["color"], {DIRECT, "unshadowed"} <= {*frame.layers} and SUN not in frame
         mask = penumbra(frame[DIRECT], frame["unshadowed"]) if lit else None
         return Image(encoding.to_display(linear, exposure_stops), linear, mask)
     if path.is_dir():

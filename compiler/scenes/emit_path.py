@@ -5,7 +5,7 @@
         for depth = 0, 1, ... MAX_DEPTH
             arrive: the next surface; radiance of the paths that are alive
             depth 0: look, add the features of the first surface; its emission, and shadow, for each ray
-            while the path is followed: see, add the features of what is seen past mirrors and glass
+            while the path is followed: past, for each shadow ray, and see, add the features of what is seen
             depth MAX_DEPTH: done
             scatter: the path continues; done when no path is alive, or followed if that is all
         add the path's radiance
@@ -18,7 +18,7 @@
    computed on with the others of its item, and changes nothing: radiance is assigned where it is alive.
 3. What is added up over the samples are planes, in groups [`GROUPS`]; a kernel writes the requested ones.
 4. With an encoding, sums stay variables, and become channels of images at the end [`_Builder._images`].
-5. `see` and `shadow` are in a kernel that has a plane of them, and no other [`asked`].
+5. `see`, `shadow` and `past` are in a kernel that has a plane of them, and no other [`asked`].
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ END = {
 """Planes of the path's state after its last arrival, by group: for comparing paths."""
 
 SUMMED: Values = {**floats("color", "deviation", ends=RGB), **LAYERS, **SEEN, **LIT, **SEEN_LIT}
-"""What samples add up to: colour, the squared differences from its mean, and the layers of `look`, `see` and
-`shadow`."""
+"""What samples add up to: colour, the squared differences from its mean, and the layers of `look`, `see`,
+`shadow` and `past`."""
 
 GROUPS: Mapping[str, Sequence[str]] = {**{g: names({g: value}) for g, value in SUMMED.items()}, **END}
 """What a kernel can add up: groups of planes, by name."""

@@ -9,13 +9,14 @@ A path is four pure functions of the reference, each a program; a kernel's skele
 5. On request `shadow`: surface, counters and the number of a shadow ray -> its part of the layer `direct`.
 6. On request `see`: way, path and surface -> the layers of what is seen past mirrors and glass, and the way
    after it (refimpl/light/following.py). Where nothing is followed it is those of the first [`_first_seen`].
+7. On request of both `past`: what a shadow ray adds to the layer `seen_direct`, where the way ends.
 
-Where features are means over more camera rays [`FeatureRays`] there is a fifth one, `ray`: `start` with
+Where features are means over more camera rays [`FeatureRays`] there is one more, `ray`: `start` with
 another source of random numbers.
 
 Values between them have names [`PATH`, `SURFACE`, `COUNTERS`; values.py]. The scene is constants by then:
 what it lacks (a kind of primitive, a second light, a rotation) is in no program. Numbers of it that shall
-move are inputs of all four [scene_inputs.py].
+move are inputs of all [scene_inputs.py].
 """
 
 from __future__ import annotations

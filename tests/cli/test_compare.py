@@ -45,6 +45,11 @@ def test_the_penumbra_is_the_reference_s(wamnet, tmp_path) -> None:
     error = metrics.inside(mask, *(to_display(frame["color"]) for frame in (noisy, clean)))
     assert found["penumbra RMSE"] == error > 0.0
     assert "direct" not in noisy
+    # Under a sun the two layers are of different light.
+    sunny = Frame({**clean.layers, "sun": np.full_like(clean["normal"], 3**-0.5)}, clean.info)
+    exr.write_frame(tmp_path / "sunny.exr", sunny)
+    data = json.loads(wamnet("compare", "noisy.exr", "sunny.exr", "--json").out)
+    assert "penumbra RMSE" not in data["metrics"]
 
 
 @pytest.mark.parametrize(

@@ -206,6 +206,15 @@ def test_help_imports_nothing_heavy(tmp_path) -> None:
     assert done.stdout.count(b"Usage: ") == len(commands)
 
 
+@pytest.mark.parametrize("path", [path for path, lines in table().items() if "call" in lines])
+def test_help_without_the_bodies_of_commands_is_the_same(wamnet, monkeypatch, path) -> None:
+    """What is left of a module for its help says what the whole module does."""
+    short = wamnet(*path.split(), "--help").out
+    monkeypatch.setattr(module.signatures, "package", lambda: "wamnet.cli.commands")
+    assert wamnet(*path.split(), "--help").out == short
+    assert "Usage" in short
+
+
 def test_help_may_be_a_value(refused) -> None:
     """The command that has it runs."""
     assert "output file '--help': must end in .exr or .png" in refused("render", "minicubes", "-o", "--help")

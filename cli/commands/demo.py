@@ -120,7 +120,8 @@ def of_scene(plan: Plan, name: str) -> Plan:
     matte = plan.preset if shown.lights else "best"
     mirrors = "mirrors-shadows" if ever_follows(build(shown, float)) else matte
     preset = "sky-shadows" if shown.environment else mirrors
-    views = VIEWS if source.still is not None else {}
+    first, later = (replace(source.at(time), environment=None, lights=(), info={}) for time in (0.0, 1.0))
+    views = VIEWS if first == later else {}
     return replace(plan, scene=name, scene_sha256=source.sha256, preset=preset, **views)
 
 

@@ -245,3 +245,9 @@ def test_the_report_compares_trained_forms_on_the_unseen_frames(
     assert len(request.pairs) == 2
     assert more["forms"] == (["form"] if forms else [])
     assert [(list(wanted), count) for wanted, count in trained] == ([(forms, 2)] if forms else [])
+
+
+@pytest.mark.parametrize(("name", "turns"), [("minicubes", False), ("glossy", False), ("daylight", True)])
+def test_the_camera_turns_where_only_light_moves(name, turns):
+    """Normals and depths of frames must differ; the sun's place changes none."""
+    assert (demo.of_scene(demo.QUICK, name).yaw_deg == demo.VIEWS["yaw_deg"]) == turns

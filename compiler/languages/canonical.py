@@ -7,7 +7,7 @@ operations that languages write with others.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -17,73 +17,65 @@ from ..kernel import kernel as tree
 from ..kernel.interface import DENOISE, IMAGE, RESULT, Interface
 from ..kernel.kernel import integer
 
+BODIES = ("body", "otherwise")
+"""Fields of statements that are statements."""
+
 
 def canonical(kernel: tree.Kernel) -> tree.Kernel:
     """Return the canonical form of a kernel of a denoiser."""
     arrays = [array for array in kernel.interface.arrays if array.is_image or array.name == RESULT]
     functions = (
-        tree.Function(each.name, each.takes, _body(each.body, ()), each.result and _value(each.result, ()))
+        tree.Function(each.name, each.takes, _body(each.body), each.result and _value(each.result))
         for each in kernel.functions
     )
     known = {each.name: tree.const(integer(kernel, each.value)) for each in kernel.constants}
-    body = tuple(_counted(each, known) for each in kernel.body)
+    body = tuple(_counted(each, partial(tree.substituted, known=known)) for each in kernel.body)
     return replace(
         kernel,
         interface=Interface(DENOISE, tuple(arrays), ()),
-        body=_body(body, ()),
-        constants=tuple(tree.Constant(each.name, _value(each.value, ())) for each in kernel.constants),
+        body=_body(body),
+        constants=tuple(tree.Constant(each.name, _value(each.value)) for each in kernel.constants),
         functions=tuple(functions),
-        step=(_value(kernel.step[0], ()), _value(kernel.step[1], ())),
+        step=(_value(kernel.step[0]), _value(kernel.step[1])),
     )
 
 
-def _counted(statement: tree.Statement, known: Mapping[str, tree.Expr]) -> tree.Statement:
+def _counted(statement: tree.Statement, counted: Callable[[tree.Expr], tree.Expr]) -> tree.Statement:
     """Return an array of the device, or a launch, with integers for constants: no source states them."""
     if isinstance(statement, tree.Launch):
-        across, down = (tree.substituted(each, known) for each in statement.counts)
-        return replace(statement, counts=(across, down))
+        return replace(statement, counts=tuple(map(counted, statement.counts)))
     if isinstance(statement, tree.Array) and statement.space == "device":
-        return replace(
-            statement, sizes=tuple(tree.substituted(tree.expr(each), known) for each in statement.sizes)
-        )
+        return replace(statement, sizes=tuple(counted(tree.expr(each)) for each in statement.sizes))
     return statement
 
 
-def _body(body: tree.Body, variables: Collection[str]) -> tree.Body:
-    """Return statements in canonical form; `variables`: names around them that are read as memory."""
-    statements: list[tree.Statement] = []
-    names = set(variables)
+def _body(body: tree.Body) -> tree.Body:
+    """Return statements in canonical form."""
+    return tree.rewritten(tuple(_statements(body)), _value)
+
+
+def _statements(body: tree.Body) -> Iterator[tree.Statement]:
+    """Yield statements in canonical form, but for their expressions."""
     for number, statement in enumerate(body):
-        if isinstance(statement, tree.Comment):
-            continue
+        rest = (each.array for each in tree.walk(body[number + 1 :]) if isinstance(each, tree.Store))
         if isinstance(statement, tree.Write):
             place = (statement.row, statement.column)
-            stores = (
-                tree.Store(RESULT, (*place, tree.const(c)), value) for c, value in enumerate(statement.values)
-            )
-            statements += [_statement(store, names) for store in stores]
-            continue
-        if isinstance(statement, tree.For) and _writes(statement):
+            for c, value in enumerate(statement.values):
+                yield tree.Store(RESULT, (*place, tree.const(c)), value)
+        elif isinstance(statement, tree.For) and _writes(statement):
             for turn in range(int(statement.count.value)):
                 known = {statement.name: tree.const(turn)}
-                statements += _body(
-                    tree.rewritten(statement.body, partial(tree.substituted, known=known)), names
-                )
-            continue
-        rest = tree.walk(body[number + 1 :])
-        stored = any(
-            isinstance(each, tree.Store) and each.array == getattr(statement, "name", "") for each in rest
-        )
-        if isinstance(statement, tree.Array) and statement.value is not None and not stored:
-            statement = tree.Let(statement.name, statement.value)
-        elif isinstance(statement, tree.Let) and stored:
-            statement = tree.Array(statement.name, statement.value.type, value=statement.value)
-        statements.append(_statement(statement, names))
-        if isinstance(statement, tree.Array) and not statement.sizes:
-            names.add(statement.name)
-        elif isinstance(statement, tree.Let | tree.Array):
-            names.discard(statement.name)
-    return tuple(statements)
+                yield from _statements(tree.rewritten(statement.body, partial(tree.substituted, known=known)))
+        elif isinstance(statement, tree.Let | tree.Array) and statement.value is not None:
+            name, value = statement.name, statement.value
+            is_variable = name in rest
+            yield tree.Array(name, value.type, value=value) if is_variable else tree.Let(name, value)
+        elif isinstance(statement, tree.Array):
+            sizes = tuple(map(tree.expr, statement.sizes))
+            yield replace(statement, sizes=sizes, kept=False, register=False)
+        elif not isinstance(statement, tree.Comment):
+            inner = {key: tuple(_statements(each)) for key, each in vars(statement).items() if key in BODIES}
+            yield replace(statement, **inner, **({"how": "loop"} if isinstance(statement, tree.For) else {}))
 
 
 def _writes(loop: tree.For) -> bool:
@@ -93,44 +85,14 @@ def _writes(loop: tree.For) -> bool:
     return stores and whole and loop.count.op == "const" and loop.count.type == tree.INT
 
 
-def _statement(statement: tree.Statement, names: Collection[str]) -> tree.Statement:
-    """Return one statement in canonical form."""
-    if isinstance(statement, tree.Let):
-        return tree.Let(statement.name, _value(statement.value, names))
-    if isinstance(statement, tree.Array):
-        sizes = tuple(_value(tree.const(s) if isinstance(s, int) else s, names) for s in statement.sizes)
-        value = statement.value and _value(statement.value, names)
-        return replace(statement, sizes=sizes, value=value, kept=False, register=False)
-    if isinstance(statement, tree.Store):
-        index = tuple(_value(each, names) for each in statement.index)
-        return replace(statement, index=index, value=_value(statement.value, names))
-    if isinstance(statement, tree.For):
-        inner = set(names) - {statement.name}
-        start, count, step = (_value(e, names) for e in (statement.start, statement.count, statement.step))
-        until = statement.until and _value(statement.until, inner)
-        return tree.For(statement.name, count, _body(statement.body, inner), "loop", start, step, until)
-    if isinstance(statement, tree.If):
-        condition = _value(statement.condition, names)
-        return tree.If(condition, _body(statement.body, names), _body(statement.otherwise, names))
-    if isinstance(statement, tree.Block | tree.Launch):
-        return replace(statement, body=_body(statement.body, names))
-    if isinstance(statement, tree.Call):
-        views = (
-            replace(v, index=tuple(_value(each, names) for each in v.index), step=_value(v.step, names))
-            for v in statement.views
-        )
-        return replace(statement, views=tuple(views))
-    return statement
-
-
-def _value(value: tree.Expr, names: Collection[str]) -> tree.Expr:
+def _value(value: tree.Expr) -> tree.Expr:
     """Return an expression in canonical form."""
     if value.op == "const":
         number = float(np.float32(value.value)) if value.type.dtype == "float32" else value.value
         return replace(value, value=number)
-    if value.op == "name" and value.value in names:
-        return tree.Expr("load", (), value.type, value.value)
-    value = replace(value, args=tuple(_value(each, names) for each in value.args))
+    if value.op == "load" and not value.args:
+        return tree.name(value.value, value.type)
+    value = replace(value, args=tuple(map(_value, value.args)))
     if value.op in ("add", "subtract") and value.type == tree.INT:
         return tree.total(tree.terms(value))
     if (

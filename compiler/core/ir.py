@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.network.dataset import Window
+from ...refimpl.network.window import Window
 
 Parameters = Mapping[str, NDArray[Any]]
 

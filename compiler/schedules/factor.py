@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
-from ...refimpl.network import dataset, factored
+from ...refimpl.network import factored, window
 from ..core.ir import Gather, Image, Node, Program, Type, attributes
 from ..core.profiles import SineContract
 from ..core.trace import trace
@@ -165,7 +165,7 @@ def at_images(
 
     def taps(image: Array, axes: tuple[int, ...]) -> Array:
         """Return the windows (H, W, n) along some axes."""
-        found: Array = dataset.all_windows(dataset.pad(image, whole.window, axes), whole.window, axes)
+        found: Array = window.all_windows(window.pad(image, whole.window, axes), whole.window, axes)
         return found
 
     def columns(h: Enclosure) -> Enclosure:

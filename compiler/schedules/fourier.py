@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.network import dataset
+from ...refimpl.network.window import Window
 from ..core.ir import Gather, Node, Program
 from ..core.ops import OPS
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
@@ -247,7 +247,7 @@ def radius(gather: Gather, centres: Array) -> Array:
     return found
 
 
-def tile_norms(image: Array, window: dataset.Window, points: int, centres: Any = 0.0) -> Array:
+def tile_norms(image: Array, window: Window, points: int, centres: Any = 0.0) -> Array:
     """Return the norm (H, W) of the tile, centred, that holds each pixel of an image (H, W, C)."""
     middle = np.zeros(image.shape[2]) + centres
     # |x - m|^2 = |m|^2 + (|x - m|^2 - |m|^2), the latter being 0 outside of a zero border.
@@ -258,7 +258,7 @@ def tile_norms(image: Array, window: dataset.Window, points: int, centres: Any =
     return found
 
 
-def _over_tiles(squares: Array, window: dataset.Window, points: int) -> Array:
+def _over_tiles(squares: Array, window: Window, points: int) -> Array:
     """Return the sums (n, m) over the rows of the tile that holds each row of (n, m)."""
     count, out = len(squares), points - window.size + 1
     first = np.arange(count) // out * out - window.size // 2

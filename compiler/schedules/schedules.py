@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
-from ...refimpl.network import dataset
+from ...refimpl.network import window
 from ..core import weights
 from ..core.ir import DTYPES, Gather, Program
 from ..core.profiles import SineContract
@@ -58,8 +58,8 @@ def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.flo
     """Return the windows (rows, W, n) of given images (H, W, C)."""
     joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
     first, end, _ = rows.indices(len(joined))
-    padded = dataset.pad(joined, gather.window, gather.axes)[first : end + gather.rows - 1]
-    found: NDArray[np.float64] = dataset.all_windows(padded, gather.window, gather.axes)
+    padded = window.pad(joined, gather.window, gather.axes)[first : end + gather.rows - 1]
+    found: NDArray[np.float64] = window.all_windows(padded, gather.window, gather.axes)
     return found
 
 

@@ -4,13 +4,11 @@
    model, not to the frame [`Normalization`], [`normalization_of`].
 2. The chosen features, one after another on the channel axis, are the feature image [`feature_image`].
    What is not a number counts as 0 there, once and for all executors [`known`].
-3. The image is padded by the border rule [`pad`], so that every pixel has a full window; the window of a
-   pixel is the network's input vector [`windows_at`].
+3. The window of a pixel is the network's input vector [window.py].
 4. Training draws pixels uniformly from all frames with the counter generator [`sample_pixels`] and gathers
    windows and targets from one table [`build`], [`examples_at`].
 
-The window's size is the paper's (*WAMnet for Image Denoising*); which of its pixels is the centre, the border
-rule and the encodings are decisions, explained in the chapter of this module.
+The encodings are decisions, explained in the chapter of this module.
 """
 
 from __future__ import annotations
@@ -31,16 +29,20 @@ from ..rng import counter, random_block
 from ..vectors import vector
 from .smoothing import DEPTH, GUIDES, LEVELS, dimmed, smooth
 from .whole import steps_of
+from .window import BORDERS as BORDERS
+from .window import LARGEST_WINDOW_PX as LARGEST_WINDOW_PX
+from .window import Window as Window
+from .window import all_windows as all_windows
+from .window import check_window as check_window
+from .window import gathered
+from .window import pad as pad
+from .window import windows_at as windows_at
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]
 
 PIXEL_TAG = 0x50495845
 """Counter `block` of the words that choose pixels ("PIXE" in ASCII); light paths use small numbers."""
-
-LARGEST_WINDOW_PX = 64
-"""Largest window: 64 x 64 pixels of 16 channels are 65,536 numbers a pixel, far beyond any use. A typing
-error is refused before it takes all memory."""
 
 LARGEST_SCALE = 1e18
 """Largest scale and position, in scene units. The smallest scale is its inverse: with a position of 1e12 no
@@ -245,36 +247,6 @@ FEATURES: Mapping[str, Feature] = {
 """Every feature that a model may use. Those of what is seen past mirrors and glass are encoded as those of
 the first hit are, by the same scales; smoothed colour is guided by the one or the other."""
 
-BORDERS: Mapping[str, str] = {"clamp": "edge", "zero": "constant"}
-"""Border rules, by name, as NumPy's padding modes: repeat the nearest pixel, or see zeros."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """The pixels that the network sees: `size` x `size` around a pixel, `border` outside the image."""
-
-    size: int = 12
-    border: str = "clamp"
-
-    @property
-    def before(self) -> int:
-        """Taps above (and left of) the pixel; as many less one are below when the size is even."""
-        return self.size // 2
-
-    @property
-    def after(self) -> int:
-        """Taps below (and right of) the pixel."""
-        return self.size - self.size // 2 - 1
-
-
-def check_window(window: Window) -> None:
-    """Refuse a size or a border rule that means nothing."""
-    if not isinstance(window.size, int) or not 1 <= window.size <= LARGEST_WINDOW_PX:
-        rule = f"must be an integer from 1 to {LARGEST_WINDOW_PX}"
-        raise InputError("window size", window.size, rule, "the paper's is 12")
-    if window.border not in BORDERS:
-        raise InputError("window border", window.border, "unknown", choice(window.border, BORDERS))
-
 
 def check_features(features: Sequence[str]) -> None:
     """Refuse feature names that are unknown, repeated or none."""
@@ -408,48 +380,6 @@ def target_image(reference: Frame, normalization: Normalization) -> NDArray[np.f
     return feature_image(reference, ("color",), normalization)
 
 
-def pad(image: Array, window: Window, axes: tuple[int, ...] = (0, 1)) -> Array:
-    """Extend (H, W, C) by the border rule to (H + size - 1, W + size - 1, C), or along some `axes` only."""
-    margins = [(window.before, window.after) if axis in axes else (0, 0) for axis in range(3)]
-    mode: Any = BORDERS[window.border]
-    padded: Array = np.pad(image, margins, mode=mode)
-    return padded
-
-
-def windows_at(image: Array, y: Any, x: Any, window: Window) -> Array:
-    """Return the window vectors (N, size * size * C) of the pixels y (N,), x (N,) of image (H, W, C).
-
-    Element (dy, dx, c) in C order is channel c of the pixel at (y + dy - size // 2, x + dx - size // 2).
-    """
-    padded = pad(image, window)
-    corner = np.asarray(y, np.int64) * padded.shape[1] + np.asarray(x, np.int64)
-    return _gather(padded.reshape(-1), corner, padded.shape[1], image.shape[2], window.size)
-
-
-def all_windows(padded: Array, window: Window, axes: tuple[int, ...] = (0, 1)) -> Array:
-    """Return the windows (H, W, size * size * C) of all pixels of the image that was padded to `padded`.
-
-    Along one of the `axes` only, they are a column (0) or a row (1) of `size` pixels.
-    """
-    sizes = (window.size,) * len(axes)
-    views = np.lib.stride_tricks.sliding_window_view(padded, sizes, axis=axes)
-    height, width = views.shape[:2]
-    # NumPy puts the window's axes last, (H, W, C, dy, dx); a window vector has the channel last.
-    return np.moveaxis(views, 2, -1).reshape(height, width, -1)
-
-
-def _gather(values: Array, corner: Indices, row_px: Any, channels: int, size: int) -> Array:
-    """Return windows (N, size * size * channels) of padded images, laid out flat in `values` (P * channels,).
-
-    `corner` (N,) is the flat pixel index of each window's first tap, `row_px` the pixels from row to row. The
-    taps of one window row are neighbours in memory: a run of size * channels numbers.
-    """
-    runs = np.lib.stride_tricks.sliding_window_view(values, size * channels)[::channels]
-    rows = corner[:, None] + np.arange(size) * np.reshape(row_px, (-1, 1))
-    windows: Array = runs[rows].reshape(len(corner), -1)
-    return windows
-
-
 @dataclass(frozen=True)
 class Dataset:
     """Padded feature images and targets of all frames, end to end.
@@ -522,7 +452,7 @@ def _starts(lengths: Sequence[int]) -> Indices:
 def examples_at(dataset: Dataset, frame: Indices, y: Indices, x: Indices) -> tuple[Array, Array]:
     """Return window vectors (N, D_in) and target colours (N, 3) of pixels given as frame, y, x (N,)."""
     corner, row_px, target = places_of(dataset, frame, y, x)
-    windows = _gather(dataset.values, corner, row_px, dataset.channels, dataset.window.size)
+    windows = gathered(dataset.values, corner, row_px, dataset.channels, dataset.window.size)
     return windows, dataset.targets[target]
 
 

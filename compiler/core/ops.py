@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -39,14 +40,22 @@ class Op:
     name: str
     arity: int | None
     type_rule: TypeRule
-    definition: Callable[..., Any]
-    rounding: Rounding
+    definition: Any  # None: the interpreter's own
     required: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
-    parameters: tuple[str, ...] = ()  # the attributes that name parameters
+    rounding: Rounding = "exact"
     elementwise: bool = False
     image: Image | None = None  # None: what it computes is not a matter of the operands' ends
     slopes: Slopes | None = None
+
+    @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """Return the attributes that name parameters."""
+        return tuple(n for n in (*self.required, *self.optional) if n in NAMING or self.name == "parameter")
+
+
+NAMING = ("weight", "bias", "table", "first", "skip")
+"""Attributes that name parameters; that of an operation `parameter` is its name."""
 
 
 FLOATS = ("float32",)
@@ -207,9 +216,9 @@ def _affine_value(x: Any, weight: Any, bias: Any = None) -> Any:
     return product if bias is None else product + bias
 
 
-def _no_definition(*_: Any, **__: Any) -> Any:
-    """Inputs, constants, parameters and what makes up a loop are the interpreter's own."""
-    raise NotImplementedError
+def _converted(x: Any, dtype: Any) -> Any:
+    """x (...) as numbers of another kind."""
+    return np.asarray(x).astype(dtype)
 
 
 def _row(
@@ -226,7 +235,7 @@ def _row(
     Without an image of its own it is monotone: its ends are those of its operands.
     """
     image, rule = image or monotone(function), _elementwise(kinds)
-    return Op(name, arity, rule, function, rounding, elementwise=True, image=image, slopes=slopes)
+    return Op(name, arity, rule, function, (), (), rounding, True, image, slopes)
 
 
 def _quotient(d: Any, y: Any, a: Any, b: Any) -> tuple[Any, ...]:
@@ -242,25 +251,16 @@ def _either(first: Any, d: Any) -> tuple[Any, ...]:
 
 def _compare(name: str, function: Callable[..., Any], image: Image) -> Op:
     """Return the row of a comparison."""
-    return Op(name, 2, _comparison, function, "exact", elementwise=True, image=image)
+    return Op(name, 2, _comparison, function, elementwise=True, image=image)
 
 
 OPS: Mapping[str, Op] = {
     op.name: op
     for op in (
-        Op("input", 0, _declared, _no_definition, "exact", required=("name", "type")),
-        Op("constant", 0, _constant, _no_definition, "exact", required=("value",), optional=("dtype",)),
-        Op("parameter", 0, _parameter, _no_definition, "exact", required=("name",), parameters=("name",)),
-        Op(
-            "affine",
-            1,
-            _affine,
-            _affine_value,
-            "dot",
-            required=("weight",),
-            optional=("bias",),
-            parameters=("weight", "bias"),
-        ),
+        Op("input", 0, _declared, None, ("name", "type")),
+        Op("constant", 0, _constant, None, ("value",), ("dtype",)),
+        Op("parameter", 0, _parameter, None, ("name",)),
+        Op("affine", 1, _affine, _affine_value, ("weight",), ("bias",), "dot"),
         _row("add", np.add, 2, "nearest", NUMBERS, slopes=lambda d, y, a, b: (d, d)),
         _row("subtract", np.subtract, 2, "nearest", NUMBERS, ends.subtract, lambda d, y, a, b: (d, -d)),
         _row(
@@ -296,43 +296,18 @@ OPS: Mapping[str, Op] = {
         _row("logical_or", np.logical_or, 2, kinds=("bool",)),
         _row("logical_not", np.logical_not, 1, kinds=("bool",), image=ends.logical_not),
         *(
-            Op(each.__name__, 2, _elementwise(("uint32",)), each, "exact", elementwise=True)
+            Op(each.__name__, 2, _elementwise(("uint32",)), each, elementwise=True)
             for each in (np.bitwise_and, np.bitwise_xor, np.right_shift)
         ),
-        Op("select", 3, _select, np.where, "exact", elementwise=True, image=ends.select),
-        Op(
-            "convert",
-            1,
-            _convert,
-            lambda x, dtype: np.asarray(x).astype(dtype),
-            "nearest",
-            required=("dtype",),
-            elementwise=True,
-        ),
-        Op(
-            "take",
-            1,
-            _take,
-            lambda index, table: np.take(table, index),
-            "exact",
-            required=("table",),
-            parameters=("table",),
-        ),
-        Op("carried", 1, _carried, _no_definition, "exact", required=("index", "loop")),
-        Op("row", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
-        Op("branch", 0, _trip, _no_definition, "exact", required=("loop", "table"), parameters=("table",)),
-        Op(
-            "loop",
-            None,
-            _loop,
-            _no_definition,
-            "exact",
-            required=("index", "loop", "trips"),
-            optional=("first", "parts", "skip"),
-            parameters=("first", "skip"),
-        ),
-        Op("stack", None, _stack, lambda *x: np.stack(np.broadcast_arrays(*x), axis=-1), "exact"),
-        Op("component", 1, _component, lambda x, index: x[..., index], "exact", required=("index",)),
+        Op("select", 3, _select, np.where, elementwise=True, image=ends.select),
+        Op("convert", 1, _convert, _converted, ("dtype",), (), "nearest", elementwise=True),
+        Op("take", 1, _take, lambda index, table: np.take(table, index), ("table",)),
+        Op("carried", 1, _carried, None, ("index", "loop")),
+        Op("row", 0, _trip, None, ("loop", "table")),
+        Op("branch", 0, _trip, None, ("loop", "table")),
+        Op("loop", None, _loop, None, ("index", "loop", "trips"), ("first", "parts", "skip")),
+        Op("stack", None, _stack, lambda *x: np.stack(np.broadcast_arrays(*x), axis=-1)),
+        Op("component", 1, _component, lambda x, index: x[..., index], ("index",)),
     )
 }
 """All operations, by name."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -74,8 +75,9 @@ def _statements(body: tree.Body) -> Iterator[tree.Statement]:
             sizes = tuple(map(tree.expr, statement.sizes))
             yield replace(statement, sizes=sizes, kept=False, register=False)
         elif not isinstance(statement, tree.Comment):
+            own: dict[str, Any] = {"how": "loop"} if isinstance(statement, tree.For) else {}
             inner = {key: tuple(_statements(each)) for key, each in vars(statement).items() if key in BODIES}
-            yield replace(statement, **inner, **({"how": "loop"} if isinstance(statement, tree.For) else {}))
+            yield replace(statement, **own, **inner)
 
 
 def _writes(loop: tree.For) -> bool:

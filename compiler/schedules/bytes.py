@@ -2,10 +2,10 @@
 
 1. Inputs and hidden values are bytes, weights are bytes with a sign: one instruction of many processors
    multiplies four pairs and adds the products to a sum of 32 bits (expression `dot4`).
-2. On processors [`Bytes`] the tile is that of tile.py. Values are n + 128, from 1 to 255, since the
+2. On processors [`Dot`] the tile is that of tile.py. Values are n + 128, from 1 to 255, since the
    instruction takes one factor without a sign; a row of weights begins its sums at -128 times the sum of its
    weights: then they are those of n. A row of taps is filled up to fours with weights of 0.
-3. On graphics processors [`GroupBytes`] the tile is that of group.py. Both factors have a sign. A word of the
+3. On graphics processors [`GroupDot`] the tile is that of group.py. Both factors have a sign. A word of the
    tile holds four channels of a pixel, counted over all images; a word of a hidden layer is a vector of four.
 
 They hold programs in which nothing rounds [proof/whole.py] and whose values are of 8 bits. A slot of a matrix
@@ -15,7 +15,6 @@ counts four bytes as one number.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from ..kernel.interface import WEIGHTS
 from ..kernel.kernel import apply, const, load, name, splat
 from ..proof import whole
 from .common import kernel_gather, loop, readers_of_window, weight
-from .group import MOST_CHANNELS, Group, Grouped
+from .group import MOST_CHANNELS, Grouped
 from .straight import VECTOR
 from .tile import (
     COUNTER,
@@ -38,7 +37,6 @@ from .tile import (
     Blocks,
     P,
     Tile,
-    Tiled,
     blocks_of,
     matrices,
     stored,
@@ -103,11 +101,20 @@ def runs_of(program: Program, parameter: str) -> list[list[int]]:
     ]
 
 
-class Bytes(Tiled):
-    """Builds the tiled kernel of bytes."""
+class Dot(Tile):
+    """A tile whose products are of bytes."""
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
-        super().__init__(program, slots, **parameters)
+    order = (
+        "matrices block by block of neurons: blocks x fours of inputs x neurons x 4 bytes with a sign; "
+        "inputs that are the window go image by image, then row of taps by row, each filled up to fours; "
+        f"{START}: where a matrix' sums begin, integers of 32 bits"
+    )
+    bytewise = True
+    instead = "tile:16"
+
+    def begin(self, program: Program, slots: Mapping[str, Slot]) -> None:
+        """Take a program, whose weights are in these slots."""
+        super().begin(program, slots)
         self.weights, self.part = tree.INT.of(self.lanes), ""
 
     def read(self, index: int) -> tree.Expr:
@@ -171,19 +178,6 @@ class Bytes(Tiled):
         """Return what words of weights add to a sum."""
         return dot4(weights, factor)
 
-
-class Dot(Tile):
-    """A tile whose products are of bytes."""
-
-    order = (
-        "matrices block by block of neurons: blocks x fours of inputs x neurons x 4 bytes with a sign; "
-        "inputs that are the window go image by image, then row of taps by row, each filled up to fours; "
-        f"{START}: where a matrix' sums begin, integers of 32 bits"
-    )
-    bytewise = True
-    instead = "tile:16"
-    builder = Bytes
-
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         names = [node["weight"] for node in program.nodes if node.op == "affine"]
@@ -224,9 +218,16 @@ def words_of(program: Program, parameter: str) -> NDArray[np.intp]:
     return np.concatenate([np.where(held < 0, -1, held + taps).reshape(-1, FOUR) for held in chunks])
 
 
-class GroupBytes(Group):
-    """Builds the grouped kernel of bytes."""
+class GroupDot(Grouped):
+    """A tile of words for each group of items."""
 
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices words x neurons, a word being four inputs "
+        "as bytes with a sign, the first one the lowest; of a matrix that reads the window the channels of "
+        f"all images make words that are filled up with zeros, at most {MOST_CHANNELS} of them at a time tap "
+        "by tap in rows, then word by word"
+    )
+    bytewise = True
     element = tree.INT
     weights = tree.INT.of(FOUR)
     part = ""
@@ -265,24 +266,6 @@ class GroupBytes(Group):
         """Return what a word of weights adds to a sum."""
         return dot4(weight, factor)
 
-
-def packed(values: Sequence[tree.Expr]) -> tree.Expr:
-    """Return four values as the bytes of a word, the first one the lowest."""
-    return tree.Expr("pack4", tuple(values), tree.INT)
-
-
-class GroupDot(Grouped):
-    """A tile of words for each group of items."""
-
-    order = (
-        "vectors filled up to multiples of 4 with zeros; matrices words x neurons, a word being four inputs "
-        "as bytes with a sign, the first one the lowest; of a matrix that reads the window the channels of "
-        f"all images make words that are filled up with zeros, at most {MOST_CHANNELS} of them at a time tap "
-        "by tap in rows, then word by word"
-    )
-    bytewise = True
-    builder = GroupBytes
-
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         return refused_by_bytes(program) or super().refusal(program)
@@ -309,3 +292,8 @@ class GroupDot(Grouped):
             words = filled[:, words_of(program, key)].transpose(1, 0, 2)
             found[key] = np.ascontiguousarray(words).view("<f4")[None, ..., 0]
         return found
+
+
+def packed(values: Sequence[tree.Expr]) -> tree.Expr:
+    """Return four values as the bytes of a word, the first one the lowest."""
+    return tree.Expr("pack4", tuple(values), tree.INT)

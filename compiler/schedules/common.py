@@ -214,7 +214,7 @@ Read = Callable[[int], tree.Expr]
 
 
 class Nest:
-    """Builds the statements of one program; a schedule's parameters are attributes.
+    """Builds the statements of one program.
 
     `wide`: the language has elementwise operations on vectors.
     """
@@ -222,9 +222,9 @@ class Nest:
     lanes = 1
     wide = True
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
+    def begin(self, program: Program, slots: Mapping[str, Slot]) -> None:
+        """Take a program, whose weights are in these slots."""
         self.program, self.slots = program, slots
-        vars(self).update(parameters)
         self.groups, self.readers = groups_of(program), users(program)
         self.group_of = {index: number for number, group in enumerate(self.groups) for index in group}
 
@@ -271,7 +271,7 @@ class Nest:
         found.setdefault(names[3], gather.columns // 2)
         return named(**found)
 
-    def kernel(
+    def assembled(
         self, body: Sequence[tree.Statement], constants: Sequence[tree.Constant], **more: object
     ) -> tree.Kernel:
         """Return the kernel of statements; where its weights are is a matter of the language."""

@@ -2,11 +2,11 @@
 
 1. A work item computes `tiles` tiles side by side, each of OUT x OUT pixels, OUT = POINTS - WINDOW_SIZE + 1:
    those whose windows lie in POINTS x POINTS pixels of the images (overlap-save: what wraps around is not
-   computed). Its patch is gathered row by row, under the border rule [`Spectral.rows_forward`].
+   computed). Its patch is gathered row by row, under the border rule [`Fourier.rows_forward`].
 2. Two channels are one complex image, and a vector holds such pairs of all tiles: `LANES` transforms at once,
    none of which needs a shuffle. Rows are transformed as they come, columns when they are needed.
 3. A column k and its mirror image -k give both channels' spectra; each is multiplied with the spectra of the
-   neurons' weights and summed over channels, with all tiles' sums in registers [`Spectral.products`].
+   neurons' weights and summed over channels, with all tiles' sums in registers [`Fourier.products`].
 4. The sums of neurons j and j + LANES are one complex image again: one inverse transform of the columns, of
    whose rows OUT are kept, and one of each row give both.
 5. What a row of all tiles gives goes through the other layers as in the tiled schedule, PIXELS at a time.
@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +35,7 @@ from ..proof.spectra import Spectra
 from . import fourier
 from .common import HEIGHT, WIDTH, Nest, clamp, kernel_gather, loop, named, readers_of_window, weight
 from .schedules import ALL, Images, Stored, windows
-from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tiled, all_stored
+from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tile, all_stored
 
 PARTS = 2
 """Values of a complex one: its real and its imaginary part."""
@@ -196,16 +195,118 @@ def centred(nest: Nest, centres: Sequence[float]) -> list[tree.Expr]:
     return [value - const(middle) if middle else value for value, middle in zip(values, centres, strict=True)]
 
 
-class Spectral(Tiled):
-    """Builds the kernel with Fourier transforms of `points` in `tiles` tiles."""
+COST = 3.0
+"""Times that an operation of a transform takes of one of the direct sum: 2.6, as measured on an AMD EPYC with
+tiles of 32; most of its operands are loaded and stored."""
 
+
+class Transformed(Stored):
+    """Tiles of `points` x `points` pixels, `tiles` side by side: what all schedules of transforms share."""
+
+    lanes: int
     points: int
     tiles: int
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
-        super().__init__(program, slots, **parameters)
+    def begin(self, program: Program, slots: Mapping[str, Slot]) -> None:
+        """Take a program, whose weights are in these slots."""
+        super().begin(program, slots)
         self.sizes = sizes_of(program, self.lanes, self.points, self.tiles)
         self.centres = fourier.arrangement(program, self.lanes).centres
+
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name."""
+        return spectra_stored(program, self.lanes, self.points, self.tiles)
+
+    def held(self, program: Program) -> Program:
+        """Return the program whose parameters are what the kernel holds, before transforms."""
+        found = fourier.arrangement(program, self.lanes)
+        return found.centred(found.moved(program))
+
+    def pack(self, program: Program) -> NDArray[np.float32]:
+        """Return the weights (count,) as `layout` places them, the neurons of the first layer in order."""
+        return super().pack(self.held(program))
+
+    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return other numbers in the places of the weights; 0 for those that the kernel does not hold."""
+        found = fourier.arrangement(program, self.lanes)
+        own = [found.weight, *([found.bias] if found.bias and any(found.centres) else [])]
+        lost = {name: np.zeros_like(parameters[name]) for name in own}
+        return super().pack(found.moved(replace(program, parameters={**parameters, **lost})))
+
+    def spectra(self, program: Program) -> Spectra:
+        """Return how the sums over the window are computed, for their bound."""
+        (layer,), found = readers_of_window(program), fourier.arrangement(program, self.lanes)
+        gather, count = kernel_gather(program), layer.type.shape[0]
+        held = found.centred(found.moved(program))
+        # Columns, groups, rows, pairs, halves, parts and places of neurons.
+        stored = self.stored(held)[found.weight].astype(np.float64)
+        placed = stored[..., 0, :] + 1j * stored[..., 1, :]
+        placed = placed.transpose(1, 5, 2, 0, 4, 3).reshape(
+            -1, self.points, self.points // 2 + 1, *placed.shape[3:5]
+        )
+        placed = placed.reshape(*placed.shape[:3], -1)[:count, ..., : gather.channels]
+        table, bias = np.empty_like(placed), np.zeros(count)
+        table[found.order] = 2 * self.points * placed
+        if found.bias is not None:
+            bias[found.order] = held.parameters[found.bias]
+        block, centres = fourier.block_of(-(-gather.channels // 2)), np.array(found.centres)
+        return Spectra(self.points, gather.rows, found.order, self.lanes, block, centres, table, bias)
+
+    def enclosures(
+        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node: the sums over the window are those of spectra."""
+        gather, of = kernel_gather(program), self.spectra(program)
+        if images is None:
+            norm = np.array(self.points * np.linalg.norm(fourier.radius(gather, of.centres)))
+            return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
+        found = windows(gather, images, rows)
+        joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
+        norms = fourier.tile_norms(joined, gather.window, self.points, of.centres)[rows]
+        return fourier.enclose(program, sine, (found, found), norms, of)
+
+    def refusal(self, program: Program) -> str:
+        """Return why this schedule cannot hold the program, or nothing."""
+        gather, readers = kernel_gather(program), readers_of_window(program)
+        if gather.whole:
+            return "sums from spectra are rounded, those of integers are not"
+        if reason := Stored.refusal(self, program):
+            return reason
+        if len(readers) != 1:
+            return f"{len(readers)} affine maps read the window, not one"
+        if gather.axes != (0, 1) or gather.rows >= self.points:
+            return f"a window of {gather.rows} x {gather.columns} pixels in a tile of {self.points}"
+        names = [node["weight"] for node in program.nodes if node.op == "affine"]
+        if names.count(readers[0]["weight"]) != 1:
+            return "a matrix is applied to the window and to a layer"
+        if reason := self.beyond_stack(program):
+            return reason
+        direct, spectra = self.operations(program)
+        if COST * spectra > direct:
+            return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"
+        return ""
+
+    def operations(self, program: Program) -> tuple[float, float]:
+        """Return the operations on vectors, per pixel, of the direct sum over the window and of this one."""
+        (layer,), n = readers_of_window(program), self.points
+        s = sizes_of(program, self.lanes, n, self.tiles)
+        direct = kernel_gather(program).n_inputs * -(-layer.type.shape[0] // self.lanes)
+        products = (n // 2 + 1) * n * s.pairs * 16 * self.tiles * s.neurons
+        # The split-radix algorithm takes 4 n log2(n) - 6 n + 8 operations.
+        one = 4 * n * (n.bit_length() - 1) - 6 * n + 8
+        transforms = s.inputs * (2 * n + 2) + self.tiles * s.neurons * (n + s.out)
+        return direct, (products + one * transforms) / (self.tiles * s.out**2)
+
+
+class Fourier(Transformed, Tile):
+    """Tiles whose transforms an item computes in its own memory."""
+
+    order = (
+        "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
+        "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
+        "(real, imaginary) of the first and of the second channel, two vectors of neurons; other "
+        "matrices block by block of neurons: blocks x D_in x neurons"
+    )
 
     def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
@@ -232,7 +333,7 @@ class Spectral(Tiled):
             codelet("backward", self.points, self.sizes.out, 1, self.vector),
         )
         more = {"functions": functions, "step": (TILES * OUT, OUT), "place": ("tile_x", "tile_y")}
-        return self.kernel(body, constants, **more, weights=self.vector)
+        return self.assembled(body, constants, **more, weights=self.vector)
 
     def rows_forward(self) -> list[tree.Statement]:
         """Return the gathering and transformation of rows."""
@@ -396,112 +497,3 @@ class Spectral(Tiled):
             lines.append(tree.Store(f"v{index}", (P * total + j,), value))
         said = tree.Comment(f"%{index}: the sums, and their bias")
         return [said, self.array(index), loop("p", PIXELS, *lines)]
-
-
-COST = 3.0
-"""Times that an operation of a transform takes of one of the direct sum: 2.6, as measured on an AMD EPYC with
-tiles of 32; most of its operands are loaded and stored."""
-
-
-class Fourier(Stored):
-    """Tiles of `points` x `points` pixels, `tiles` side by side."""
-
-    order = (
-        "vectors filled up with zeros; the spectrum of the matrix that reads the window: columns of "
-        "frequencies 0 to points / 2, pairs of vectors of neurons, rows of frequencies, pairs of channels, "
-        "(real, imaginary) of the first and of the second channel, two vectors of neurons; other "
-        "matrices block by block of neurons: blocks x D_in x neurons"
-    )
-
-    builder: type[Nest] = Spectral
-    takes: tuple[str, ...] = ("lanes", "pixels", "points", "tiles")
-    lanes: int
-    points: int
-    tiles: int
-
-    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
-        """Return all weights as they are stored, by name."""
-        return spectra_stored(program, self.lanes, self.points, self.tiles)
-
-    def held(self, program: Program) -> Program:
-        """Return the program whose parameters are what the kernel holds, before transforms."""
-        found = fourier.arrangement(program, self.lanes)
-        return found.centred(found.moved(program))
-
-    def pack(self, program: Program) -> NDArray[np.float32]:
-        """Return the weights (count,) as `layout` places them, the neurons of the first layer in order."""
-        return super().pack(self.held(program))
-
-    def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-        """Return other numbers in the places of the weights; 0 for those that the kernel does not hold."""
-        found = fourier.arrangement(program, self.lanes)
-        own = [found.weight, *([found.bias] if found.bias and any(found.centres) else [])]
-        lost = {name: np.zeros_like(parameters[name]) for name in own}
-        return super().pack(found.moved(replace(program, parameters={**parameters, **lost})))
-
-    def spectra(self, program: Program) -> Spectra:
-        """Return how the sums over the window are computed, for their bound."""
-        (layer,), found = readers_of_window(program), fourier.arrangement(program, self.lanes)
-        gather, count = kernel_gather(program), layer.type.shape[0]
-        held = found.centred(found.moved(program))
-        # Columns, groups, rows, pairs, halves, parts and places of neurons.
-        stored = self.stored(held)[found.weight].astype(np.float64)
-        placed = stored[..., 0, :] + 1j * stored[..., 1, :]
-        placed = placed.transpose(1, 5, 2, 0, 4, 3).reshape(
-            -1, self.points, self.points // 2 + 1, *placed.shape[3:5]
-        )
-        placed = placed.reshape(*placed.shape[:3], -1)[:count, ..., : gather.channels]
-        table, bias = np.empty_like(placed), np.zeros(count)
-        table[found.order] = 2 * self.points * placed
-        if found.bias is not None:
-            bias[found.order] = held.parameters[found.bias]
-        block, centres = self.sizes(program).block, np.array(found.centres)
-        return Spectra(self.points, gather.rows, found.order, self.lanes, block, centres, table, bias)
-
-    def sizes(self, program: Program) -> Sizes:
-        """Return the sizes of a program's kernel."""
-        return sizes_of(program, self.lanes, self.points, self.tiles)
-
-    def enclosures(
-        self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
-    ) -> list[Enclosure]:
-        """Return the enclosure of every node: the sums over the window are those of spectra."""
-        gather, of = kernel_gather(program), self.spectra(program)
-        if images is None:
-            norm = np.array(self.points * np.linalg.norm(fourier.radius(gather, of.centres)))
-            return fourier.enclose(program, sine, bounds.window_box(gather), norm, of)
-        found = windows(gather, images, rows)
-        joined = np.concatenate([images[image.name] for image in gather.images], axis=-1, dtype=np.float64)
-        norms = fourier.tile_norms(joined, gather.window, self.points, of.centres)[rows]
-        return fourier.enclose(program, sine, (found, found), norms, of)
-
-    def refusal(self, program: Program) -> str:
-        """Return why this schedule cannot hold the program, or nothing."""
-        gather, readers = kernel_gather(program), readers_of_window(program)
-        if gather.whole:
-            return "sums from spectra are rounded, those of integers are not"
-        if reason := super().refusal(program):
-            return reason
-        if len(readers) != 1:
-            return f"{len(readers)} affine maps read the window, not one"
-        if gather.axes != (0, 1) or gather.rows >= self.points:
-            return f"a window of {gather.rows} x {gather.columns} pixels in a tile of {self.points}"
-        names = [node["weight"] for node in program.nodes if node.op == "affine"]
-        if names.count(readers[0]["weight"]) != 1:
-            return "a matrix is applied to the window and to a layer"
-        if reason := self.beyond_stack(program):
-            return reason
-        direct, spectra = self.operations(program)
-        if COST * spectra > direct:
-            return f"the direct sum takes {direct:.0f} operations on vectors a pixel, spectra {spectra:.0f}"
-        return ""
-
-    def operations(self, program: Program) -> tuple[float, float]:
-        """Return the operations on vectors, per pixel, of the direct sum over the window and of this one."""
-        (layer,), s, n = readers_of_window(program), self.sizes(program), self.points
-        direct = kernel_gather(program).n_inputs * -(-layer.type.shape[0] // self.lanes)
-        products = (n // 2 + 1) * n * s.pairs * 16 * self.tiles * s.neurons
-        # The split-radix algorithm takes 4 n log2(n) - 6 n + 8 operations.
-        one = 4 * n * (n.bit_length() - 1) - 6 * n + 8
-        transforms = s.inputs * (2 * n + 2) + self.tiles * s.neurons * (n + s.out)
-        return direct, (products + one * transforms) / (self.tiles * s.out**2)

@@ -4,7 +4,7 @@
    along the row. An item's pixels are `width` columns apart, so that neighbours in a group read and write
    neighbours in memory at every step.
 2. All that the group's windows touch, one image at a time, is loaded once into memory that the group shares,
-   channel by channel, under the border rule [`Group.staged`]; the loops over taps know no border.
+   channel by channel, under the border rule [`Grouped.staged`]; the loops over taps know no border.
 3. Layers are straight code [straight.py]; only the loops over taps are loops.
 4. A weight is read once by an item for all its pixels, four neurons at a time, and all items of a group read
    the same one at the same time: it is broadcast.
@@ -24,8 +24,7 @@ from ..core.ir import Node, Program
 from ..kernel import kernel as tree
 from ..kernel.kernel import const, load, name
 from ..kernel.sizes import shared_bytes
-from .common import HEIGHT, WIDTH, Nest, X, Y, clamp, kernel_gather, loop, named
-from .schedules import Stored
+from .common import HEIGHT, WIDTH, X, Y, clamp, kernel_gather, loop, named
 from .straight import Straight
 from .tile import all_stored, shared_matrix
 
@@ -48,12 +47,19 @@ COUNTER, DX, DY, AT, LOCAL_X, LOCAL_Y = map(name, ("i", "dx", "dy", "at", "local
 TILE, FIRST = "tile", name("first")
 
 
-class Group(Straight):
-    """Builds the grouped kernel of groups of `group` (x, y) items.
+class Grouped(Straight):
+    """A tile of the image for each group of `group` (x, y) items, `pixels` of a row for each item.
 
     `element`: the type of a value in the tile; `part`: what partial sums are called, where there are some.
     """
 
+    order = (
+        "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads "
+        f"the window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, "
+        "then channel by channel"
+    )
+
+    pixels: int
     group: tuple[int, int]
     element = tree.FLOAT
     part = "part"
@@ -90,7 +96,7 @@ class Group(Straight):
             inside = (column < WIDTH) & (Y < HEIGHT)
             body.append(tree.If(inside, (self.written(Y, column, p),)))
         more = {"functions": self.functions(), "step": (PIXELS, const(1)), "group": self.group}
-        return self.kernel(body, constants, **more, weights=self.weights)
+        return self.assembled(body, constants, **more, weights=self.weights)
 
     def of_window(self, index: int, node: Node) -> list[tree.Statement]:
         """Return the products of all taps, one tile after another."""
@@ -135,21 +141,6 @@ class Group(Straight):
             lines += self.multiplied(self.weights_row(index, FIRST, c), sums, factors)
         row = loop("dx", self.columns, *lines)
         return loop("dy", self.rows, *(self.summed(index, self.part, [row]) if self.part else [row]))
-
-
-class Grouped(Stored):
-    """A tile of the image for each group of items, `pixels` of a row for each item."""
-
-    order = (
-        "vectors filled up to multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads "
-        f"the window go image by image, at most {MOST_CHANNELS} channels at a time, then tap by tap in rows, "
-        "then channel by channel"
-    )
-
-    builder: type[Nest] = Group
-    takes = ("pixels", "group")
-    pixels: int
-    group: tuple[int, int]
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""

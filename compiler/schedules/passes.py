@@ -25,12 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.ir import Node, Program
-from ..core.weights import Slot, weights
+from ..core.weights import weights
 from ..kernel import kernel as tree
 from ..kernel.interface import ITEMS
 from ..kernel.kernel import BATCH, apply, const, load, name, stack
 from ..kernel.sizes import handed_on, of_tile
-from . import fourier
 from .common import HEIGHT, WIDTH, clamp, loop, named, readers_of_window, weight
 from .fft import (
     OUT,
@@ -40,13 +39,12 @@ from .fft import (
     REACH,
     SUMMED,
     TILE,
-    Fourier,
+    Transformed,
     centred,
     line,
-    sizes_of,
     spectra_stored,
 )
-from .straight import LARGEST_WEIGHTS, VECTOR, ZERO, Inlined, variables
+from .straight import LARGEST_WEIGHTS, VECTOR, ZERO, Straight, variables
 
 HALF = 16
 """Neurons that share complex images with as many others."""
@@ -79,15 +77,17 @@ def used(kernel: tree.Kernel, launch: tree.Launch) -> list[str]:
     return [name for name in arrays if name in found]
 
 
-class Passes(Inlined):
-    """Builds the launches, of a program whose neurons are in order."""
+class FourierPasses(Transformed, Straight):
+    """Tiles of `points` x `points` pixels, one launch after another."""
 
-    points: int
+    order = (
+        "the spectrum of the matrix that reads the window: columns of frequencies 0 to points / 2, groups "
+        "of 32 neurons, rows of frequencies, pairs of channels, (real, imaginary) of the first and of the "
+        "second channel, neurons; weights of the layers after it are constants of the source"
+    )
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
-        super().__init__(program, slots, **parameters)
-        self.sizes = sizes_of(program, HALF, self.points, 1)
-        self.centres = fourier.arrangement(program, HALF).centres
+    lanes = HALF
+    tiles = 1
 
     def constants(self) -> list[tree.Constant]:
         """Return the sizes of tiles and transforms."""
@@ -136,7 +136,7 @@ class Passes(Inlined):
         across, down = ((size + OUT - 1) // OUT for size in (WIDTH, HEIGHT))
         tiles = (across * down + (TILES - 1)) // TILES * TILES
         more = {"functions": self.functions(), "step": (OUT, OUT), "batch": tiles}
-        return self.kernel(body, constants, **more, weights=VECTOR)
+        return self.assembled(body, constants, **more, weights=VECTOR)
 
     def launch(self, count: tree.Expr, *body: tree.Statement) -> tree.Launch:
         """Return a launch of so many items for each tile."""
@@ -217,7 +217,7 @@ class Passes(Inlined):
         ]
         sums = [f"{part}_{t}_{v}" for part in PRODUCTS for t in range(TILES) for v in range(IMAGES // 2)]
         zero = variables(sums, ZERO)
-        lines = [tree.Let("own", BLOCK * name("block") + PAIR), *self.spectra()]
+        lines = [tree.Let("own", BLOCK * name("block") + PAIR), *self.both_spectra()]
         lines += [tree.Block(tuple(self.weighted(v))) for v in range(IMAGES // 2)]
         adds = [tree.Store(f"whole_{each}", (), name(each, VECTOR), add=True) for each in sums]
         found += variables([f"whole_{each}" for each in sums], ZERO)
@@ -237,7 +237,7 @@ class Passes(Inlined):
         """Return the tile with this number of an item's: those of neighbouring items are neighbours."""
         return TILE + TILE_COUNT // TILES * t
 
-    def spectra(self) -> list[tree.Statement]:
+    def both_spectra(self) -> list[tree.Statement]:
         """Return the spectra of both channels of a pair, of all tiles."""
         found: list[tree.Statement] = []
         for t in range(TILES):
@@ -293,26 +293,6 @@ class Passes(Inlined):
             found.append(tree.Store(self.variable(f"v{index}", 0, j), (), stack(reads), add=True))
         return found
 
-
-def kept(lets: Sequence[tree.Let]) -> list[tree.Let]:
-    """Return values whose operations stay in order, which the bound is one of (FOU-6)."""
-    return [replace(each, kept=True) for each in lets]
-
-
-class FourierPasses(Fourier):
-    """Tiles of `points` x `points` pixels, one launch after another."""
-
-    order = (
-        "the spectrum of the matrix that reads the window: columns of frequencies 0 to points / 2, groups "
-        "of 32 neurons, rows of frequencies, pairs of channels, (real, imaginary) of the first and of the "
-        "second channel, neurons; weights of the layers after it are constants of the source"
-    )
-
-    builder = Passes
-    takes = ("points",)
-    lanes = HALF
-    tiles = 1
-
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""
         if reason := super().refusal(program):
@@ -344,3 +324,8 @@ class FourierPasses(Fourier):
             "memory": handed_on(kernel),
             "items": ITEMS,
         }
+
+
+def kept(lets: Sequence[tree.Let]) -> list[tree.Let]:
+    """Return values whose operations stay in order, which the bound is one of (FOU-6)."""
+    return [replace(each, kept=True) for each in lets]

@@ -24,7 +24,7 @@ from ..core.sums import is_split
 from ..kernel import kernel as tree
 from ..kernel.interface import PLAIN, RESULT
 from ..kernel.kernel import apply, const, load, name, splat
-from .common import HEIGHT, Nest, X, Y, clamp, loop, output_channels, weight
+from .common import HEIGHT, X, Y, clamp, loop, output_channels, weight
 from .schedules import Schedule, Stored
 from .straight import VECTOR, ZERO
 
@@ -38,13 +38,16 @@ WEIGHTS_A_TEXEL = "weights_a_texel"
 """Key of a manifest's schedule: how many floats a texel of the weight texture has, if not one."""
 
 
-class Plainly(Nest):
-    """Builds the plain kernel."""
+class Plain(Schedule):
+    """One pixel a work item, loops over taps and neurons."""
+
+    name = PLAIN
+    idea = "one pixel after another, loops over taps and neurons"
 
     def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.window()
-        return self.kernel([*self.all_groups(), *self.outputs()], constants, weights=self.weights)
+        return self.assembled([*self.all_groups(), *self.outputs()], constants, weights=self.weights)
 
     weights, zero = tree.Type(), const(0.0)
 
@@ -171,9 +174,12 @@ class Plainly(Nest):
         return found
 
 
-class InFours(Plainly):
-    """Builds the packed kernel: the plain one by vectors."""
+class Packed(Stored, Plain):
+    """Loops, and four weights a read: the plain schedule by vectors."""
 
+    name = "packed"
+    idea = "four weights a texel, four neurons a `vec4`"
+    order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
     lanes = 4
     weights, zero = VECTOR, ZERO
 
@@ -221,34 +227,6 @@ class InFours(Plainly):
         added = self.products(index, sums, first, name("tap") + at, factors)
         return [tree.Let(image.name, value), added]
 
-
-def lanes(value: tree.Expr, count: int) -> list[tree.Expr]:
-    """Return the first components of a vector, or a single value."""
-    return [value.lane(c) for c in range(count)] if value.type.lanes > 1 else [value]
-
-
-class Plain(Schedule):
-    """One pixel a work item, loops over taps and neurons."""
-
-    name = PLAIN
-    idea = "one pixel after another, loops over taps and neurons"
-    builder = Plainly
-
-
-class Printed(Plain):
-    """The program as text, which is all that the interpreter needs."""
-
-    idea = "one operation after another, all pixels at once"
-
-
-class Packed(Stored):
-    """Loops, and four weights a read [py]."""
-
-    name = "packed"
-    idea = "four weights a texel, four neurons a `vec4`"
-    order = "matrices input-major, each input's neurons filled up with 0 to a multiple of four"
-    builder = InFours
-
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
         """Return all weights as they are stored, by name."""
         found = {}
@@ -260,3 +238,14 @@ class Packed(Stored):
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return the form of the texture."""
         return {WEIGHTS_A_TEXEL: 4}
+
+
+def lanes(value: tree.Expr, count: int) -> list[tree.Expr]:
+    """Return the first components of a vector, or a single value."""
+    return [value.lane(c) for c in range(count)] if value.type.lanes > 1 else [value]
+
+
+class Printed(Plain):
+    """The program as text, which is all that the interpreter needs."""
+
+    idea = "one operation after another, all pixels at once"

@@ -13,6 +13,7 @@ The layout of the weights belongs to the schedule: kernels walk through them in 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -63,19 +64,17 @@ def windows(gather: Gather, images: Images, rows: slice = ALL) -> NDArray[np.flo
     return found
 
 
-class Schedule:
+class Schedule(Nest):
     """One way to order a kernel's work; `idea` is the sentence that sets it apart from the one before.
 
-    `instead` names the schedule of programs that it refuses; `order` says how a matrix is stored among the
-    weights. `bytewise`: its array of weights holds bytes. Its `builder` makes kernels as data, and takes the
-    schedule's parameters that `takes` names.
+    Its parameters are attributes; a copy of it builds a kernel as data. `instead` names the schedule of
+    programs that it refuses; `order` says how a matrix is stored among the weights. `bytewise`: its array of
+    weights holds bytes.
     """
 
     name = ""
     idea = ""
     dialect: Dialect
-    builder: type[Nest]
-    takes: tuple[str, ...] = ()
     instead: str = PLAIN
     bytewise: bool = False
     order: str = "matrices input-major: D_in x D_out, in C order"
@@ -101,8 +100,10 @@ class Schedule:
 
     def build(self, program: Program) -> Kernel:
         """Return the kernel of a program."""
-        parameters = {key: getattr(self, key) for key in self.takes}
-        return self.builder(program, self.layout(program), wide=self.dialect.wide, **parameters).built()
+        own = copy(self)
+        own.wide = self.dialect.wide
+        own.begin(program, self.layout(program))
+        return own.built()
 
     def renderer(self, program: Program, bounded: bool) -> Renderer:
         """Return what prints the kernel of a program.

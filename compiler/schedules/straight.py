@@ -22,7 +22,7 @@ from ..core.ir import Image, Node, Program
 from ..core.sums import is_split
 from ..kernel import kernel as tree
 from ..kernel.kernel import apply, call, const, name, splat, stack
-from .common import HEIGHT, Nest, X, Y, clamp, weight
+from .common import HEIGHT, X, Y, clamp, weight
 from .schedules import Stored
 
 VECTOR = tree.FLOAT.of(4)
@@ -46,7 +46,7 @@ def variables(names: Sequence[str], value: tree.Expr, kind: tree.Type = VECTOR) 
     return [tree.Array(each, kind, kept=True, value=value, register=True) for each in names]
 
 
-class Straight(Nest):
+class Straight(Stored):
     """Builds straight code of one or several pixels; with several, names of variables say which."""
 
     lanes = 4
@@ -216,14 +216,18 @@ def fours(column: NDArray[np.float32]) -> list[tree.Expr]:
     return [numbers(column, j) for j in range(-(-len(column) // 4))]
 
 
-class Inlined(Straight):
-    """Builds the inlined kernel."""
+class Inline(Straight):
+    """Everything unrolled, weights in the source."""
+
+    name = "inlined"
+    idea = "all loops unrolled, every weight a constant of the source"
+    order = "every weight is a constant of the source"
 
     def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.window()
         body = [*self.all_groups(), self.output_comment(), self.written(Y, X, 0)]
-        return self.kernel(body, constants, functions=self.functions())
+        return self.assembled(body, constants, functions=self.functions())
 
     def of_window(self, index: int, node: Node) -> list[tree.Statement]:
         """Return the products of all taps: a partial sum for each row of taps of an image."""
@@ -265,15 +269,6 @@ class Inlined(Straight):
                 factor = texel.lane(c) if image.channels > 1 else texel
                 lines += self.multiplied(fours(columns[:, c]), sums, [factor])
         return tree.Block(tuple(lines))
-
-
-class Inline(Stored):
-    """Everything unrolled, weights in the source."""
-
-    name = "inlined"
-    idea = "all loops unrolled, every weight a constant of the source"
-    order = "every weight is a constant of the source"
-    builder = Inlined
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""

@@ -1,7 +1,7 @@
 """The tiled schedule: a work item computes a row of pixels, and keeps their sums in vector registers.
 
 1. The images around the pixels are copied to a patch that belongs to the work item; the border rule is
-   applied there, and the loops that follow know no border [`Tiled.patches`].
+   applied there, and the loops that follow know no border [`Tile.patches`].
 2. The neurons of a layer stand side by side in vectors of `lanes`, the last one filled up with neurons whose
    weights are 0: nothing reads them.
 3. An affine map works on blocks of `vectors` vectors: all pixels' sums of a block are in registers while the
@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,6 @@ from ..kernel.kernel import apply, const, load, name, splat
 from .common import (
     HEIGHT,
     WIDTH,
-    Nest,
     X,
     Y,
     clamp,
@@ -108,17 +106,24 @@ def all_stored(program: Program, lanes: int, vectors: int) -> dict[str, NDArray[
 # ---- statements ------------------------------------------------------------------------------------------
 
 
-class Tiled(Nest):
-    """Builds the tiled kernel of `pixels` x `vectors` vectors of `lanes` neurons.
+class Tile(Stored):
+    """A tile of `pixels` x `vectors` vectors of `lanes` neurons.
 
     `part`: what partial sums are called, where there are some; `weights`: the type of weights, and of sums.
     """
 
+    order = (
+        "vectors filled up with zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows "
+        "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
+    )
+
+    lanes: int
     pixels: int
     vectors = 2
 
-    def __init__(self, program: Program, slots: Mapping[str, Slot], **parameters: Any) -> None:
-        super().__init__(program, slots, **parameters)
+    def begin(self, program: Program, slots: Mapping[str, Slot]) -> None:
+        """Take a program, whose weights are in these slots."""
+        super().begin(program, slots)
         self.vector = self.weights = tree.FLOAT.of(self.lanes)
         self.element = self.vector if self.wide else tree.FLOAT
         self.part = "part" if is_split(self.gather) else ""
@@ -143,7 +148,7 @@ class Tiled(Nest):
         """Return the kernel."""
         constants = self.constants()
         body = [*self.patches(), *self.all_groups(), *self.outputs()]
-        return self.kernel(body, constants, step=(PIXELS, const(1)), weights=self.weights)
+        return self.assembled(body, constants, step=(PIXELS, const(1)), weights=self.weights)
 
     # ---- the images around the pixels --------------------------------------------------------------------
 
@@ -317,20 +322,6 @@ class Tiled(Nest):
         value = load(f"v{index}", P * self.total(index) * LANES + COUNTER)
         write = loop("i", output_channels(self.program), tree.Store(RESULT, (Y, X + P, COUNTER), value))
         return self.output_comment(), tree.For("p", PIXELS, (write,), until=end > X + P)
-
-
-class Tile(Stored):
-    """A tile of `pixels` x `vectors` vectors of `lanes` neurons."""
-
-    order = (
-        "vectors filled up with zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows "
-        "of one that reads the window go image by image, then tap by tap in rows, then channel by channel"
-    )
-
-    builder: type[Nest] = Tiled
-    takes = ("lanes", "pixels", "vectors")
-    lanes: int
-    vectors = 2
 
     def refusal(self, program: Program) -> str:
         """Return why this schedule cannot hold the program, or nothing."""

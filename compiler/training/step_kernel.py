@@ -177,10 +177,12 @@ class _Rows(NamedTuple):
 class Derivatives(Nest):
     """Builds the launch; `size` is the number of rows of the window, `vectors` the memory of a work item."""
 
+    lanes = LANES
+
     def __init__(self, step: Step, size: int) -> None:
         self.copies = transposed_slots(step)
         self.places = {**slots(step), **self.copies}
-        super().__init__(step.program, {}, lanes=LANES)
+        self.begin(step.program, {})
         self.step, self.size, self.vectors = step, size, 0
         self.outputs = dict(self.program.outputs)
         self.gathered = next(i for i, n in enumerate(self.program.nodes) if n.get("name") == WINDOW)

@@ -21,7 +21,7 @@ from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds, spectra, spectra_checker
 from wamnet.compiler.schedules import fourier
-from wamnet.compiler.schedules.fft import Fourier
+from wamnet.compiler.schedules.fft import Fourier, sizes_of
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
@@ -365,7 +365,8 @@ def test_golden_spectra(golden) -> None:
 def test_every_spectrum_lies_where_the_kernel_reads_it(channels, size, neurons) -> None:
     """Read the array as the kernel's loops do."""
     made = emitted(program((size * size * channels, neurons, 3), channels, size))
-    slots, packed, s = FFT32.layout(made), FFT32.pack(made), FFT32.sizes(made)
+    slots, packed = FFT32.layout(made), FFT32.pack(made)
+    s = sizes_of(made, FFT32.lanes, FFT32.points, FFT32.tiles)
     assert all(slot.offset % FFT32.lanes == 0 for slot in slots.values())
     slot = next(slot for slot in slots.values() if len(slot.shape) == 7)
     stored = packed[slot.offset :][: np.prod(slot.shape)].reshape(slot.shape)

@@ -15,7 +15,7 @@ from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
 from wamnet.compiler.schedules.bytes import Dot, GroupDot
-from wamnet.compiler.schedules.fft import Fourier
+from wamnet.compiler.schedules.fft import Transformed
 from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline, denoise_on
 from wamnet.kernels.devices import opencl_executor
@@ -32,7 +32,7 @@ WAYS = [
     (t.name, s.name)
     for t in DENOISERS.values()
     for s in t.schedules
-    if not isinstance(s, Fourier | Dot | GroupDot)
+    if not isinstance(s, Transformed | Dot | GroupDot)
 ]
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes,
 and bytes hold integers."""

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 from .interface import BATCH as BATCH
-from .interface import READ, RESULT, Interface
+from .interface import READ, Interface
 
 Index = tuple["Expr", ...]
 
@@ -131,15 +131,6 @@ class Store:
 
 
 @dataclass(frozen=True)
-class Write:
-    """All channels of a pixel of the result."""
-
-    row: Expr
-    column: Expr
-    values: tuple[Expr, ...]
-
-
-@dataclass(frozen=True)
 class For:
     """A counted loop; `how`: `loop` as it stands, `unroll` as a demand on the compiler.
 
@@ -214,7 +205,7 @@ class Call:
     views: tuple[View, ...]
 
 
-Statement = Comment | Let | Array | Store | Write | For | Break | If | Block | Barrier | Launch | Call
+Statement = Comment | Let | Array | Store | For | Break | If | Block | Barrier | Launch | Call
 Body = tuple[Statement, ...]
 
 
@@ -433,7 +424,6 @@ def accesses(body: Body) -> list[tuple[str, Type]]:
     """Return the arrays that statements read and write, and the types of what is read and written."""
     statements = walk(body)
     found = [(s.array, s.value.type) for s in statements if isinstance(s, Store)]
-    found += [(RESULT, FLOAT) for s in statements if isinstance(s, Write)]
     every = (each for s in statements for v in values(s) for each in parts(v))
     return found + [(each.value, each.type) for each in every if each.op == "load"]
 

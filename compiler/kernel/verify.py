@@ -261,16 +261,6 @@ class Verifier:
         if statement.add and (array == RESULT or kind.dtype not in ("float32", "int32", "uint32")):
             raise KernelError(f"a value of type {kind} is added to {array}")
 
-    def _check_write(self, statement: tree.Write, depth: int) -> None:
-        """Check all channels of a pixel."""
-        channels = self.array(RESULT).sizes
-        if channels is None or len(statement.values) != channels[-1]:
-            raise KernelError(f"a pixel is written with {len(statement.values)} channels")
-        for each in (statement.row, statement.column):
-            self.check(each, tree.INT, "the place of a pixel")
-        for each in statement.values:
-            self.check(each, tree.FLOAT, "a channel of a pixel")
-
     def _check_for(self, statement: tree.For, depth: int) -> None:
         """Check the bounds of a loop; a barrier inside needs bounds that all items share."""
         name = statement.name

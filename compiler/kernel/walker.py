@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Any
 
 from . import kernel as tree
-from .interface import RESULT
 
 
 class Walker:
@@ -38,11 +37,6 @@ class Walker:
     def _run_let(self, statement: tree.Let) -> None:
         """Name a value."""
         self.names[statement.name] = self.value(statement.value)
-
-    def _run_write(self, statement: tree.Write) -> None:
-        """Write all channels of a pixel."""
-        for channel, value in enumerate(statement.values):
-            self.statement(tree.Store(RESULT, (statement.row, statement.column, tree.const(channel)), value))
 
     def _run_block(self, statement: tree.Block) -> None:
         """Run statements whose names end with them."""

@@ -59,11 +59,7 @@ def _statements(body: tree.Body) -> Iterator[tree.Statement]:
     """Yield statements in canonical form, but for their expressions."""
     for number, statement in enumerate(body):
         rest = (each.array for each in tree.walk(body[number + 1 :]) if isinstance(each, tree.Store))
-        if isinstance(statement, tree.Write):
-            place = (statement.row, statement.column)
-            for c, value in enumerate(statement.values):
-                yield tree.Store(RESULT, (*place, tree.const(c)), value)
-        elif isinstance(statement, tree.For) and _writes(statement):
+        if isinstance(statement, tree.For) and _writes(statement):
             for turn in range(int(statement.count.value)):
                 known = {statement.name: tree.const(turn)}
                 yield from _statements(tree.rewritten(statement.body, partial(tree.substituted, known=known)))

@@ -435,8 +435,10 @@ class Renderer:
         self._line(f"wamnet_{call}({', '.join([into, *given])});")
 
     def _result(self, index: Sequence[tree.Expr], value: tree.Expr) -> None:
-        """Write a channel of the result."""
+        """Write a channel of the result; a language may have lines around those of a pixel."""
         row, column, channel = index
+        for line in self.dialect.pixel_begin if channel == tree.const(0) else ():
+            self._line(line)
         shown = {"row": self.text(row, 11), "column": self.text(column, 10), "i": self.text(channel, 10)}
         result, channels = RESULT, self.channels
         each = self.dialect.channels_per_result
@@ -446,16 +448,8 @@ class Renderer:
         self._line(
             self.dialect.store.format(result=result, channels=channels, value=self.text(value), **shown)
         )
-
-    def _write_write(self, statement: tree.Write) -> None:
-        """Write all channels of a pixel."""
-        for line in self.dialect.pixel_begin:
-            self._line(line)
-        for channel, value in enumerate(statement.values):
-            self._result((statement.row, statement.column, tree.const(channel)), value)
-        row, column = self.text(statement.row), self.text(statement.column)
-        for line in self.dialect.pixel_end:
-            self._line(line.format(row=row, column=column))
+        for line in self.dialect.pixel_end if channel == tree.const(channels - 1) else ():
+            self._line(line.format(row=self.text(row), column=self.text(column)))
 
     @property
     def channels(self) -> int:

@@ -18,7 +18,7 @@ from ..core.loops import Loop, Part, Walk, loops
 from ..core.ops import LOOPS, OPS
 from ..core.weights import Slot, tables
 from ..kernel import kernel as tree
-from ..kernel.interface import IMAGE, WEIGHTS, denoiser
+from ..kernel.interface import IMAGE, RESULT, WEIGHTS, denoiser
 from ..kernel.kernel import apply, const, expr, load, name, splat
 
 X, Y, WIDTH, HEIGHT = map(name, ("x", "y", "width", "height"))
@@ -384,6 +384,13 @@ class Nest:
     def output_comment(self) -> tree.Comment:
         """Return the comment above the output."""
         return tree.Comment(f"output {self.program.outputs[0][0]}")
+
+    def written(
+        self, row: tree.Expr, column: tree.Expr, four: Callable[[int], tree.Expr]
+    ) -> list[tree.Statement]:
+        """Return the stores of a pixel's channels, of vectors of four."""
+        places = ((row, column, const(c)) for c in range(output_channels(self.program)))
+        return [tree.Store(RESULT, at, four(c // 4).lane(c % 4)) for c, at in enumerate(places)]
 
 
 def clamp(value: tree.Expr, count: tree.Expr) -> tree.Expr:

@@ -94,7 +94,7 @@ class Grouped(Straight):
         for p in range(self.pixels):
             column = X + const(p) * GROUP_WIDTH
             inside = (column < WIDTH) & (Y < HEIGHT)
-            body.append(tree.If(inside, (self.written(Y, column, p),)))
+            body.append(tree.If(inside, tuple(self.output(Y, column, p))))
         more = {"functions": self.functions(), "step": (PIXELS, const(1)), "group": self.group}
         return self.assembled(body, constants, **more, weights=self.weights)
 

@@ -277,9 +277,9 @@ class FourierPasses(Transformed, Straight):
         """Return the layers after the first one's sums, for one pixel."""
         x, y = name("tile_x") + ITEM % OUT, name("tile_y") + ITEM // OUT
         found: list[tree.Statement] = [*self.corner(), tree.Let("column", x), tree.Let("row", y)]
-        write = self.written(name("row"), name("column"), 0)
+        write = tuple(self.output(name("row"), name("column")))
         inside = (name("column") < WIDTH) & (name("row") < HEIGHT)
-        return [*found, *self.all_groups(), self.output_comment(), tree.If(inside, (write,))]
+        return [*found, *self.all_groups(), self.output_comment(), tree.If(inside, write)]
 
     def of_window(self, index: int, node: Node) -> list[tree.Statement]:
         """Return the sums over the window, which are in memory."""

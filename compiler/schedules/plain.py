@@ -198,11 +198,7 @@ class Packed(Stored, Plain):
     def outputs(self) -> tree.Body:
         """Return the statements that write the output."""
         index = self.program.outputs[0][1]
-        values = [
-            self.read(index, const(i // 4)).lane(i % 4)
-            for i in range(self.program.nodes[index].type.shape[0])
-        ]
-        return tree.Comment(f"output {self.program.outputs[0][0]}"), tree.Write(Y, X, tuple(values))
+        return self.output_comment(), *self.written(Y, X, lambda j: self.read(index, const(j)))
 
     def count(self, index: int) -> int:
         """Return the vectors of four that hold a value."""

@@ -202,13 +202,9 @@ class Straight(Stored):
                 found.append(tree.Array(self.variable(f"v{result}", p, j), VECTOR, value=value))
         return found
 
-    # ---- the output --------------------------------------------------------------------------------------
-
-    def written(self, row: tree.Expr, column: tree.Expr, p: int) -> tree.Statement:
-        """Return the statement that writes the output of a pixel."""
-        index = self.program.outputs[0][1]
-        channels = range(self.program.nodes[index].type.shape[0])
-        return tree.Write(row, column, tuple(self.at(index, p, i // 4).lane(i % 4) for i in channels))
+    def output(self, row: tree.Expr, column: tree.Expr, p: int = 0) -> list[tree.Statement]:
+        """Return the statements that write the output of a pixel."""
+        return self.written(row, column, lambda j: self.at(self.program.outputs[0][1], p, j))
 
 
 def fours(column: NDArray[np.float32]) -> list[tree.Expr]:
@@ -226,7 +222,7 @@ class Inline(Straight):
     def built(self) -> tree.Kernel:
         """Return the kernel."""
         constants = self.window()
-        body = [*self.all_groups(), self.output_comment(), self.written(Y, X, 0)]
+        body = [*self.all_groups(), self.output_comment(), *self.output(Y, X)]
         return self.assembled(body, constants, functions=self.functions())
 
     def of_window(self, index: int, node: Node) -> list[tree.Statement]:

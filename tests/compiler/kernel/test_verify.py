@@ -30,7 +30,6 @@ from wamnet.compiler.kernel.kernel import (
     Store,
     Type,
     View,
-    Write,
     any_lane,
     apply,
     call,
@@ -133,7 +132,6 @@ WRONG = {
         small(Let("t", Expr("pack4", (X, X, X, X), INT))),
         "an operand of pack4 has type",
     ),
-    "a pixel without its channels": (small(Write(Y, X, ())), "a pixel is written with 0 channels"),
     "a written image": (
         small(Store("image_a", (Y, X, const(0)), ZERO)),
         "image_a is written, which is read only",

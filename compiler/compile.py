@@ -217,7 +217,7 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
 
 def _entries(plan: Plan, bound: Bound) -> list[Entry]:
     """Return the entries of the header, but for the weights."""
-    program, picked = plan.analysed, plan.picked
+    program = plan.analysed
     gather, channels = kernel_gather(program), output_channels(program)
     images = [
         f"{i.name}: {i.channels} channels in {i.range_text}" + (f", {i.encoding}" if i.encoding else "")
@@ -238,7 +238,7 @@ def _entries(plan: Plan, bound: Bound) -> list[Entry]:
         ("bound", [_bound_text(bound, program)]),
         ("assumes", assumes),
         ("sums", [SUMS] if is_split(gather) and plan.shares_bound else []),
-        ("schedule", [] if picked.schedule.name == PLAIN else [schedule_text(picked.manifest())]),
+        ("schedule", [] if plan.schedule.name == PLAIN else [schedule_text(plan.schedule_facts)]),
         ("arguments", plan.schedule.arguments(plan.emitted).split("\n")),
     ]
 
@@ -278,7 +278,7 @@ def _facts(plan: Plan, bound: Bound, weights: NDArray[np.float32]) -> dict[str, 
         "sine_arguments": [[_finite(-round_up(-low)), _finite(round_up(high))] for low, high in bound.sines],
         "info": {name: _info_value(name, text) for name, text in emitted.info if name in KEPT_INFO},
         "private_bytes": schedule.private_bytes(emitted),
-        "schedule": plan.picked.manifest(),
+        "schedule": plan.schedule_facts,
         "weights": {
             "count": int(weights.size),
             "layout": [asdict(slot) for slot in schedule.layout(emitted).values()],

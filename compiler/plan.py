@@ -17,7 +17,7 @@ Everything is computed when it is first needed, and then kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,7 @@ from .proof.bounds import Enclosure
 from .schedules import schedules
 from .schedules.common import kernel_gather, output_channels
 from .schedules.factor import Cut, at_images, factor, over_images, product
-from .schedules.schedules import ALL, PLAIN, Images, Pick, Schedule, pick
+from .schedules.schedules import ALL, PLAIN, Images, Schedule, pick
 from .targets import Language, language_named
 
 if TYPE_CHECKING:
@@ -117,14 +117,20 @@ class Plan:
         return pipeline.run(self.analysed, self.profile.passes)
 
     @cached_property
-    def picked(self) -> Pick:
+    def picked(self) -> tuple[Schedule, str]:
         """Return the schedule, and why it is not the requested one where it is not."""
         return pick(self.target.schedules, self.asked, self.emitted)
 
     @property
     def schedule(self) -> Schedule:
         """Return the schedule."""
-        return self.picked.schedule
+        return self.picked[0]
+
+    @property
+    def schedule_facts(self) -> Mapping[str, Any]:
+        """Return what a manifest says about the schedule."""
+        found, (_, reason) = self.schedule.facts(self.emitted), self.picked
+        return {**found, "asked": self.asked, "reason": reason} if reason else found
 
     @cached_property
     def passes(self) -> tuple[Plan, ...]:

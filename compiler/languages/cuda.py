@@ -61,7 +61,6 @@ class CUDA(Arguments):
     group = (16, 8)
     grouped = {"heading": 'extern "C" __global__ void __launch_bounds__(GROUP_WIDTH * GROUP_HEIGHT) {entry}'}
     launches = (
-        "Launch blocks of any size that together cover (width, height) threads",
         "Launch blocks of any size that together cover (ceil(width / {columns}), ceil(height / {rows})) "
         "threads",
         GROUPED,

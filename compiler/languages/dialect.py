@@ -15,6 +15,7 @@ A dialect is all that the emitters know of a language, for every role of a kerne
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -151,7 +152,7 @@ class Dialect:
     numbers: str = ""
     launching: Mapping[str, Any] = {}
     vectors: Type | None = None
-    launches: tuple[str, str, str] = ("", "", "")
+    launches: tuple[str, str] = ("", "")
     followed: str = "item (i, j) follows the pixels from {columns} * i on of row first_row + j"
     declares_memory: bool = False
     local_place: tuple[str, str] = ("", "")
@@ -162,6 +163,9 @@ class Dialect:
         "multiply": "{0} * {1}",
         "divide": "{0} / {1}",
         "negative": "-{0}",
+        "absolute": "abs({0})",
+        "minimum": "min({0}, {1})",
+        "maximum": "max({0}, {1})",
         "floor": "floor({0})",
         "sqrt": "sqrt({0})",
         "power": "pow({0}, {1})",
@@ -184,6 +188,7 @@ class Dialect:
         "remainder": "{0} % {1}",
         "take": "{table}[{0}]",
         "select": "{0} ? {1} : {2}",
+        "convert": "{type}({0})",
         "any": "{0}",
     }
 
@@ -254,13 +259,13 @@ class Dialect:
     def launch(self, kernel: Kernel) -> str:
         """Return how many items of such a kernel are started."""
         columns, rows = (integer(kernel, each) for each in kernel.step)
-        one, several, grouped = self.launches
-        said = several if columns > 1 else one
+        said, grouped = self.launches
         if kernel.launches:
             said = STAGED if self.staged else LAUNCHED
         elif kernel.group:
             said = grouped.replace("{group}", " x ".join(map(str, kernel.group)))
-        said = said.format(columns=columns, rows=rows).replace("ceil(height / 1)", "height")
+        said = re.sub(r"\(1 \* (\w+)\)", r"\1", said.format(columns=columns, rows=rows))
+        said = re.sub(r"ceil\((width|height) / 1\)", r"\1", said)
         if kernel.interface.role != PATH:
             return said
         return f"{said.replace('height', 'rows')}; {self.followed.format(columns=columns)}"

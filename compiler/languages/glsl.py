@@ -135,13 +135,6 @@ class GLSL(Dialect):
         "#define PRECISE",
         f"#error the error bound needs `precise`: {ORDER_EXTENSION}, or #version 400",
     )
-    operations = {
-        **Dialect.operations,
-        "absolute": "abs({0})",
-        "minimum": "min({0}, {1})",
-        "maximum": "max({0}, {1})",
-        "convert": "{type}({0})",
-    }
 
     def begin(self, kernel: Kernel, top: str, bounded: bool) -> str:
         """Return the text of a shader up to its first statement."""
@@ -258,7 +251,6 @@ class GLSLCompute(GLSL):
     channels_per_result = None
     store = "color[{i}] = {value};"
     launches = (
-        "",
         "",
         "Dispatch ceil(width / ({columns} * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of {group}\n"
         "items. Row 0 is the TOP row of all images; half floats in them void the bound",

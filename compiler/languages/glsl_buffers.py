@@ -34,7 +34,10 @@ maxComputeSharedMemorySize."""
 GROUP = (8, 8)
 """Invocations (x, y) in a work group: 64, which every implementation of Vulkan and of OpenGL 4.3 takes."""
 
-GROUPS = f"Groups of {GROUP[0]} x {GROUP[1]}: ceil(width / {GROUP[0]}) x ceil(height / {GROUP[1]})"
+GROUPS = (
+    f"Groups of {GROUP[0]} x {GROUP[1]}: "
+    f"ceil(width / ({{columns}} * {GROUP[0]})) x ceil(height / ({{rows}} * {GROUP[1]}))"
+)
 """What is dispatched."""
 
 
@@ -53,12 +56,7 @@ class Declared(Buffers):
     accesses: tuple[str, str]
     group = (8, 8)
     largest_shared = LEAST_SHARED
-    launches = (
-        GROUPS,
-        f"Groups of {GROUP[0]} x {GROUP[1]} items: "
-        f"ceil(width / ({{columns}} * {GROUP[0]})) x ceil(height / ({{rows}} * {GROUP[1]}))",
-        GROUPED,
-    )
+    launches = (GROUPS, GROUPED)
 
     entries = dict.fromkeys((DENOISE, PATH, ENCODE), "main")
 
@@ -102,7 +100,6 @@ class Vulkan(Declared):
     )
     qualifiers = GLSL.qualifiers
     table = GLSL.table
-    operations = GLSL.operations
     integers_block = (
         "layout(local_size_x = {0}, local_size_y = {1}) in;\nlayout(std140, binding = 0) uniform Size {{",
         "    {0};",

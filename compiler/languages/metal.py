@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from ..core.profiles import SineContract
 from ..kernel.interface import BLOCK, READ, Array, Interface
 from ..kernel.kernel import Kernel
-from .c import C
 from .cuda import GROUPED
 from .dialect import Dialect
 from .openings import Buffers
@@ -52,7 +51,6 @@ class Metal(Buffers):
         )
     }
     launches = (
-        "Dispatch width x height threads, or more, in groups of any size",
         "Dispatch ceil(width / {columns}) x ceil(height / {rows}) threads, or more, in groups of any size",
         GROUPED,
     )
@@ -63,13 +61,7 @@ class Metal(Buffers):
     wide = False
     casts = numbered = True
     table = "constant {type} {name}[{count}] = {{{values}}};"
-    operations = {
-        **C.operations,
-        **Dialect.operations,
-        "absolute": "fabs({0})",
-        "minimum": "min({0}, {1})",
-        "maximum": "max({0}, {1})",
-    }
+    operations = {**Dialect.operations, "absolute": "fabs({0})"}
 
     def top(self, kernel: Kernel, top: str) -> list[str]:
         """Return the lines above the function: the structure of the integers is a kernel's own."""

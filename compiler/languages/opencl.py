@@ -110,7 +110,6 @@ class OpenCL(Arguments):
     words = "cl_khr_integer_dot_product where -cl-std=CL3.0 and the device have it, else shifts"
     group = (16, 8)
     launches = (
-        "Global size: at least (width, height)",
         "Global size: at least (ceil(width / {columns}), ceil(height / {rows}))",
         "Groups of {group} items; global size: (ceil(width / {columns}), height), in whole groups",
     )

@@ -65,14 +65,7 @@ class WGSL(Declared):
     scalars = {"float32": "f32", "int32": "i32", "uint32": "u32", "bool": "bool"}
     define = "const {name}: i32 = {value};"
     table = "const {name} = array<{type}, {count}>({values});"
-    operations = {
-        **Dialect.operations,
-        "absolute": "abs({0})",
-        "minimum": "min({0}, {1})",
-        "maximum": "max({0}, {1})",
-        "convert": "{type}({0})",
-        "select": "select({2}, {1}, {0})",
-    }
+    operations = {**Dialect.operations, "select": "select({2}, {1}, {0})"}
 
     def typed(self, name: str) -> str:
         """Return the declaration of an integer, without what ends it."""

@@ -20,7 +20,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +36,7 @@ from ..core.verify import verify
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from .common import kernel_gather
+from .schedules import Images, windows
 
 Array = NDArray[np.float64]
 
@@ -156,23 +157,16 @@ def over_images(cut: Cut, contract: SineContract, of_cut: bool = True) -> list[E
     return enclose(cut, contract, boxes, columns, of_cut)
 
 
-def at_images(
-    cut: Cut, contract: SineContract, images: Mapping[str, NDArray[np.float32]], of_cut: bool = True
-) -> list[Enclosure]:
+def at_images(cut: Cut, contract: SineContract, images: Images, of_cut: bool = True) -> list[Enclosure]:
     """Return the enclosures (H, W, ...) for given images (H, W, C): a-posteriori."""
-    whole = kernel_gather(cut.whole)
-    joined = np.concatenate([images[image.name] for image in whole.images], axis=-1).astype(np.float64)
-
-    def taps(image: Array, axes: tuple[int, ...]) -> Array:
-        """Return the windows (H, W, n) along some axes."""
-        found: Array = window.all_windows(window.pad(image, whole.window, axes), whole.window, axes)
-        return found
+    of = kernel_gather(cut.whole).window
 
     def columns(h: Enclosure) -> Enclosure:
         """What the first pass leaves is the image of the second."""
-        return Enclosure(*(taps(part, (0,)) for part in (h.low, h.high, h.error)))
+        padded = (window.pad(part, of, (0,)) for part in (h.low, h.high, h.error))
+        return Enclosure(*(window.all_windows(part, of, (0,)) for part in padded))
 
-    x = tuple((taps(joined, axes),) * 2 for axes in ((0, 1), (1,)))
+    x = tuple((windows(kernel_gather(each), images),) * 2 for each in (cut.whole, cut.horizontal))
     return enclose(cut, contract, x, columns, of_cut)
 
 

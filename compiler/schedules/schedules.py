@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -138,6 +138,13 @@ class Schedule(Nest):
         """Return what else a caller must know, for the manifest."""
         return {}
 
+    def facts(self, program: Program) -> Mapping[str, Any]:
+        """Return what a manifest says about it."""
+        kernel = self.kernel(program)
+        columns, rows = (integer(kernel, each) for each in kernel.step)
+        size = {"pixels": columns, **({"rows": rows} if rows > 1 else {})}
+        return {"name": self.name, "idea": self.idea, **size, **self.details(program)}
+
     def layout(self, program: Program) -> Mapping[str, Slot]:
         """Return the slot of each weight."""
         return weights.layout(program)
@@ -226,26 +233,7 @@ def _others_between_loops(program: Program) -> str:
     return ""
 
 
-@dataclass(frozen=True)
-class Pick:
-    """The schedule of a kernel, and the reason if it is not the requested one."""
-
-    schedule: Schedule
-    asked: str
-    program: Program
-    reason: str = ""
-
-    def manifest(self) -> Mapping[str, Any]:
-        """Return what a manifest says about it."""
-        kernel = self.schedule.kernel(self.program)
-        columns, rows = (integer(kernel, each) for each in kernel.step)
-        found = {"name": self.schedule.name, "idea": self.schedule.idea, "pixels": columns}
-        found = {**found, "rows": rows} if rows > 1 else found
-        found |= self.schedule.details(self.program)
-        return {**found, "asked": self.asked, "reason": self.reason} if self.reason else found
-
-
-def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
+def pick(schedules: Sequence[Schedule], name: str, program: Program) -> tuple[Schedule, str]:
     """Return the schedule of this name, or the one in its place that holds the program, with the reason."""
     known = {schedule.name: schedule for schedule in schedules}
     if name not in known:
@@ -258,4 +246,4 @@ def pick(schedules: Sequence[Schedule], name: str, program: Program) -> Pick:
         raise CompileError(
             f"no schedule of this target can run the program: {reason}; compile for another target"
         )
-    return Pick(chosen, name, program, first)
+    return chosen, first

@@ -17,7 +17,7 @@
  *           result: width * height * 2 floats, rows from the top, channels interleaved, encoded as `output`
  *           says;
  *           width; height.
- *           Groups of 16 x 8 items; global size: (ceil(width / 1), height), in whole groups
+ *           Groups of 16 x 8 items; global size: (width, height), in whole groups
  * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up to
  *           multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads the
  *           window go image by image, at most 4 channels at a time, then tap by tap in rows, then

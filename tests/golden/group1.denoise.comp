@@ -15,7 +15,7 @@
  *           image_i1: a texture of 32-bit floats;
  *           weight_buffer: a storage buffer at binding 0, 124 floats;
  *           result: an image of format RGBA32F at binding 0, encoded as `output` says.
- *           Dispatch ceil(width / (1 * GROUP_WIDTH)) x ceil(height / GROUP_HEIGHT) groups of 16 x 8
+ *           Dispatch ceil(width / GROUP_WIDTH) x ceil(height / GROUP_HEIGHT) groups of 16 x 8
  *           items. Row 0 is the TOP row of all images; half floats in them void the bound
  * weights   W0 (1 x 12 x 8) at 0, b0 (8) at 96, W1 (1 x 5 x 4) at 104; vectors filled up to
  *           multiples of 4 with zeros; matrices D_in x neurons; the rows of one that reads the

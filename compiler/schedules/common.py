@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -209,6 +210,22 @@ def assigned(
     return before + after
 
 
+def fused(lets: Sequence[tree.Let], outputs: Collection[str]) -> list[tree.Let]:
+    """Return values without products that only one sum reads, which contains them: compilers fuse those.
+
+    `outputs`: names that others read.
+    """
+    readers: dict[str, list[str]] = {name: ["output"] for name in outputs}
+    for let in lets:
+        for part in tree.parts(let.value):
+            if part.op == "name":
+                readers.setdefault(part.value, []).append(let.value.op)
+    read = {let.name for let in lets if readers.get(let.name) in (["add"], ["subtract"])}
+    products = {let.name: let.value for let in lets if let.value.op == "multiply" and let.name in read}
+    kept = (let for let in lets if let.name not in products)
+    return [replace(let, value=tree.substituted(let.value, products)) for let in kept]
+
+
 Read = Callable[[int], tree.Expr]
 """The expression of a value that another group has computed."""
 
@@ -302,8 +319,8 @@ class Nest:
         for index in group:
             node = self.program.nodes[index]
             value = self._value(node, found, read, lanes if node.type.shape else 1)
-            found[index] = value if self.fuses(index) else name(f"t{index}", value.type)
-            lines += [] if self.fuses(index) else [tree.Let(f"t{index}", value, kept=True)]
+            found[index] = name(f"t{index}", value.type)
+            lines.append(tree.Let(f"t{index}", value, kept=True))
         return lines
 
     def array(self, index: int) -> tree.Array:
@@ -321,10 +338,6 @@ class Nest:
             if let.name in kept:
                 lines.append(tree.Store(kept[let.name], (name("i"),), name(let.name, let.value.type)))
         return [self.span(group), *(self.array(int(t[1:])) for t in kept), loop("i", count, *lines)]
-
-    def fuses(self, index: int) -> bool:
-        """Return whether a value has no name: its expression is part of the only one that reads it."""
-        return False
 
     def _value(self, node: Node, own: Mapping[int, tree.Expr], read: Read, lanes: int) -> tree.Expr:
         """Return what an elementwise node computes."""

@@ -11,29 +11,44 @@
    whose rows OUT are kept, and one of each row give both.
 5. What a row of all tiles gives goes through the other layers as in the tiled schedule, PIXELS at a time.
 
-The transforms are functions of the kernel, traced from `fourier.transform` [`codelet`]. Weights are
+The transforms are functions of the kernel, traced from `fourier.transform` [`line`]. Weights are
 transformed when they are packed, in float64 [`fourier.spectrum`]. The bound is that of fourier.py.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.ir import Node, Program
+from ..core.ir import Node, Program, Type
+from ..core.passes import pipeline
 from ..core.profiles import SineContract
+from ..core.trace import trace
 from ..core.weights import Slot
 from ..kernel import kernel as tree
-from ..kernel.kernel import apply, const, load, name, splat
+from ..kernel.kernel import apply, const, load, name
 from ..proof import bounds
 from ..proof.bounds import Enclosure
 from ..proof.spectra import Spectra
 from . import fourier
-from .common import HEIGHT, WIDTH, Nest, clamp, kernel_gather, loop, named, readers_of_window, weight
+from .common import (
+    HEIGHT,
+    WIDTH,
+    Nest,
+    clamp,
+    fused,
+    kernel_gather,
+    lets,
+    loop,
+    named,
+    readers_of_window,
+    weight,
+)
 from .schedules import ALL, Images, Stored, windows
 from .tile import BLOCK, COUNTER, LANES, PIXELS, P, Tile, all_stored
 
@@ -88,94 +103,31 @@ def sizes_of(program: Program, lanes: int, points: int, tiles: int) -> Sizes:
     )
 
 
-def spectra_stored(
-    program: Program, lanes: int, points: int, tiles: int
-) -> Mapping[str, NDArray[np.float32]]:
-    """Return all weights as they are stored: of the matrix that reads the window its spectra.
-
-    Those are columns, groups, rows, pairs, channels, parts and neurons.
-    """
-    (layer,), s = readers_of_window(program), sizes_of(program, lanes, points, tiles)
-    columns = points // 2 + 1
-    matrix = program.parameters[str(layer["weight"])].astype(np.float64)
-    spectra = fourier.spectrum(matrix, kernel_gather(program).rows, points).transpose(2, 1, 3, 0)[:columns]
-    # Frequencies that are their own negatives have real spectra; float64 leaves some 2^-53 there.
-    spectra[:: points // 2, :: points // 2] = spectra[:: points // 2, :: points // 2].real
-    filled = np.zeros((columns, points, 2 * s.pairs, s.neurons * 2 * lanes), np.complex128)
-    filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
-    # Channel j of the first half and channel j of the second are a pair.
-    split = filled.reshape(columns, points, 2, s.pairs, s.neurons, 2 * lanes).transpose(0, 4, 1, 3, 2, 5)
-    both = np.stack([split.real, split.imag], axis=5).astype(np.float32)
-    return {**all_stored(program, lanes, 2), str(layer["weight"]): both}
-
-
 # ---- transforms ------------------------------------------------------------------------------------------
-
-
-class Traced:
-    """The operations of a transform, in the order in which they are made."""
-
-    def __init__(self) -> None:
-        self.made: list[tree.Expr] = []
-
-    def add(self, value: tree.Expr) -> Number:
-        """Return a new value."""
-        self.made.append(value)
-        return Number(name(f"t{len(self.made) - 1}", value.type), self)
-
-    def needed(self, outputs: list[tree.Expr]) -> list[tree.Let]:
-        """Return what outputs depend on; a sum contains the products that only it reads."""
-        readers = Counter(each.value for each in outputs)
-        kept = []
-        for number, value in reversed(list(enumerate(self.made))):
-            if readers[f"t{number}"]:
-                readers.update(arg.value for arg in value.args if arg.op == "name" and value.op != "load")
-                kept.append(number)
-        known: dict[str, tree.Expr] = {}
-        lets = []
-        wanted = {each.value for each in outputs}
-        for number in kept[::-1]:
-            value, own = self.made[number], f"t{number}"
-            if value.op not in ("load", "component"):
-                value = apply(value.op, *(known.get(str(arg.value), arg) for arg in value.args))
-            if value.op == "multiply" and readers[own] == 1 and own not in wanted:
-                known[own] = value
-            else:
-                lets.append(tree.Let(own, value))
-        return lets
-
-
-@dataclass(frozen=True)
-class Number:
-    """A value that an operation of a transform makes."""
-
-    value: tree.Expr
-    traced: Traced
-
-    def __add__(self, other: Number) -> Number:
-        return self.traced.add(self.value + other.value)
-
-    def __sub__(self, other: Number) -> Number:
-        return self.traced.add(self.value - other.value)
-
-    def __mul__(self, factor: float) -> Number:
-        return self.traced.add(self.value * splat(const(factor), self.value.type.lanes))
 
 
 def line(
     inputs: Sequence[tuple[tree.Expr, tree.Expr]], kept: int, sign: int
-) -> tuple[list[tree.Let], list[list[tree.Expr]]]:
+) -> tuple[list[tree.Let], list[tuple[tree.Expr, tree.Expr]]]:
     """Return the statements that transform complex values, and the first `kept` of what they give."""
-    traced = Traced()
-    found = fourier.transform([tuple(map(traced.add, each)) for each in inputs], sign)[:kept]  # type: ignore[misc]
-    outputs = [[part.value for part in number] for number in found]
-    return traced.needed([part for number in outputs for part in number]), outputs
+    given = {f"t{number}": part for number, part in enumerate(chain(*inputs))}
+
+    def transformed(*parts: Any) -> dict[str, Any]:
+        found = fourier.transform(list(zip(parts[::2], parts[1::2], strict=True)), sign)[:kept]
+        return {f"y{number}": part for number, part in enumerate(chain(*found))}
+
+    program = pipeline.run(trace(transformed, dict.fromkeys(given, Type())), ("eliminate_dead",))
+    statements, values = lets(program, lanes=inputs[0][0].type.lanes)
+    outputs = [values[f"y{number}"] for number in range(2 * kept)]
+    reads = [tree.Let(name, value) for name, value in given.items()]
+    made = fused([s for s in statements if isinstance(s, tree.Let)], [each.value for each in outputs])
+    return [*reads, *made], list(zip(outputs[::2], outputs[1::2], strict=True))
 
 
 def codelet(title: str, points: int, kept: int, sign: int, kind: tree.Type) -> tree.Function:
     """Return the function that transforms `points` complex values and keeps the first `kept`."""
     places = [(STEP * (PARTS * k), STEP * (PARTS * k) + 1) for k in range(points)]
-    lets, found = line(
+    made, found = line(
         [(load("from", a, kind=kind), load("from", b, kind=kind)) for a, b in places], kept, sign
     )
     stores = [
@@ -183,7 +135,7 @@ def codelet(title: str, points: int, kept: int, sign: int, kind: tree.Type) -> t
         for k, number in enumerate(found)
         for i, part in enumerate(number)
     ]
-    return tree.Function(title, (("from", kind), ("to", kind)), (*lets, *stores))
+    return tree.Function(title, (("from", kind), ("to", kind)), (*made, *stores))
 
 
 # ---- statements ------------------------------------------------------------------------------------------
@@ -214,8 +166,24 @@ class Transformed(Stored):
         self.centres = fourier.arrangement(program, self.lanes).centres
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
-        """Return all weights as they are stored, by name."""
-        return spectra_stored(program, self.lanes, self.points, self.tiles)
+        """Return all weights as they are stored, by name: of the matrix that reads the window its spectra.
+
+        Those are columns, groups, rows, pairs, channels, parts and neurons.
+        """
+        (layer,), lanes, points = readers_of_window(program), self.lanes, self.points
+        s = sizes_of(program, lanes, points, self.tiles)
+        columns = points // 2 + 1
+        matrix = program.parameters[str(layer["weight"])].astype(np.float64)
+        spectra = fourier.spectrum(matrix, kernel_gather(program).rows, points)[:, :, :columns]
+        spectra = spectra.transpose(2, 1, 3, 0)
+        # Frequencies that are their own negatives have real spectra; float64 leaves some 2^-53 there.
+        spectra[:: points // 2, :: points // 2] = spectra[:: points // 2, :: points // 2].real
+        filled = np.zeros((columns, points, 2 * s.pairs, s.neurons * 2 * lanes), np.complex128)
+        filled[:, :, : spectra.shape[2], : spectra.shape[3]] = spectra
+        # Channel j of the first half and channel j of the second are a pair.
+        split = filled.reshape(columns, points, 2, s.pairs, s.neurons, 2 * lanes).transpose(0, 4, 1, 3, 2, 5)
+        both = np.stack([split.real, split.imag], axis=5).astype(np.float32)
+        return {**all_stored(program, lanes, 2), str(layer["weight"]): both}
 
     def held(self, program: Program) -> Program:
         """Return the program whose parameters are what the kernel holds, before transforms."""

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -42,7 +41,6 @@ from .fft import (
     Transformed,
     centred,
     line,
-    spectra_stored,
 )
 from .straight import LARGEST_WEIGHTS, VECTOR, ZERO, Straight, variables
 
@@ -61,13 +59,6 @@ Path = tuple[str, tree.Expr, tree.Expr]
 FIRST_TILE, TILE_COUNT = map(name, BATCH)
 ACROSS, ITEM, PAIR, K, F = map(name, ("across", "line", "pair", "k", "f"))
 FREQUENCIES, MIRRORED, BLOCK = map(name, ("FREQUENCIES", "MIRRORED", "BLOCK"))
-
-
-def stored(program: Program, points: int) -> Mapping[str, NDArray[np.float32]]:
-    """Return what is in memory: the first layer's spectra and bias, as the FFT schedule has them."""
-    (layer,) = readers_of_window(program)
-    own = [str(layer[key]) for key in ("weight", "bias") if layer.get(key)]
-    return {key: a for key, a in spectra_stored(program, HALF, points, 1).items() if key in own}
 
 
 def used(kernel: tree.Kernel, launch: tree.Launch) -> list[str]:
@@ -168,11 +159,9 @@ class FourierPasses(Transformed, Straight):
         for channel, value in enumerate(values):
             part, pair = divmod(channel, self.sizes.pairs)
             lines.append(tree.Store("gathered", ((pair * POINTS + name("dx")) * 2 + part,), value))
-        inputs = [
-            tuple(load("gathered", (PAIR * POINTS + dx) * 2 + part) for part in (0, 1))
-            for dx in range(self.points)
-        ]
-        lets, found = line(inputs, self.points, -1)  # type: ignore[arg-type]
+        places = ((PAIR * POINTS + dx) * 2 for dx in range(self.points))
+        inputs = [(load("gathered", at), load("gathered", at + 1)) for at in places]
+        lets, found = line(inputs, self.points, -1)
         puts = [self.put("rows", (PAIR * POINTS + ITEM) * POINTS + k, parts) for k, parts in enumerate(found)]
         return [
             *self.corner(),
@@ -180,7 +169,7 @@ class FourierPasses(Transformed, Straight):
             tree.Let("row", clamp(name("top"), HEIGHT)),
             tree.Array("gathered", tree.FLOAT, (PAIRS * POINTS * 2,), kept=True),
             loop("dx", POINTS, *lines),
-            loop("pair", PAIRS, *kept(lets), *puts),
+            loop("pair", PAIRS, *lets, *puts),
         ]
 
     def turned(self, source: Path, result: Path, sign: int) -> list[tree.Statement]:
@@ -193,7 +182,7 @@ class FourierPasses(Transformed, Straight):
             reads.append(tree.Let(f"z{n}", load(array, at, kind=COMPLEX)))
             parts.append((name(f"z{n}", COMPLEX).lane(0), name(f"z{n}", COMPLEX).lane(1)))
         lets, found = line(parts, self.points if sign < 0 else self.sizes.out, sign)
-        return [*reads, *kept(lets), *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
+        return [*reads, *lets, *(self.put(into, name("to") + leap * n, z) for n, z in enumerate(found))]
 
     # ---- products ----------------------------------------------------------------------------------------
 
@@ -307,8 +296,10 @@ class FourierPasses(Transformed, Straight):
         return super().build(self.held(program))
 
     def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
-        """Return the weights outside the source as they are stored, by name."""
-        return stored(program, self.points)
+        """Return the weights outside the source as they are stored: the first layer's spectra and bias."""
+        (layer,) = readers_of_window(program)
+        own = [str(layer[key]) for key in ("weight", "bias") if layer.get(key)]
+        return {key: array for key, array in super().stored(program).items() if key in own}
 
     def details(self, program: Program) -> Mapping[str, Any]:
         """Return what is launched, the numbers of each array for a tile, and the items of a group."""
@@ -324,8 +315,3 @@ class FourierPasses(Transformed, Straight):
             "memory": handed_on(kernel),
             "items": ITEMS,
         }
-
-
-def kept(lets: Sequence[tree.Let]) -> list[tree.Let]:
-    """Return values whose operations stay in order, which the bound is one of (FOU-6)."""
-    return [replace(each, kept=True) for each in lets]

@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +31,11 @@ from ..kernel.kernel import apply, const, load, name, splat
 from .common import (
     HEIGHT,
     WIDTH,
+    Read,
     X,
     Y,
     clamp,
+    fused,
     kernel_gather,
     loop,
     named,
@@ -210,13 +212,10 @@ class Tile(Stored):
             return weight(offset // self.lanes + COUNTER % total, self.vector)
         return weight(offset + COUNTER % (total * LANES))
 
-    def fuses(self, index: int) -> bool:
-        """Return whether this is a product that one sum reads: compilers fuse what one expression holds."""
-        if self.program.nodes[index].op != "multiply" or len(self.readers[index]) != 1:
-            return False
-        (reader,) = self.readers[index]
-        inside = self.group_of.get(reader) == self.group_of[index] and not self.is_array(index)
-        return inside and self.program.nodes[reader].op in ("add", "subtract")
+    def statements(self, group: Sequence[int], read: Read, lanes: int) -> list[tree.Let]:
+        """Return a statement for each node of an elementwise group, but for products that a sum contains."""
+        kept = [f"t{index}" for index in group if self.is_array(index)]
+        return fused(super().statements(group, read, lanes), kept)
 
     # ---- affine maps -------------------------------------------------------------------------------------
 

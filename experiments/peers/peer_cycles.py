@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wamnet.models.blender.session import LineProcess
+from wamnet.models.lines import LineProcess
 from wamnet.refimpl.errors import ExecutorUnavailable, InputError
 from wamnet.refimpl.light.scene import Scene, to_json
 from wamnet.refimpl.light.transport import Settings
@@ -106,5 +106,5 @@ class Cycles:
 
     def close(self) -> None:
         """End the process."""
-        self._process.close()
+        self._process.end()
         self._folder.cleanup()

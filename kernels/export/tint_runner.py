@@ -13,11 +13,9 @@ needs no display if the environment says so.
 from __future__ import annotations
 
 import base64
-import json
 import os
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,6 +24,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.kernel.interface import BLOCK
+from ...models.lines import LineProcess
 from ...refimpl.errors import CompileError, ExecutorUnavailable
 from . import tools
 from .buffer_runner import BufferRunner, Launch
@@ -42,9 +41,6 @@ TRIED: Mapping[str, Mapping[str, str]] = {
     "opengles": {"EGL_PLATFORM": "surfaceless"},
 }
 """What the environment is given where it has no device by itself, unless it says otherwise."""
-
-CLOSE_S = 10
-"""Seconds that Node may take to end."""
 
 SCRIPT = "dawn.mjs"
 """The shim that Node runs: one device; each line asks for a kernel to be built, or built and run."""
@@ -79,42 +75,27 @@ class TintRunner(BufferRunner):
 
     def _open(self, node: str, backend: str, environment: Mapping[str, str]) -> str:
         """Start the process; return why it has no device, or nothing."""
-        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115 (closed with the process)
-        self._process = subprocess.Popen(
-            [node, "--input-type=module", "-e", tools.shim(SCRIPT), "--", backend, LEVELS[backend]],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            env=environment,
-        )
+        command = [node, "--input-type=module", "-e", tools.shim(SCRIPT), "--", backend, LEVELS[backend]]
+        self._process = LineProcess(command, "Node has ended", environment=environment)
         told = self._answer()
         if "device" in told:
             self.device = f"Dawn, {told['device']}, {told['described']}"
             return ""
-        self._said.seek(0)
-        warnings = ["no warning", *(line for line in self._said if line.startswith("Warning: "))]
-        why = " ".join(f"{told.get('missing', told.get('error'))}; {warnings[-1]}".split())
-        self.close()
-        return why
+        said = self._process.end().splitlines()
+        warnings = ["no warning", *(line for line in said if line.startswith("Warning: "))]
+        return " ".join(f"{told.get('missing', told.get('error'))}; {warnings[-1]}".split())
 
     def _answer(self) -> dict[str, Any]:
         """Return the next line of the process."""
-        line = self._process.stdout.readline() if self._process.stdout else ""
-        if not line:
-            return {"error": "Node has ended"}
-        found: dict[str, Any] = json.loads(line)
-        return found
+        try:
+            return self._process.answer()
+        except ExecutorUnavailable as error:
+            return {"error": str(error)}
 
     def _ask(self, **asked: Any) -> dict[str, Any]:
         """Return what the process answers; raise CompileError for what Dawn does not take."""
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(asked) + "\n")
-            self._process.stdin.flush()
-            told = self._answer()
-        except BrokenPipeError:
-            told = {"error": "Node has ended"}
+        self._process.tell(asked)
+        told = self._answer()
         if "error" in told:
             raise CompileError(f"{self.device} rejects the kernel: {' '.join(told['error'].split())}")
         return told
@@ -140,10 +121,4 @@ class TintRunner(BufferRunner):
 
     def close(self) -> None:
         """End the process."""
-        with self._process, self._said:
-            if self._process.stdin:
-                self._process.stdin.close()
-            try:
-                self._process.wait(CLOSE_S)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
+        self._process.end()

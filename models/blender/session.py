@@ -2,28 +2,20 @@
 
 1. The program is an installed Blender, or this Python where it has the package bpy [`program`]; both run
    process.py, which says how it is asked.
-2. A program in a process of its own answers questions: a line of JSON in, a line of JSON back. Answers begin
-   with a mark, so that other lines of the program are passed over. It is in a process group of its own: an
-   interrupt is for the one who asks, who then closes this: by closing its input, and by killing it where it
-   does not end then, or where an error is on its way [`LineProcess`].
-3. What Blender says against a file is an InputError with the file's name; a program that is missing or ends
+2. What Blender says against a file is an InputError with the file's name; a program that is missing or ends
    is ExecutorUnavailable [`Blender`].
 """
 
 from __future__ import annotations
 
-import json
 import shutil
-import subprocess
 import sys
-import tempfile
-from collections.abc import Sequence
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ...refimpl.errors import ExecutorUnavailable, InputError
+from ..lines import LineProcess
 from .plan import Animation, Shot
 from .process import MARK
 
@@ -35,9 +27,6 @@ BLENDER = "blender"
 
 QUIET = ("--background", "--factory-startup", "--disable-autoexec", "--python")
 """Options of Blender: no window, no settings of the user, no scripts of files, and a script to run."""
-
-CLOSING_S = 20.0
-"""Seconds in which the process has to end before it is ended."""
 
 
 def program(named: str | None) -> list[str]:
@@ -51,59 +40,6 @@ def program(named: str | None) -> list[str]:
         raise InputError("--blender", named, "not found", "give the path of Blender's program")
     rule = "there is no program blender, and this Python has no package bpy"
     raise ExecutorUnavailable(f"Blender: {rule}; install Blender, or pip install --no-deps bpy")
-
-
-class LineProcess:
-    """A running program; `ended` is what is said when it has gone, before the last line of its errors."""
-
-    def __init__(self, command: Sequence[str], ended: str, mark: str = "") -> None:
-        """Start it."""
-        self._ended, self._mark = ended, mark
-        self._said = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            start_new_session=True,
-        )
-
-    def ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        """Return the answer to a question; ExecutorUnavailable says that the program has ended."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(question) + "\n")
-            self._process.stdin.flush()
-            for line in self._process.stdout:
-                if line.startswith(self._mark):
-                    found: dict[str, Any] = json.loads(line.removeprefix(self._mark))
-                    return found
-        raise ExecutorUnavailable(f"{self._ended}{self._last_words()}")
-
-    def _last_words(self) -> str:
-        """Return the last line that it printed as an error, if there is one."""
-        self._said.seek(0)
-        lines = self._said.read().strip().splitlines()
-        return f": {lines[-1].strip()}" if lines else ""
-
-    def close(self) -> None:
-        """End the process."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        if not self._process.stdin.closed:
-            with suppress(BrokenPipeError):
-                self._process.stdin.close()
-        if sys.exc_info()[0] is not None:
-            self._process.kill()
-        try:
-            self._process.wait(CLOSING_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._process.stdout.close()
-        self._said.close()
 
 
 class Blender:
@@ -137,7 +73,7 @@ class Blender:
 
     def close(self) -> None:
         """End the process."""
-        self._process.close()
+        self._process.end()
 
     def __enter__(self) -> Blender:
         return self

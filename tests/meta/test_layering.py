@@ -70,7 +70,7 @@ def imports(source) -> Iterator[tuple[ast.AST, str]]:
 
 ROOMS = {
     "refimpl": {"": (), "light": ("",), "network": ("",)},
-    "models": {"": (), "importing": ("",), "data": (), "blender": ("data",)},
+    "models": {"": (), "importing": ("",), "data": (), "blender": ("", "data")},
     "compiler": {
         "core": (),
         "kernel": ("core",),

@@ -20,10 +20,10 @@ from typing import Any
 
 from ...compiler.scenes.encode_kernel import feature_rays, sees
 from ...compiler.variants import FULL, with_rank
-from ...kernels import Pipeline, denoise_on, open_executor, render_on
-from ...kernels.devices.executor import Executor
+from ...kernels import Pipeline, open_executor, render_on
 from ...kernels.run import render_frame
 from ...kernels.run.before import wants
+from ...kernels.run.denoise_on import Denoiser
 from ...kernels.run.pipeline import Drawn
 from ...kernels.run.render_on import Frames
 from ...models.data.frame_plan import animation_times
@@ -132,12 +132,13 @@ def _draw(
         pixels, samples = left[0].noisy.width * left[0].noisy.height, sum(job.samples for job in jobs)
         said_of_rendering(left[0].scene, samples, pixels, renderer, None)
     with open_executor(executor) as runner, progress("rendering", len(left), "frames") as advance:
+        denoiser = Denoiser(runner, network, variant=with_rank(FULL, rank), pictures=len(left))
         # One device does both, from what the paths of a pixel have seen.
         features, noisy = network.features, shots[0].noisy
         beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
         together = renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
         draw = draw_frames if together else partial(draw_apart, film=shots)
-        for _ in draw(left, watch, runner, renderer, with_rank(FULL, rank)):
+        for _ in draw(left, watch, denoiser, renderer):
             advance(1)
     return len(left), watch
 
@@ -209,12 +210,7 @@ def missing(folder: Path, shots: Sequence[Shot]) -> list[Shot]:
 
 
 def draw_apart(
-    shots: Sequence[Shot],
-    watch: Watch,
-    executor: Executor,
-    renderer: str,
-    variant: str,
-    film: Sequence[Shot] = (),
+    shots: Sequence[Shot], watch: Watch, denoiser: Denoiser, renderer: str, film: Sequence[Shot] = ()
 ) -> Iterator[None]:
     """Render, denoise and write pictures, rendering and denoising on different devices.
 
@@ -236,7 +232,7 @@ def draw_apart(
             continue
         watch.see_frame(shot.path.name, frame)
         noisy = to_display(frame["color"], model.normalization.exposure_stops)
-        denoised = denoise_on(executor, model, frame, variant=variant, pictures=len(shots)).image
+        denoised = denoiser.run(frame).image
         reference = None
         if shot.reference is not None:
             reference = render(renderer, shot.scene, shot.reference, workers=None, frames=frames).frame
@@ -244,9 +240,7 @@ def draw_apart(
         yield
 
 
-def draw_frames(
-    shots: Sequence[Shot], watch: Watch, executor: Executor, renderer: str, variant: str
-) -> Iterator[None]:
+def draw_frames(shots: Sequence[Shot], watch: Watch, denoiser: Denoiser, renderer: str) -> Iterator[None]:
     """Render, denoise and write pictures by one pipeline, on the device that does both."""
     if not shots:
         return
@@ -254,6 +248,7 @@ def draw_frames(
     # A reference is traced by the pipeline's kernel, unless that has rays of features too, or sees more.
     apart = feature_job(first.noisy) is not None or first.noisy.seen or first.noisy.shadow_rays
     frames = Frames(scenes) if apart else None
+    executor = denoiser.executor
     with Pipeline(
         executor,
         first.scene,
@@ -262,8 +257,8 @@ def draw_frames(
         settings=first.noisy.settings,
         show=("color",),
         whole=first.reference is not None and frames is None,
-        variant=variant,
-        pictures=len(shots),
+        variant=denoiser.variant,
+        pictures=denoiser.pictures,
         moving=scenes,
         feature_spp=first.noisy.feature_spp,
     ) as pipeline:

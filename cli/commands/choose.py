@@ -86,13 +86,14 @@ class Request:
         of_frames = hashlib.sha256((self.frames / dataset_files.MANIFEST).read_bytes()).hexdigest()
         names, size = curve.names_for(model), (self.size or 1024, self.size or 1024)
         with open_executor(executor) as runner:
+            runner.profile = network.profile
             wanted = Curve(digest, runner.device, size, network.profile, ())
             key = wanted.key(runner.name, of_frames, names)
             if (kept := curve.cached(key, wanted)) is not None:
                 say(f"curve: {len(kept.points)} points, measured before, cached in {cache.path_of(key)}")
                 return kept
             with progress(f"measuring {len(names)} variants", 1.0) as advance:
-                measured = curve.Measurement(runner, model, size, network.profile, pairs)
+                measured = curve.Measurement(runner, model, size, pairs)
                 found = measured.curve(names, on_done=advance)
         path = cache.write_json(key, found.as_data())
         where = f"cached in {path}" if path else "not cached: no cache folder is writable"

@@ -117,12 +117,13 @@ def denoise(
     for result in outputs:
         check_output(result, suffixes, [model, *paths])
     network, notes = load_model(model), Notes()
-    how = kernel.profile, kernel.schedule, kernel.network(rank)
+    how = kernel.schedule, kernel.network(rank)
     name = chosen(executor)
     with kernels.open_executor(name) as runner:
+        runner.profile = kernel.profile
         job = Job(Denoiser(runner, network, *how, len(paths), keeps=True), notes, layers)
         if many:
-            made_by = [name, *how, layers.keep_layers, layers.view_layer]
+            made_by = [name, kernel.profile, *how, layers.keep_layers, layers.view_layer]
             content = hashlib.sha256(model_path(model).read_bytes()).hexdigest()
             _denoise_all(job, paths, outputs, output, _digest(content, *made_by))
         else:

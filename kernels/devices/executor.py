@@ -95,6 +95,7 @@ class Built:
 class Executor(Closing, ABC):
     """A device that is open; a context manager that closes it. `name` is its target, `device` a text.
 
+    `profile` is the numerical profile of the kernels that are compiled for it, unless a plan states another.
     `lanes` is the number of paths that its path kernels should follow at once, `schedule` the name of the
     schedule that suits a denoiser on it, for pictures of at least `schedule_pixels`: smaller ones are done
     with the plain kernel before the other is compiled; `schedule_reason` says why.
@@ -109,6 +110,7 @@ class Executor(Closing, ABC):
 
     name: str
     device: str
+    profile: str = "ieee"
     lanes: int = 1
     schedule: str = PLAIN
     schedule_pixels: int = 0

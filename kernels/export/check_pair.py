@@ -16,7 +16,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -143,11 +142,15 @@ def pair(
     if programs is None:
         images = _livelier(plan.analysed, size)
     else:
-        summed = partial(_sums, programs, model.features, plan.profile.name, size)
-        planes, sums = summed()
+        groups = tuple(dict.fromkeys(layers_of(model.features)))
+        kernel = compile_path(programs, "numpy", plan.profile.name, groups=groups)
+        with open_executor("numpy") as executor:
+            part = Part(size[1], size[0], 0, size[0], 0, 1, SEED)
+            sums, *others = (executor.trace(kernel, part, row) for row in (None, *rows))
+        planes = kernel.planes
         rays = programs.rays.count if programs.rays else 0
         images = _encoded(model, dict(zip(planes, sums, strict=True)), rays)
-        moments = tuple(Moment(row, summed(row)[1]) for row in rows)
+        moments = tuple(map(Moment, rows, others))
     held = (plan if promised else plan_program(lower(model), "numpy")).expected(images)
     output = held.value.astype(np.float32)
     return Pair(images, output, held.most_from(output), promised, sums, planes, moments)
@@ -176,22 +179,6 @@ def _spread(gather: Gather, size: tuple[int, int], contrast: float) -> dict[str,
         values = np.rint(values) if image.whole else values
         found[image.name] = np.clip(values.astype(np.float32), np.float32(image.low), np.float32(image.high))
     return found
-
-
-def _sums(
-    programs: PathPrograms,
-    features: Sequence[str],
-    profile: str,
-    size: tuple[int, int],
-    numbers: NDArray[np.float32] | None = None,
-) -> tuple[tuple[str, ...], NDArray[np.float32]]:
-    """Return the planes of features, and the interpreter's sums (planes, H, W) over one sample.
-
-    `numbers` (n,) are those of the scene that move, by default of the scene that was compiled.
-    """
-    kernel = compile_path(programs, "numpy", profile, groups=tuple(dict.fromkeys(layers_of(features))))
-    with open_executor("numpy") as executor:
-        return kernel.planes, executor.trace(kernel, Part(size[1], size[0], 0, size[0], 0, 1, SEED), numbers)
 
 
 def _encoded(

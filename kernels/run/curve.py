@@ -268,12 +268,11 @@ def names_for(model: Model, wanted: Sequence[str] = NAMES) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A model on an open device at a size (height, width), under a profile; errors are those of `pairs`."""
+    """A model on an open device at a size (height, width); errors are those of `pairs`."""
 
     executor: Executor
     model: Model
     size: tuple[int, int]
-    profile: str
     pairs: Pairs
 
     def curve(
@@ -306,11 +305,13 @@ class Measurement:
         times = in_turns(ways, repeats, pause_s=PAUSE_S)
         on_done(1 / (len(names) + 1))
         timed = (replace(points[key], milliseconds=1e3 * found.median) for key, found in times.items())
-        return Curve(variants.digest_of(model), self.executor.device, self.size, self.profile, tuple(timed))
+        device, digest = self.executor, variants.digest_of(model)
+        return Curve(digest, device.device, self.size, device.profile, tuple(timed))
 
     def _plan(self, schedule: str = PLAIN, variant: str = variants.FULL) -> Plan:
         """Return the plan of a variant."""
-        return variants.plan_model(self.model, self.executor.language, self.profile, schedule, variant)
+        device = self.executor
+        return variants.plan_model(self.model, device.language, device.profile, schedule, variant)
 
     def promising(self) -> tuple[str, ...]:
         """Return the schedules under which the full network is fastest on a small picture, the best first."""

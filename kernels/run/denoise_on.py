@@ -123,7 +123,6 @@ class Denoiser:
 
     executor: Executor
     full: Model
-    profile: str = "ieee"
     schedule: str | None = None
     variant: str = FULL
     pictures: int = 1
@@ -146,9 +145,8 @@ class Denoiser:
         """Return the plan."""
         from ...compiler.variants import plan_model
 
-        plan = plan_model(
-            self.full, self.executor.language, self.profile, self.schedule or PLAIN, self.variant
-        )
+        executor, schedule = self.executor, self.schedule or PLAIN
+        plan = plan_model(self.full, executor.language, executor.profile, schedule, self.variant)
         return replace(plan, proves=not self.keeps)
 
     def kernel(self, size: Size) -> tuple[Artifact, str]:
@@ -164,12 +162,12 @@ class Denoiser:
         """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
-            subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.profile)
+            subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.executor.profile)
             name, reason = Tuning(self.executor, subject, size).picked(self.pictures)
         if not self.keeps:
             return self._compiled(name)[0], reason
         digest = hashlib.sha256(model_bytes(self.full)).hexdigest()
-        parts = (digest, self.executor.name, self.profile, self.variant, name)
+        parts = (digest, self.executor.name, self.executor.profile, self.variant, name)
         return kept_kernels("kernel", parts, lambda: self._compiled(name))[0], reason
 
     def _compiled(self, schedule: str) -> Sequence[Artifact]:
@@ -193,7 +191,7 @@ class Denoiser:
             return None
         if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
             return None
-        kernels = _filter(model.normalization, executor.name, self.profile, executor.lanes, self.keeps)
+        kernels = _filter(model.normalization, executor.name, executor.profile, executor.lanes, self.keeps)
         return Filter(executor, kernels)
 
     def images(self, frame: Frame) -> Images:
@@ -235,7 +233,6 @@ def denoise_on(
     executor: Executor,
     model: Model,
     frame: Frame,
-    profile: str = "ieee",
     schedule: str | None = None,
     variant: str = FULL,
     pictures: int = 1,
@@ -247,7 +244,7 @@ def denoise_on(
     `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
     with the reference's image; by default the device may make them [`Denoiser.images`].
     """
-    return Denoiser(executor, model, profile, schedule, variant, pictures, keeps).run(frame, images)
+    return Denoiser(executor, model, schedule, variant, pictures, keeps).run(frame, images)
 
 
 def products_of(program: Program) -> int:

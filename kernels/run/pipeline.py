@@ -90,7 +90,6 @@ class Pipeline(Closing):
         size: tuple[int, int],
         *,
         settings: Settings | None = None,
-        profile: str = "ieee",
         show: Sequence[str] = (),
         whole: bool = False,
         variant: str = FULL,
@@ -103,7 +102,7 @@ class Pipeline(Closing):
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
         # The first picture does not wait for a proof that nobody reads.
-        plan = replace(plan_model(model, executor.language, profile, variant=variant), proves=False)
+        plan = replace(plan_model(model, executor.language, executor.profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
         self._settings = settings or Settings()
@@ -118,7 +117,8 @@ class Pipeline(Closing):
             rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
             raise InputError("whole", whole, rule, "render references with a separate kernel")
         self._in_integers = integers = model.is_whole
-        features, scales, language = self._features, model.normalization, executor.language
+        features, scales = self._features, model.normalization
+        language, profile = executor.language, executor.profile
         count = self._rays.count if self._rays else 0
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
@@ -126,7 +126,7 @@ class Pipeline(Closing):
         groups = layers_of(self._features)
         groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
         more = {"seen": sees(self._features), "rays": self._rays, "shadow_rays": shadow_rays}
-        self._paths = MovingPaths(executor, self._settings, profile, groups, more, encoding, moving)
+        self._paths = MovingPaths(executor, self._settings, groups, more, encoding, moving)
         self.set_scene(scene)
         planned = planes(groups)
         self.encode = compile_encode(features, scales, language, profile, planned, integers, count)

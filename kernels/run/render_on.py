@@ -72,18 +72,16 @@ class Frames:
         self._scenes = tuple(scenes)
         self._paths: dict[tuple[object, ...], MovingPaths] = {}
 
-    def of(
-        self, executor: Executor, scene: Scene, job: Job, profile: str = "ieee", groups: Sequence[str] = ()
-    ) -> Moment:
+    def of(self, executor: Executor, scene: Scene, job: Job, groups: Sequence[str] = ()) -> Moment:
         """Return the kernel that renders a job's scene on an executor, and the scene's numbers.
 
         `groups` are those of its planes, by default what the job's frame is made of.
         """
         settings, groups = job.settings, tuple(groups) or groups_of(job)
-        key = (executor.name, executor.lanes, profile, settings, groups, job.shadow_rays)
+        key = (executor.name, executor.lanes, executor.profile, settings, groups, job.shadow_rays)
         if key not in self._paths:
             more = {"seen": job.seen, "shadow_rays": job.shadow_rays}
-            paths = MovingPaths(executor, settings, profile, groups, more, moving=self._scenes)
+            paths = MovingPaths(executor, settings, groups, more, moving=self._scenes)
             self._paths[key] = paths
         return self._paths[key].of(scene)
 
@@ -101,7 +99,6 @@ def render_on(
     *,
     rows: tuple[int, int] | None = None,
     on_progress: Callable[[int], None] | None = None,
-    profile: str = "ieee",
     moment: Moment | None = None,
     frames: Frames | None = None,
 ) -> Render:
@@ -113,20 +110,20 @@ def render_on(
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
     if feature_job(job) is not None:
-        options: dict[str, Any] = {"rows": rows, "on_progress": on_progress, "profile": profile}
-        return with_own_features(scene, job, partial(render_on, executor, scene, **options, frames=frames))
+        again = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, frames=frames)
+        return with_own_features(scene, job, again)
     first, last = checked_rows(job, rows)
     if job.seen and len(planes(groups_of(job))) > executor.language.dialect.max_planes:
         # The same paths twice, for layers that no kernel of this device writes at once.
         settings = job.settings if job.color else feature_settings(job.settings, False)
         plain = replace(job, seen=False, settings=settings)
-        again = partial(render_on, executor, scene, rows=rows, profile=profile, frames=frames)
+        again = partial(render_on, executor, scene, rows=rows, frames=frames)
         hits, past = again(plain, on_progress=on_progress), replace(job, color=False)
         names = [name for name in job.layers if name not in plain.layers]
-        moment = (frames or frames_of(scene)).of(executor, scene, past, profile, names)
+        moment = (frames or frames_of(scene)).of(executor, scene, past, names)
         seen = _render(moment.kernel, moment.totals(past, (first, last)), names, {})
         return joined(scene, job, hits, seen)
-    moment = moment or (frames or frames_of(scene)).of(executor, scene, job, profile)
+    moment = moment or (frames or frames_of(scene)).of(executor, scene, job)
     if moment.kernel.programs.rays:
         rule = "has separate feature rays, and a render's kernel sums features over the samples"
         raise InputError("kernel", NO_VALUE, rule, "render with frames=, or without either")
@@ -229,7 +226,6 @@ class MovingPaths:
 
     executor: Executor
     settings: Settings
-    profile: str
     groups: Sequence[str]
     more: Mapping[str, Any]
     encoding: Encoding | None = None
@@ -266,7 +262,7 @@ class MovingPaths:
         """Return the kernel of a scene, some of whose numbers are inputs."""
         language, lanes = self.executor.language, self.executor.lanes
         programs = lower_scene(scene, self.settings, language.forms, inputs, **self.more)
-        return compile_path(programs, language, self.profile, lanes, self.groups, self.encoding)
+        return compile_path(programs, language, self.executor.profile, lanes, self.groups, self.encoding)
 
     def _find(self, scenes: Sequence[Scene]) -> None:
         """Make a family for each layout of some scenes, with the numbers in which they differ as inputs."""

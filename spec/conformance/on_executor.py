@@ -50,8 +50,8 @@ from .kinds.network import layers, network_from
 from .kinds.paths import VERTEX
 from .numbers import from_json
 
-Own = Callable[[Mapping[str, Any], str], Mapping[str, Any]]
-"""(inputs, profile) -> outputs, of a kind that is not a function of numbers."""
+Own = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+"""Inputs -> outputs, of a kind that is not a function of numbers."""
 
 
 class OnExecutor:
@@ -69,11 +69,14 @@ class OnExecutor:
 
     def answer(self, kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
         """Return the executor's outputs."""
-        profile_named(profile)
+        if self.executor.profile != profile:
+            self.executor.profile = profile_named(profile).name
+            self._compiled.cache_clear()
+            self._path_kernel.cache_clear()
         check_integers(KINDS[kind], inputs)
         if kind in self._own:
-            return self._own[kind]({name: given(value) for name, value in inputs.items()}, profile)
-        function, kernels = FUNCTIONS[kind], self._compiled(kind, profile)
+            return self._own[kind]({name: given(value) for name, value in inputs.items()})
+        function, kernels = FUNCTIONS[kind], self._compiled(kind)
         fields = {name: np.asarray(from_json(inputs[name], name), np.float32) for name in function.inputs}
         parts = apart(values_of(function.inputs), fields)
         images = {part: np.full((1, 1, 1), value, np.float32) for part, value in parts.items()}
@@ -81,7 +84,7 @@ class OnExecutor:
         values = values_of(function.outputs)
         return joined(values, dict(zip(names(values), found, strict=True)))
 
-    def _vertices(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+    def _vertices(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return every vertex of a path, each from a kernel that stops there."""
         x, y, width, height, sample, seed = (
             int(inputs[name]) for name in ("x", "y", "width", "height", "sample", "seed")
@@ -90,7 +93,7 @@ class OnExecutor:
         rows: list[dict[str, Any]] = []
         for depth in range(inputs["settings"]["max_depth"] + 1):
             settings = json.dumps({**inputs["settings"], "max_depth": depth})
-            kernel = self._path_kernel(inputs["scene"], settings, profile)
+            kernel = self._path_kernel(inputs["scene"], settings)
             planes = self.executor.trace(kernel, part)[:, 0, x]
             state = dict(zip(kernel.planes, planes, strict=True))
             # A path that ended at the surface before has no vertex here.
@@ -99,24 +102,25 @@ class OnExecutor:
             rows.append(state)
         return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
 
-    def _compile_path(self, scene: str, settings: str, profile: str) -> Artifact:
+    def _compile_path(self, scene: str, settings: str) -> Artifact:
         """Return the kernel that reports the last vertex of paths."""
         stopped = Settings(**json.loads(settings))
         programs = replace(self._programs(scene, replace(stopped, max_depth=0)), settings=stopped)
-        return compile_path(programs, self.executor.name, profile, self.executor.lanes, tuple(END))
+        device = self.executor
+        return compile_path(programs, device.name, device.profile, device.lanes, tuple(END))
 
     def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
         """Return the programs of a path, which do not depend on the depth."""
         return lower_scene(scene_module.from_json(scene), settings, language_named(self.executor.name).forms)
 
-    def _denoised(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+    def _denoised(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return a denoised picture."""
         frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
         model = model_from(base64.b64decode(inputs["model"]))
         schedule = None if self.executor.name in DENOISERS else PLAIN
-        return {"picture": denoise_on(self.executor, model, frame, profile, schedule).image}
+        return {"picture": denoise_on(self.executor, model, frame, schedule).image}
 
-    def _whole(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+    def _whole(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return what each layer of a network of integers gives, from kernels of a window of one pixel."""
         network = network_from(inputs)
         images = tuple(
@@ -131,35 +135,36 @@ class OnExecutor:
             for first in range(0, width, 3):
                 wanted = range(first, min(first + 3, width))
                 program = trace(partial(_some, network, name, wanted), types, gather)
-                picture = self.executor.run(self._kernel(program, profile), pixel)
+                picture = self.executor.run(self._kernel(program), pixel)
                 found.setdefault(name, []).extend(picture[0, 0].tolist())
         return {name: np.array(values) for name, values in found.items()}
 
-    def _rendered(self, inputs: Mapping[str, Any], profile: str) -> dict[str, Any]:
+    def _rendered(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return mean and variance of each pixel."""
         width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
         job = Job(width, height, spp, seed, Settings(**inputs["settings"]))
-        found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job, profile=profile)
+        found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job)
         return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
-    def _compile(self, kind: str, profile: str) -> list[Artifact]:
+    def _compile(self, kind: str) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
         total = len(names(values_of(function.outputs)))
         threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
-        return [self._kernel(_program(function, wanted), profile) for wanted in threes]
+        return [self._kernel(_program(function, wanted)) for wanted in threes]
 
-    def _kernel(self, program: Program, profile: str) -> Artifact:
+    def _kernel(self, program: Program) -> Artifact:
         """Return the kernel of a program.
 
         Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there
         is no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
         """
+        target, profile = self.executor.name, self.executor.profile
         try:
-            return compile_program(program, self.executor.name, profile)
+            return compile_program(program, target, profile)
         except CompileError:
             expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
-            return compile_program(expanded, self.executor.name, profile)
+            return compile_program(expanded, target, profile)
 
 
 def _joined(state: Mapping[str, Any], name: str) -> Any:

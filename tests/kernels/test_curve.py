@@ -204,7 +204,7 @@ def test_a_measurement_has_every_variant(executor_named, model) -> None:
     names = curve.names_for(model, ("full", "window3", "rank2", "window9", "without-normal"))
     assert names == ("full", "window3", "rank2")
     done = []
-    measured = Measurement(executor_named("numpy"), model, (17, 19), "ieee", frames())
+    measured = Measurement(executor_named("numpy"), model, (17, 19), frames())
     found = measured.curve(names, repeats=2, on_done=done.append)
     assert [p.variant for p in found.points] == list(names)
     assert (found.model, found.size) == (variants.digest_of(model), (17, 19))
@@ -220,7 +220,7 @@ def test_a_measurement_has_every_variant(executor_named, model) -> None:
 
 def test_every_target_s_schedules_are_tried(denoiser, model) -> None:
     """It was a KeyError for C: `compile --target c --max-ms 9 --frames FOLDER`."""
-    found = Measurement(denoiser, model, (8, 8), "ieee", ()).promising()
+    found = Measurement(denoiser, model, (8, 8), ()).promising()
     known = {schedule.name for schedule in DENOISERS[denoiser.name].schedules}
     assert found
     assert known.issuperset(found)

@@ -68,12 +68,13 @@ def test_image_is_the_reference_s(executor, name):
         Settings(max_depth=2, strategy="bsdf", heuristic="balance"),
     ],
 )
-def test_settings(executor, settings):
+def test_settings(executor, settings, monkeypatch):
     """As above, with the kernel's sine of either profile."""
     job = R.Job(21, 13, 2, 1, settings)
     expected = R.render(scene("cornell"), job).frame["color"]
     for profile in ("ieee", "native"):
-        found = render_on(executor, scene("cornell"), job, profile=profile).frame["color"]
+        monkeypatch.setattr(executor, "profile", profile)
+        found = render_on(executor, scene("cornell"), job).frame["color"]
         # The angle of a direction may be off by 2^-11, the sine of GLSL, in theory; Mesa's is much better.
         near = np.abs(found - expected) <= 1e-4 * (expected + expected.mean())
         assert near.all(axis=-1).mean() >= 0.97

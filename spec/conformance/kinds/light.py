@@ -23,8 +23,7 @@ from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK, inverse
 from ....refimpl.vectors import dot
 from ..case import FOLDER, Kind, within
-from ..functions import Numbers
-from .tables import ROWS, direct, function, kind
+from .tables import ROWS, function, kind
 
 ROUNDED = "float64, rounded once to float32"
 """Where bounds of numbers come from that are computed once for a scene: with a margin, one ulp."""
@@ -75,34 +74,30 @@ CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), (0.0, 1.0, 0.0), 41.0)
 WIDTH, HEIGHT = 97, 64
 """Size of its image in pixels."""
 
-SPHERE_CENTER, SPHERE_RADIUS = (0.25, -0.5, 0.125), 0.75
+SPHERE = Sphere((0.25, -0.5, 0.125), 0.75, BLACK)
 """The sphere of all rays."""
 
-QUAD = ((-0.5, 0.25, -0.75), (1.5, 0.0, 0.25), (0.25, 0.0, 2.0))
-"""Corner and edges of the parallelogram of all rays."""
+QUAD = Quad((-0.5, 0.25, -0.75), (1.5, 0.0, 0.25), (0.25, 0.0, 2.0), BLACK)
+"""The parallelogram of all rays."""
 
 CUMULATIVE = (0.125, 0.125, 0.625, 1.0)
 """Running sums of the probabilities of all draws: the second is 0."""
 
+SCENES = {name: scene_module.from_json(json.dumps(scene)) for name, scene in ROWS["scenes"].items()}
+"""What the rays of each kind meet; the titles say it too."""
 
-def _ray(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return origin and direction."""
-    basis = camera.camera_basis(CAMERA, dtype)
-    x, y, u, v = (given[name] for name in ("x", "y", "u", "v"))
-    origin, direction = camera.camera_ray(basis, x, y, u, v, WIDTH, HEIGHT)
-    return {"origin": origin, "direction": direction}
+BOX = SCENES["intersection.box"].boxes[0]
+"""The box of all slabs."""
+
+SKY = Sky((0.16, 0.30, 0.62), (0.62, 0.70, 0.80), (0.18, 0.16, 0.14), (0.6, 0.8, 0.0), (2.6, 2.2, 1.6), 64.0)
+"""The sky of all directions."""
 
 
 def _vector(a: Any, b: Any, c: Any) -> tuple[Any, ...]:
     """Return what vectors are made into."""
     products = vectors.dot(a, b), vectors.cross(a, b), vectors.scale(a, b[..., 0])
-    return (
-        *products,
-        vectors.normalize(a),
-        vectors.rotate((a, b, c), c),
-        vectors.largest(a),
-        vectors.smallest(a),
-    )
+    rotated = vectors.rotate((a, b, c), c)
+    return *products, vectors.normalize(a), rotated, vectors.largest(a), vectors.smallest(a)
 
 
 def _hemisphere(u0: Any, u1: Any) -> tuple[Any, Any]:
@@ -119,83 +114,61 @@ def _cauchy(u0: Any, u1: Any, concentration: Any) -> tuple[Any, Any]:
     return wi, sampling.spherical_cauchy_pdf(0.5 * (x * x + y * y + z * z), concentration)
 
 
-def _discrete(given: Numbers, dtype: Any) -> dict[str, Any]:
+def _discrete(dtype: Any, u0: Any) -> tuple[Any, Any]:
     """Return the index as a float, and its probability."""
     cumulative = np.asarray(CUMULATIVE, dtype)
-    index = sampling.sample_discrete(given["u0"], cumulative)
-    return {"index": index.astype(dtype), "probability": sampling.discrete_pdf(index, cumulative)}
-
-
-def _sphere(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return the distance of the sphere."""
-    row = tuple(np.asarray(part, dtype) for part in Sphere(SPHERE_CENTER, SPHERE_RADIUS, BLACK).row)
-    return {"t": Sphere.distance(row, given["origin"], given["direction"])}
-
-
-def _quad(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return the distance of the parallelogram."""
-    row = tuple(np.asarray(part, dtype) for part in quad_row(Quad(*QUAD, BLACK)))
-    return {"t": Quad.distance(row, given["origin"], given["direction"])}
-
-
-# ---- boxes, rooms and scenes ------------------------------------------------------------------------------
-
-SCENES = {name: scene_module.from_json(json.dumps(scene)) for name, scene in ROWS["scenes"].items()}
-"""What the rays of each kind meet; the titles say it too."""
-
-BOX = SCENES["intersection.box"].boxes[0]
-"""The box of all slabs."""
+    index = sampling.sample_discrete(u0, cumulative)
+    return index.astype(dtype), sampling.discrete_pdf(index, cumulative)
 
 
 def _met(name: str) -> Any:
-    """Return the function from rays to distance, normal and number of the surface."""
+    """Return the function from rays to distance, normal and perhaps number of the surface."""
 
-    def call(given: Numbers, dtype: Any) -> dict[str, Any]:
+    def call(dtype: Any, origin: Any, direction: Any) -> tuple[Any, ...]:
         geometry = intersection.build(SCENES[name], dtype)
-        hit = intersection.closest_hit(geometry, given["origin"], given["direction"])
-        surface = intersection.surface_at(geometry, hit, given["origin"], given["direction"])
-        return {"t": hit.t, "normal": surface.normal, "surface": hit.surface.astype(dtype)}
+        hit = intersection.closest_hit(geometry, origin, direction)
+        surface = intersection.surface_at(geometry, hit, origin, direction)
+        found = hit.t, surface.normal, hit.surface.astype(dtype)
+        return found[: len(ROWS["functions"][name]["outputs"])]
 
     return call
 
 
-def _slabs(given: Numbers, dtype: Any) -> dict[str, Any]:
+def _slabs(dtype: Any, origin: Any, direction: Any) -> Any:
     """Return where a ray enters and leaves each slab."""
     half = np.asarray(BOX.half_extent, dtype)
-    enter, leave = slabs(np.asarray(BOX.center, dtype), half, given["origin"], inverse(given["direction"]))
-    return {"enter": enter, "leave": leave}
+    return slabs(np.asarray(BOX.center, dtype), half, origin, inverse(direction))
 
 
-def _occluded(given: Numbers, dtype: Any) -> dict[str, Any]:
+def _occluded(dtype: Any, origin: Any, direction: Any, distance: Any) -> Any:
     """Return 1 where something is nearer than a distance."""
-    geometry = intersection.build(SCENES["intersection.occluded"], dtype)
-    found = intersection.occluded(geometry, given["origin"], given["direction"], given["distance"])
-    one = np.ones_like(given["distance"])
-    return {"occluded": np.where(found, one, 0.0 * one)}
+    geometry, one = intersection.build(SCENES["intersection.occluded"], dtype), np.ones_like(distance)
+    return np.where(intersection.occluded(geometry, origin, direction, distance), one, 0.0 * one)
 
 
-# ---- surfaces ---------------------------------------------------------------------------------------------
-
-
-def _site(given: Numbers, parameter: Any = None, outside: Any = None) -> Site:
+def _site(wo: Any, normal: Any, reflectance: Any, parameter: Any = None, outside: Any = None) -> Site:
     """Return the vertex with a throughput of 1."""
-    reflectance = given["reflectance"]
     one = np.ones_like(reflectance)
-    return Site(given["wo"], given["normal"], outside, reflectance, one, one * reflectance, parameter)
+    return Site(wo, normal, outside, reflectance, one, one * reflectance, parameter)
 
 
-def _sampled(material: Any, given: Numbers, **of_site: Any) -> dict[str, Any]:
-    """Return how a path continues."""
-    found = material.sample(_site(given, **of_site), given["u0"], given["u1"], given["u_choice"])
-    return {name: getattr(found, name) for name in ("direction", "beta", "pdf")}
+def _sampled(material: Any) -> Any:
+    """Return the function from a vertex and random numbers to how a path continues."""
+
+    def call(wo: Any, normal: Any, reflectance: Any, u0: Any, u1: Any, u_choice: Any, *more: Any) -> Any:
+        parameter, outside = (*more, None, None)[:2]
+        site = _site(wo, normal, reflectance, parameter, None if outside is None else outside > 0.5)
+        found = material.sample(site, u0, u1, u_choice)
+        return found.direction, found.beta, found.pdf
+
+    return call
 
 
-def _valued(given: Numbers, dtype: Any) -> dict[str, Any]:
+def _valued(wo: Any, normal: Any, reflectance: Any, wi: Any, roughness: Any) -> tuple[Any, Any]:
     """Return value and density."""
-    site, wi = _site(given, parameter=given["roughness"]), given["wi"]
-    cosine = np.maximum(dot(site.normal, wi), 0.0)
+    site, cosine = _site(wo, normal, reflectance, roughness), np.maximum(dot(normal, wi), 0.0)
     color, factor = Conductor.value(site, wi, cosine)
-    return {"value": color * factor[..., np.newaxis], "pdf": Conductor.pdf(site, wi, cosine)}
+    return color * factor[..., np.newaxis], Conductor.pdf(site, wi, cosine)
 
 
 def _refracted(wo: Any, normal: Any, ratio: Any) -> tuple[Any, Any]:
@@ -205,13 +178,10 @@ def _refracted(wo: Any, normal: Any, ratio: Any) -> tuple[Any, Any]:
     return refract(site, np.minimum(np.maximum(dot(wo, normal), 0.0), 1.0), ratio)
 
 
-# ---- lights -----------------------------------------------------------------------------------------------
+class Heuristic(NamedTuple):
+    """All that a weight reads of settings."""
 
-NO_SETTINGS = cast(transport.Settings, None)
-"""Settings where nobody reads any."""
-
-SKY = Sky((0.16, 0.30, 0.62), (0.62, 0.70, 0.80), (0.18, 0.16, 0.14), (0.6, 0.8, 0.0), (2.6, 2.2, 1.6), 64.0)
-"""The sky of all directions."""
+    heuristic: str
 
 
 @cache
@@ -220,90 +190,81 @@ def _terrace() -> Scene:
     return scene_module.from_json((FOLDER / "scenes/terrace.json").read_text(encoding="utf-8"))
 
 
-class Heuristic(NamedTuple):
-    """All that a weight reads of settings."""
-
-    heuristic: str
-
-
-def _sky(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return radiance and density."""
-    sky, direction = environment.build(SKY, dtype), given["direction"]
-    return {"radiance": environment.radiance(sky, direction), "pdf": environment.pdf(sky, direction)}
+def _world(dtype: Any) -> transport.World:
+    """Return the terrace where nobody reads settings."""
+    return transport.build(_terrace(), cast(transport.Settings, None), dtype)
 
 
-def _sky_sample(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return a direction."""
-    numbers = (given[name] for name in ("u_choice", "u0", "u1"))
-    return {"direction": environment.sample(environment.build(SKY, dtype), *numbers)}
-
-
-def _unshadowed(given: Numbers, dtype: Any) -> dict[str, Any]:
-    """Return the light of the terrace's lamps at points of its surfaces."""
-    world = transport.build(_terrace(), NO_SETTINGS, dtype)
-    surface = reflecting(given["point"], given["normal"], given["reflectance"])
-    return {"unshadowed": transport.unshadowed(world, surface)}
-
-
-def _light_pdf(given: Numbers, dtype: Any) -> dict[str, Any]:
+def _light_pdf(dtype: Any, square: Any, cosine: Any) -> tuple[Any, Any]:
     """Return the densities of both lamps of the terrace."""
-    lights = transport.build(_terrace(), NO_SETTINGS, dtype).lights
+    lights, index = _world(dtype).lights, np.zeros_like(square, np.int32)
     assert lights is not None
-    square, cosine = given["square"], given["cosine"]
-    index = np.zeros_like(square, np.int32)
-    return {f"lamp_{k}": transport.light_pdf(lights, index + np.int32(k), square, cosine) for k in (0, 1)}
+    first, second = (transport.light_pdf(lights, index + np.int32(k), square, cosine) for k in (0, 1))
+    return first, second
 
 
-FUNCTIONS = (
-    direct("vector", _vector),
-    function("camera.ray", _ray),
-    direct("sampling.concentric_disk", sampling.sample_concentric_disk),
-    direct("sampling.cosine_hemisphere", _hemisphere),
-    direct("sampling.spherical_cauchy", _cauchy),
-    direct(
-        "sampling.quad",
-        lambda u0, u1, corner, edge_u, edge_v: (
-            sampling.sample_quad(u0, u1, corner, edge_u, edge_v),
-            sampling.quad_pdf(edge_u, edge_v),
-        ),
+def _sky(dtype: Any, direction: Any) -> tuple[Any, Any]:
+    """Return radiance and density."""
+    sky = environment.build(SKY, dtype)
+    return environment.radiance(sky, direction), environment.pdf(sky, direction)
+
+
+TYPED: Mapping[str, Callable[..., Any]] = {
+    "camera.ray": lambda dtype, x, y, u, v: camera.camera_ray(
+        camera.camera_basis(CAMERA, dtype), x, y, u, v, WIDTH, HEIGHT
     ),
-    function("sampling.discrete", _discrete),
-    direct("sampling.tangent_frame", sampling.tangent_frame),
-    direct(
-        "sampling.to_world",
-        lambda vector, normal: (sampling.to_world(vector, normal), sampling.to_local(vector, normal)),
+    "sampling.discrete": _discrete,
+    "intersection.sphere": lambda dtype, origin, direction: Sphere.distance(
+        tuple(np.asarray(part, dtype) for part in SPHERE.row), origin, direction
     ),
-    function("intersection.sphere", _sphere),
-    function("intersection.quad", _quad),
-    function("intersection.slabs", _slabs),
-    *(function(name, _met(name)) for name in SCENES if name != "intersection.occluded"),
-    function("intersection.occluded", _occluded),
-    direct("material.ggx", distribution),
-    direct("material.schlick", schlick),
-    direct("material.visible_normal", sample_visible_normal),
-    direct("material.refracted", _refracted),
-    direct("material.fresnel", fresnel),
-    function("transport.light_pdf", _light_pdf),
-    function("material.lambertian", lambda given, dtype: _sampled(Lambertian, given)),
-    function("material.mirror", lambda given, dtype: _sampled(Mirror, given)),
-    function(
-        "material.conductor", lambda given, dtype: _sampled(Conductor, given, parameter=given["roughness"])
+    "intersection.quad": lambda dtype, origin, direction: Quad.distance(
+        tuple(np.asarray(part, dtype) for part in quad_row(QUAD)), origin, direction
     ),
-    function("material.conductor_value", _valued),
-    function(
-        "material.dielectric",
-        lambda given, dtype: _sampled(
-            Dielectric, given, parameter=given["ior"], outside=given["outside"] > 0.5
-        ),
+    "intersection.slabs": _slabs,
+    **{name: _met(name) for name in SCENES if name != "intersection.occluded"},
+    "intersection.occluded": _occluded,
+    "transport.light_pdf": _light_pdf,
+    "transport.unshadowed": lambda dtype, *surface: transport.unshadowed(_world(dtype), reflecting(*surface)),
+    "sky.radiance": _sky,
+    "sky.sample": lambda dtype, u0, u1, u_choice: environment.sample(
+        environment.build(SKY, dtype), u_choice, u0, u1
     ),
-    direct(
-        "transport.mis_weight",
-        lambda pdf, other: tuple(
-            transport.mis_weight(cast(Any, Heuristic(name)), pdf, other) for name in ("balance", "power")
-        ),
+}
+"""Functions with constants of a float type, by name."""
+
+UNTYPED: Mapping[str, Callable[..., Any]] = {
+    "vector": _vector,
+    "sampling.concentric_disk": sampling.sample_concentric_disk,
+    "sampling.cosine_hemisphere": _hemisphere,
+    "sampling.spherical_cauchy": _cauchy,
+    "sampling.quad": lambda u0, u1, corner, edge_u, edge_v: (
+        sampling.sample_quad(u0, u1, corner, edge_u, edge_v),
+        sampling.quad_pdf(edge_u, edge_v),
     ),
-    function("transport.unshadowed", _unshadowed),
-    function("sky.radiance", _sky),
-    function("sky.sample", _sky_sample),
+    "sampling.tangent_frame": sampling.tangent_frame,
+    "sampling.to_world": lambda vector, normal: (
+        sampling.to_world(vector, normal),
+        sampling.to_local(vector, normal),
+    ),
+    "material.ggx": distribution,
+    "material.schlick": schlick,
+    "material.visible_normal": sample_visible_normal,
+    "material.refracted": _refracted,
+    "material.fresnel": fresnel,
+    "material.lambertian": _sampled(Lambertian),
+    "material.mirror": _sampled(Mirror),
+    "material.conductor": _sampled(Conductor),
+    "material.conductor_value": _valued,
+    "material.dielectric": _sampled(Dielectric),
+    "transport.mis_weight": lambda pdf, other: tuple(
+        transport.mis_weight(cast(Any, Heuristic(name)), pdf, other) for name in ("balance", "power")
+    ),
+}
+"""All others."""
+
+FUNCTIONS = tuple(
+    function(name, TYPED.get(name) or UNTYPED[name], name in TYPED)
+    for name in ROWS["functions"]
+    if name in TYPED or name in UNTYPED
 )
-"""The functions of this module."""
+"""The functions of this module, in the order of the table."""

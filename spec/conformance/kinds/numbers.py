@@ -11,13 +11,13 @@ from ....refimpl import encoding, rng
 from ....refimpl.light import sobol
 from ....refimpl.network import adam
 from ..case import Kind, within
-from .tables import ROWS, direct, kind
+from .tables import ROWS, function, kind
 
 FUNCTIONS = (
-    direct("encoding.srgb", encoding.srgb_encode),
-    direct("encoding.display", encoding.to_display),
-    direct("sine", np.sin),
-    direct("adam.step", lambda theta, g, m, v, rate, *grown: adam.update(theta, g, m, v, rate, grown)),
+    function("encoding.srgb", encoding.srgb_encode),
+    function("encoding.display", encoding.to_display),
+    function("sine", np.sin),
+    function("adam.step", lambda theta, g, m, v, rate, *grown: adam.update(theta, g, m, v, rate, grown)),
 )
 """Kinds that are functions of floats; the contract of the sine is the emitted sine's."""
 

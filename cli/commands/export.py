@@ -8,7 +8,6 @@ import typer
 
 from ...compiler.artifact import schedule_text
 from ...kernels.export import check as checking
-from ...kernels.export import speed
 from ...kernels.export.hosts.host import host_named
 from ...kernels.export.motion import TIME, Motion
 from ...kernels.export.package import Export, Request, with_speed
@@ -136,13 +135,13 @@ def export(
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
     """Return the export that the options ask for; `measured`: it says how long it takes."""
     if measured:
-        speed.check_measured(target)
+        checking.check_measured(target)
     settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
     motion = shown.motion()
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
     how = (kernel.profile, kernel.weights or "", kernel.network(), settings, kernel.schedule or "")
     made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
-    return with_speed(made, speed.measure(made)) if measured else made
+    return with_speed(made, checking.measure(made)) if measured else made
 
 
 def _tell(made: Export) -> None:

@@ -30,9 +30,8 @@ from ...compiler.core.profiles import profile_named
 from ...compiler.plan import Plan, analysed
 from ...kernels.devices.kernel import Images
 from ...kernels.devices.registry import EXECUTORS, WAYS
-from ...kernels.judge import apart
 from ...kernels.judge.reduce import Box, Reduced, reduced
-from ...kernels.judge.triage import Compile, Judge, Kernel, Verdict, conclusion, kernels_of, odd_ones
+from ...kernels.judge.triage import Apart, Compile, Judge, Kernel, Verdict, conclusion, kernels_of, odd_ones
 from ...kernels.run.denoise_on import images_of
 from ...refimpl.errors import ExecutorUnavailable, InputError, choice
 from ...refimpl.frame import Frame
@@ -112,17 +111,17 @@ class Task:
         return self.kept.compiled if self.kept else compiling.compile_plan
 
 
-def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[apart.Apart]:
+def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[Apart]:
     """Open executors by name, each in a process of its own: all that are here, or those that are wanted."""
     for name in wanted:
         if name not in {*WAYS, *EXECUTORS}:
             raise InputError("--executor", name, "unknown", choice(name, dict.fromkeys([*EXECUTORS, *WAYS])))
-    runners: list[apart.Apart] = []
+    runners: list[Apart] = []
     for way, (name, _) in WAYS.items():
         if wanted and not {way, name} & set(wanted):
             continue
         try:
-            runners.append(opened.enter_context(apart.Apart(way)))
+            runners.append(opened.enter_context(Apart(way)))
         except ExecutorUnavailable as error:
             if way in wanted:
                 raise
@@ -132,7 +131,7 @@ def open_runners(wanted: Sequence[str], opened: ExitStack) -> list[apart.Apart]:
     return runners
 
 
-def _judged(task: Task, runners: Sequence[apart.Apart]) -> list[Verdict]:
+def _judged(task: Task, runners: Sequence[Apart]) -> list[Verdict]:
     """Run all kernels on the whole frame."""
     program, size = lower(task.model), (task.frame.height, task.frame.width)
     # The schedule that an executor would pick is not that of the kept kernel.

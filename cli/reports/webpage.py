@@ -13,8 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...kernels.run.page import Animation, networks_of, page_data
-from ...kernels.run.webassembly import compiler
+from ...kernels.run.page import Animation, compiler, networks_of, page_data
 from ...models.data.scene_source import scene_source
 from ...refimpl.errors import NO_VALUE, InputError
 from ...refimpl.network.denoise import Model

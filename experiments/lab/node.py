@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wamnet.compiler.artifact import Artifact
-from wamnet.kernels.run.webassembly import module_of
+from wamnet.kernels.run.page import module_of
 from wamnet.refimpl.errors import ExecutorUnavailable
 
 PROGRAM = """

@@ -6,7 +6,8 @@
    [`drawn_together`].
 2. The encoding of the features is split where they are more than colour buffers [`encoders`].
 3. Each variant of the network is one or two passes, with its bound [`variant`]. One of them is no shader
-   but a module of WebAssembly, several times as fast as shaders that run on a processor.
+   but a module of WebAssembly, several times as fast as shaders that run on a processor: it imports nothing,
+   and exports its memory, its first free byte (`__heap_base`) and `wamnet_rows` of C executors [`module_of`].
 4. A page cannot trust its compiler (GLSL ES 3.00 has no `precise`): it carries a small picture's features,
    and for each variant the reference's output in float64 with a bound for each number [`check`]; of a network
    of integers, whose bits every device has, the SHA-256 of the output too.
@@ -17,10 +18,16 @@ Everything is JSON's types; arrays are base64 of little-endian numbers. spec/web
 from __future__ import annotations
 
 import base64
+import importlib.util
 import math
+import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,7 +56,7 @@ from ...compiler.schedules.common import kernel_gather, output_channels
 from ...compiler.schedules.plain import WEIGHTS_A_TEXEL
 from ...compiler.variants import parse, vary
 from ...refimpl import rng
-from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.errors import NO_VALUE, CompileError, ExecutorUnavailable, InputError
 from ...refimpl.light import transport
 from ...refimpl.light.render import Job, feature_settings, render
 from ...refimpl.light.scene import Scene
@@ -61,7 +68,8 @@ from ...refimpl.network import factored
 from ...refimpl.network.dataset import FEATURES, feature_image
 from ...refimpl.network.denoise import Model, check_model, learned_shadow_rays
 from ...refimpl.network.whole import INPUT_LEVELS, WEIGHT_LEVELS, round_image
-from . import webassembly
+from .. import cache
+from ..devices.c_executor import MOST_TOLD, glue_of
 from .denoise_on import bound_of, products_of
 
 SCHEMA = "wamnet-page-6"
@@ -353,7 +361,7 @@ def _pass(kernel: Artifact, packed: Artifact | None) -> dict[str, Any]:
     if packed is None:
         return {"source": kernel.source, "weights": _weights(kernel.weights), **found}
     return {
-        "module": base64.b64encode(webassembly.module_of(kernel)).decode(),
+        "module": base64.b64encode(module_of(kernel)).decode(),
         "channels": [image.channels for image in images],
         "rows": kernel.manifest["schedule"].get("rows", 1),
         "weights": _transformed(kernel, packed),
@@ -405,3 +413,48 @@ def check(
 def _packed(array: NDArray[Any], kind: str = "<f4") -> str:
     """Return the numbers as base64."""
     return base64.b64encode(np.ascontiguousarray(array, kind).tobytes()).decode()
+
+
+# ---- WebAssembly ------------------------------------------------------------------------------------------
+
+
+ZIG_OPTIONS = (
+    "-target", "wasm32-wasi", "-mcpu=generic+simd128", "-mexec-model=reactor", "-std=gnu99", "-O3",
+    "-ffp-contract=off", "-nostartfiles", "-Wl,--strip-all", "-Wl,--export=wamnet_rows",
+    "-Wl,--export=__heap_base",
+)  # fmt: skip
+"""No start, no file, no debugging: a page needs one function."""
+
+
+def compiler() -> list[str]:
+    """Return the words that call Zig; none where it is not there."""
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang"]
+    return [*filter(None, [shutil.which("zig")])]
+
+
+def module_of(artifact: Artifact) -> bytes:
+    """Return a kernel in C as a module.
+
+    Raises `ExecutorUnavailable` without Zig, `CompileError` where it does not build the kernel.
+    """
+    command = compiler()
+    if not command:
+        raise ExecutorUnavailable("zig is not installed: pip install ziglang")
+    glue = glue_of(artifact, "denoise.h")
+
+    def built() -> str:
+        with tempfile.TemporaryDirectory(prefix="wamnet-") as name:
+            folder = Path(name)
+            (folder / "denoise.h").write_text(artifact.source, encoding="utf-8")
+            (folder / "page.c").write_text(glue, encoding="utf-8")
+            done = subprocess.run(
+                [*command, "cc", *ZIG_OPTIONS, "-o", "page.wasm", "page.c"],
+                cwd=folder, capture_output=True, text=True, check=False, errors="replace",
+            )  # fmt: skip
+            if done.returncode:
+                raise CompileError(f"zig: {done.stderr.strip()[:MOST_TOLD] or 'no module'}; update ziglang")
+            return base64.b64encode((folder / "page.wasm").read_bytes()).decode()
+
+    version = subprocess.run([*command, "version"], capture_output=True, text=True, check=False).stdout
+    return base64.b64decode(cache.kept("webassembly", [version, *ZIG_OPTIONS, artifact.source, glue], built))

@@ -15,7 +15,6 @@ from wamnet.compiler import artifact
 from wamnet.compiler import compile as compiling
 from wamnet.compiler.core.ir import sha256
 from wamnet.kernels.devices.registry import WAYS
-from wamnet.kernels.judge import apart
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.models.model_file import load_model
 from wamnet.refimpl.errors import ExecutorUnavailable
@@ -172,7 +171,7 @@ def test_one_that_is_not_here_is_told(wamnet, here, monkeypatch, refused) -> Non
     def missing(way: str) -> None:
         raise ExecutorUnavailable(f"{way}: gone")
 
-    monkeypatch.setattr(apart, "Apart", missing)
+    monkeypatch.setattr("wamnet.cli.commands.triage.Apart", missing)
     command = ("triage", "model.safetensors", "noisy.exr", "--executor", "opengl")
     outcome = wamnet(*command)
     assert outcome.status == 2

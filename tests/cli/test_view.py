@@ -14,7 +14,7 @@ import pytest
 
 from wamnet.cli.commands import view
 from wamnet.cli.reports import webpage
-from wamnet.kernels.run.webassembly import compiler
+from wamnet.kernels.run.page import compiler
 from wamnet.models.model_file import load_model, save_model
 from wamnet.refimpl.light import scenes
 

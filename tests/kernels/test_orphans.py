@@ -26,7 +26,7 @@ POOL = (
 """A render on two processes that reports when they work."""
 
 APART = (
-    "import time; from wamnet.kernels.judge.apart import Apart\n"
+    "import time; from wamnet.kernels.judge.triage import Apart\n"
     "if __name__ == '__main__':\n"
     "    with Apart('numpy'): print('ready', flush=True); time.sleep(600)\n"
 )

@@ -13,9 +13,9 @@ from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import plan_program
 from wamnet.kernels.devices.registry import EXECUTORS, OPTIONS, WAYS
-from wamnet.kernels.judge import apart, triage
-from wamnet.kernels.judge.apart import Apart, Outcome, attempt
+from wamnet.kernels.judge import triage
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
+from wamnet.kernels.judge.triage import Apart, Outcome, attempt
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network.dataset import Normalization, Window
 from wamnet.refimpl.network.denoise import Model
@@ -331,4 +331,4 @@ def test_a_failure_that_comes_once_is_told(executor_named, model, images):
 def test_lines_have_no_line_ends():
     """A driver's log has many: a verdict is one line."""
     executor = SimpleNamespace(run=lambda *_: (_ for _ in ()).throw(RuntimeError("a\n  b")))
-    assert apart.attempt(executor, None, {}).failure == "RuntimeError: a b"
+    assert attempt(executor, None, {}).failure == "RuntimeError: a b"

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from wamnet.kernels.bench.workload import random_model
+from wamnet.kernels.export.check import MS, measure
 from wamnet.kernels.export.package import README_NAME, Request, export, with_speed
-from wamnet.kernels.export.speed import MS, measure
 from wamnet.refimpl.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[3]

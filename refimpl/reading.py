@@ -68,12 +68,12 @@ def read_file(
     """
     shown = os.fspath(path)
     try:
-        _check_regular(Path(path).stat(), what, shown)
+        check_regular(Path(path).stat(), what, shown)
         # Between the two looks the name may have come to stand for a pipe, which must not make us wait.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
             found = os.fstat(handle)
-            _check_regular(found, what, shown)
+            check_regular(found, what, shown)
             wanted = found.st_size <= most and stated in (None, found.st_size)
             content = file.read(most + 1 if stated is None else stated) if wanted else b""
             size = max(found.st_size, len(content))
@@ -90,7 +90,7 @@ def read_file(
     return content
 
 
-def _check_regular(found: os.stat_result, what: str, shown: str) -> None:
+def check_regular(found: os.stat_result, what: str, shown: str) -> None:
     """Refuse what is not a regular file."""
     if stat.S_ISDIR(found.st_mode):
         raise InputError(what, shown, "is a folder", "give the name of a file in it")

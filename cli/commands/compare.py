@@ -4,11 +4,11 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import typer
 
 from ... import kernels
+from ...kernels.cache import clean
 from ...kernels.judge.compare_images import ImageReport, check_samples, compare_images
 from ...kernels.judge.compare_paths import PathReport, View
 from ...kernels.judge.compare_paths import compare_paths as compare_paths_of
@@ -82,20 +82,11 @@ def compare_paths(
             image = compare_images(device, scene, job, on_progress=advance)
     if as_json:
         parts = {key: {**asdict(r), "passed": r.passed} for key, r in (("paths", paths), ("image", image))}
-        typer.echo(json.dumps({"scene": name, "device": device.device, **_finite(parts)}))
+        typer.echo(json.dumps({"scene": name, "device": device.device, **clean(parts)}))
     else:
         _print(f"{name} on {device.device}", paths, image)
     if not (paths.passed and image.passed):
         raise typer.Exit(STATUS_WRONG)
-
-
-def _finite(data: Any) -> Any:
-    """Return data with None instead of numbers that JSON does not know."""
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not abs(data) < float("inf") else data
 
 
 def _print(title: str, paths: PathReport, image: ImageReport) -> None:

@@ -12,6 +12,7 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.light.scenes import CANONICAL, canonical
 from ...refimpl.light.variation import RANGES, outside, ranges_from_json
 from ...refimpl.network.denoise import Model
+from ...refimpl.reading import check_regular
 from . import options
 from .terminal import tell
 
@@ -24,13 +25,9 @@ CHECKPOINT_MARK = ".checkpoint"
 
 def check_input(path: Path) -> None:
     """Refuse an input that is not a file."""
-    if path.is_dir():
-        raise InputError("input file", str(path), "is a folder", "give the name of a file in it")
     if not path.exists():
         raise InputError("input file", str(path), "not found", "check the name")
-    if not path.is_file():
-        rule = "is a pipe or a device, not a regular file"
-        raise InputError("input file", str(path), rule, "give a file on a disk")
+    check_regular(path.stat(), "input file", str(path))
 
 
 def model_path(path: Path) -> Path:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from wamnet.kernels.cache import clean
 from wamnet.refimpl.errors import escaped
 
 from .cases import RULES
@@ -24,7 +25,7 @@ SCHEMA = "wamnet-verify-1"
 
 
 def entry(verdict: Verdict) -> dict[str, Any]:
-    """Return a verdict for JSON."""
+    """Return a verdict for JSON, but for numbers that it does not know."""
     question = verdict.question
     return {
         "name": question.name,
@@ -33,20 +34,15 @@ def entry(verdict: Verdict) -> dict[str, Any]:
         "source": question.source,
         "shot": question.shot.name,
         "state": verdict.state,
-        "mean": _finite(verdict.mean),
-        "answer": _finite(verdict.answer),
-        "half_width": _finite(verdict.half_width),
+        "mean": verdict.mean,
+        "answer": verdict.answer,
+        "half_width": verdict.half_width,
         "p": verdict.p,
-        "detects": _finite([verdict.detects])[0],
+        "detects": verdict.detects,
         "note": verdict.note,
         "profile": verdict.profile,
         "confirmed": verdict.confirmed,
     }
-
-
-def _finite(values: Sequence[float]) -> list[float | None]:
-    """Return numbers that JSON knows."""
-    return [value if math.isfinite(value) else None for value in values]
 
 
 def to_json(renderer: str, verdicts: Sequence[Verdict], about: Mapping[str, Any]) -> str:
@@ -61,7 +57,7 @@ def to_json(renderer: str, verdicts: Sequence[Verdict], about: Mapping[str, Any]
         "look_first_at": None if first is None else {"rule": first.rule, "case": first.question.name},
         "verdicts": [entry(verdict) for verdict in verdicts],
     }
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+    return json.dumps(clean(data), indent=1, allow_nan=False) + "\n"
 
 
 def row(verdict: Verdict) -> tuple[str, ...]:

@@ -72,8 +72,8 @@ def _statements(body: tree.Body) -> Iterator[tree.Statement]:
             yield replace(statement, sizes=sizes, kept=False, register=False)
         elif not isinstance(statement, tree.Comment):
             own: dict[str, Any] = {"how": "loop"} if isinstance(statement, tree.For) else {}
-            inner = {key: tuple(_statements(each)) for key, each in vars(statement).items() if key in BODIES}
-            yield replace(statement, **own, **inner)
+            own |= {key: tuple(_statements(each)) for key, each in vars(statement).items() if key in BODIES}
+            yield replace(statement, **own)
 
 
 def _writes(loop: tree.For) -> bool:

@@ -13,7 +13,7 @@ For |x| <= DOMAIN, u = 2**-24:
    the range.
 3. sin(x) = (-1)**k sin(r); the sign is 1 - 2 (k - 2 floor(k / 2)), exact.
 4. sin(r) ~ r + r (z q(z)), z = r r: odd, of degree 3 to 13, with float32 coefficients; approximation error
-   `approximation_error` (proven by experiments/sine_coefficients.py). Its rounding is bounded by the
+   `approximation_error` (proven by experiments/sine_errors.py). Its rounding is bounded by the
    compiler's own rules (bounds.py), which hold with and without fused multiply-add. Below degree 7 the first
    coefficient is not 1, which makes the absolute error smaller and gives up the relative one near 0.
 5. The result is clamped to [-1, 1], which cannot move it away from sin(x).

@@ -1,12 +1,13 @@
 """What the tests of the commands share: a way to run one, and small frames and a model to run them on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from small_page import SmallPage, make
+from browser import Tab
+from small_page import NO_MOTION, SmallPage, make
 
 from wamnet.cli.files import exr
 from wamnet.cli.main import main
@@ -84,3 +85,17 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_page(kit: Any, tmp_path_factory: pytest.TempPathFactory) -> SmallPage:
     """A page that is drawn in a moment, for the tests in a browser."""
     return make(kit, tmp_path_factory.mktemp("page"))
+
+
+@pytest.fixture(scope="module")
+def path(small_page: SmallPage) -> Path:
+    """The file of that page."""
+    return small_page.path
+
+
+@pytest.fixture(scope="module")
+def still(chromium: Any, path: Path) -> Iterator[Tab]:
+    """A tab whose animation stands still, ready."""
+    with chromium.tab(path, **NO_MOTION) as tab:
+        tab.page.evaluate("wamnet.ready")
+        yield tab

@@ -239,7 +239,6 @@ def test_a_film_s_folder_with_more_in_it_stays(wamnet, tmp_path) -> None:
         (["--yaw", 999], "yaw_deg 999.0: must be a number from -180 to 180"),
         (["--light", "3=1,1,1"], "--light '3=1,1,1': the scene's lights are 1 to 2"),
         (["--set", "fps=1"], "parameter 'fps': unknown to scene minicubes (choose one of time, warm"),
-        (["--set", "warm=1"], "parameter warm 1.0: scene minicubes needs three numbers"),
         (
             ["--fps", 0.001, "--seconds", 2000, "-o", "a.gif"],
             "--fps 0.001: a GIF shows each frame for 655.35 s at most (use more, or .mp4",

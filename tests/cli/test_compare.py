@@ -129,7 +129,6 @@ def test_unexplained_components_in_words() -> None:
         (("--paths", "empty", "--exposure", 0), "argument '--exposure': has no meaning with --paths"),
         (("--paths", "nowhere"), "scene 'nowhere': unknown"),
         (("--paths", "empty", "--width", 0), "width 0: must be an integer from 1 to 65536"),
-        (("--paths", "empty", "--max-depth", -1), "max_depth -1: must be an integer of 0 or more"),
         (("--paths", "empty", "--executor", "numpy", "--spp", 1), "spp 1: Welch's test needs the variance"),
     ],
 )

@@ -210,29 +210,36 @@ def test_links_in_a_data_set_are_refused_before_anything_changes(tmp_path, name)
     assert make(folder)[0] == 18
 
 
-@pytest.mark.parametrize("name", ["thesis.txt", f"train-00000-noisy.0-6.{64 * '0'}.exr"])
-def test_other_files_in_the_unfinished_folder_are_refused(tmp_path, name) -> None:
-    """They stay: one of another name, and a link of a band's."""
-    with files.Store.open(tmp_path / "a", REQUEST, plan(REQUEST)):
-        pass
-    mine = tmp_path / "a" / files.UNFINISHED / name
-    if mine.suffix == ".txt":
-        mine.write_text("precious")
-    else:
-        mine.symlink_to(tmp_path)
-    with pytest.raises(InputError, match=r"is not one of the files that wamnet writes there \(move it"):
-        make(tmp_path / "a")
-    assert mine.exists()
+def text(path: Path) -> None:
+    path.write_text("precious")
 
 
-def test_a_manifest_that_is_a_link_is_refused(tmp_path) -> None:
-    """It would be replaced when the data set is finished."""
+def link(path: Path) -> None:
+    path.symlink_to(path.parents[1])
+
+
+def moved(path: Path) -> None:
+    path.rename(path.parents[1] / "m.json")
+    path.symlink_to(path.parents[1] / "m.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "put", "rule"),
+    [
+        (f"{files.UNFINISHED}/thesis.txt", text, r"that wamnet writes there \(move it"),
+        (f"{files.UNFINISHED}/train-00000-noisy.0-6.{64 * '0'}.exr", link, r"writes there \(move it"),
+        (files.MANIFEST, moved, r"manifest\.json': is not one of the files"),
+    ],
+)
+def test_other_files_in_a_data_set_are_refused(tmp_path, name, put, rule) -> None:
+    """They stay: one of another name, a link of a band's, and one of the manifest's, which is replaced."""
     with files.Store.open(tmp_path / "a", REQUEST, plan(REQUEST)):
         pass
-    (tmp_path / "a" / files.MANIFEST).rename(tmp_path / "m.json")
-    (tmp_path / "a" / files.MANIFEST).symlink_to(tmp_path / "m.json")
-    with pytest.raises(InputError, match=r"manifest\.json': is not one of the files"):
+    path = tmp_path / "a" / name
+    put(path)
+    with pytest.raises(InputError, match=rule):
         make(tmp_path / "a")
+    assert path.exists()
 
 
 def test_a_pipe_is_no_picture(tmp_path) -> None:
@@ -299,17 +306,13 @@ def test_a_journal_that_is_damaged(tmp_path, whole, line) -> None:
 )
 def test_manifests_that_are_none(tmp_path, old, new, text) -> None:
     """One line each; a name never leads out of the folder."""
+    with pytest.raises(InputError, match=r"has no manifest.json \(make one: wamnet dataset"):
+        files.read_manifest(tmp_path)
     make(tmp_path)
     path = tmp_path / files.MANIFEST
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(InputError, match=text):
-        files.read_manifest(tmp_path)
-
-
-def test_a_folder_without_a_manifest(tmp_path) -> None:
-    """And the way to one."""
-    with pytest.raises(InputError, match=r"has no manifest.json \(make one: wamnet dataset"):
         files.read_manifest(tmp_path)
 
 

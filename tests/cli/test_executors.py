@@ -8,6 +8,7 @@ import pytest
 from wamnet.cli.commands import animate, dataset, denoise, render, train
 from wamnet.cli.common.request import spread
 from wamnet.kernels.devices import registry
+from wamnet.refimpl.errors import ExecutorUnavailable
 
 COMMANDS = (render.render, train.train, dataset.dataset, denoise.denoise, animate.animate)
 """Those that choose by themselves."""
@@ -58,3 +59,26 @@ def test_work_for_numpy_alone(wamnet, monkeypatch, arguments, because) -> None:
     monkeypatch.delenv("WAMNET_EXECUTOR")
     outcome = wamnet("render", "furnace", "--width", 4, "--height", 4, *arguments)
     assert outcome.out.splitlines()[0] == f"executor numpy: {because}"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "render furnace --width 4 --height 4",
+        "dataset minicubes --frames 2 --test 1 --size 12 --spp 4",
+        "train -i noisy.exr -t reference.exr --features color",
+        "denoise model.safetensors noisy.exr",
+    ],
+)
+def test_a_device_that_is_missing(refused, samples, tmp_path, monkeypatch, command) -> None:
+    """One line with the reason. A folder that asks for it would refuse the request for another executor."""
+
+    def missing(name: str) -> None:
+        raise ExecutorUnavailable(f"{name}: no device was found; install one")
+
+    for module in ("wamnet.kernels", "wamnet.kernels.run.render_frame"):
+        monkeypatch.setattr(f"{module}.open_executor", missing)
+    shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
+    line = refused(*command.split(), "--executor", "opencl")
+    assert line == "wamnet: error: opencl: no device was found; install one\n"
+    assert not [path for path in tmp_path.iterdir() if path.is_dir()]

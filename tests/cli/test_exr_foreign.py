@@ -53,10 +53,20 @@ def view(name: str) -> bytes:
         ([RawPart(planes(1), name="ViewLayer")], "", {"color": 1}),
         ([RawPart(planes(1, "Image."))], "", {"color": 1}),
         ([RawPart(planes(1) | planes(5, "r.", "XYZ"), view("r"), "rgba")], "", {"color": 1}),
+        ([RawPart(planes(1), name="a"), RawPart(planes(5, "albedo."), name="b")], "",
+         {"color": 1, "albedo": 5}),
+        ([RawPart(planes(5, "beauty.") | planes(1))], "", {"color": 1}),
+        ([RawPart(planes(5, "V.Combined.") | planes(1, "V.Noisy Image."))], "", {"color": 1}),
+        ([RawPart(planes(1, names="RGBY"))], "", {"color": 1}),
+        ([RawPart(planes(1, names="RGBZ"))], "", {"color": 1, "depth": 4}),
     ],
 )  # fmt: skip
 def test_views_and_parts(tmp_path: Path, parts: list[RawPart], chosen: str, layers: dict[str, int]) -> None:
-    """The first view, or the one that is named; a part's name is a layer's."""
+    """The first view, or the one that is named; a part's name is a layer's.
+
+    Where Blender writes a noisy image beside `Combined`, that one is denoised. Luminance does not count as
+    depth.
+    """
     frame = exr.read_frame(write_raw(tmp_path / "a.exr", *parts), view_layer=chosen)
     assert {name: pixels[0, 0, 0] for name, pixels in frame.layers.items()} == layers
     assert all((np.diff(pixels) == 1).all() for pixels in frame.layers.values())

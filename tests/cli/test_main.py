@@ -26,6 +26,8 @@ COMMANDS = (
         "demo",
 )  # fmt: skip
 
+OF_BENCH = ("bench render", "bench train", "bench pipeline", "bench exports", "bench primitives")
+
 
 def run_process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run the installed command in a process of its own."""
@@ -62,10 +64,10 @@ def test_a_shell_completes_commands_options_and_choices(tmp_path, line, complete
     assert (done.returncode, set(done.stdout.split()), done.stderr) == (0, completed, "")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, *OF_BENCH])
 def test_each_help_has_examples(wamnet, command) -> None:
     """And defaults, where there are options."""
-    outcome = wamnet(command, "--help")
+    outcome = wamnet(*command.split(), "--help")
     assert outcome.status == 0
     assert f"wamnet {command}" in outcome.out.split("Example")[1]
     assert "default:" in outcome.out or command == "executors"
@@ -114,6 +116,25 @@ def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, 
     )
 
 
+class HalfMade:
+    """An object whose `__init__` is cut short lacks attributes when it is deleted: of no use to anyone."""
+
+    def __init__(self) -> None:
+        raise KeyboardInterrupt
+
+    def __del__(self) -> None:
+        self.connection.close()
+
+
+def fails(error: BaseException):
+    """Return a command that fails."""
+
+    def fail(*_args: object, **_options: object) -> None:
+        raise error
+
+    return fail
+
+
 @pytest.mark.parametrize(
     ("error", "said"),
     [
@@ -124,35 +145,20 @@ def test_commands_of_other_distributions(refused, wamnet, monkeypatch, command, 
 )
 def test_errors_of_the_system_and_of_training_are_one_line(refused, monkeypatch, error, said) -> None:
     """A full disk is not a bug; an error of training is a plain sentence, perhaps over several lines."""
-
-    def fail(*_args: object, **_options: object) -> None:
-        raise error
-
-    monkeypatch.setattr(module, "application", lambda _: fail)
+    monkeypatch.setattr(module, "application", lambda _: fails(error))
     assert said in refused("render").removeprefix("wamnet: error: ")
 
 
-def test_bugs_keep_their_traceback(wamnet, monkeypatch) -> None:
-    """What no user can cause is not hidden."""
-
-    def fail(*_args: object, **_options: object) -> None:
-        raise ZeroDivisionError("a bug")
-
-    monkeypatch.setattr(module, "application", lambda _: fail)
+def test_ctrl_c_and_a_bug(wamnet, monkeypatch) -> None:
+    """Status 130 and no traceback, which a bug keeps: what no user can cause is not hidden."""
+    for command in (fails(KeyboardInterrupt()), lambda *_args, **_options: HalfMade()):
+        monkeypatch.setattr(module, "application", lambda _, command=command: command)
+        assert wamnet("render") == (130, "", "wamnet: interrupted\n")
+    monkeypatch.setattr(module, "application", lambda _: fails(ZeroDivisionError("a bug")))
     with pytest.raises(ZeroDivisionError, match="a bug"):
         wamnet("render")
-
-
-def test_ctrl_c(wamnet, monkeypatch) -> None:
-    """Status 130 and no traceback."""
-
-    def interrupt(*_args: object, **_options: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(module, "application", lambda _: interrupt)
-    assert wamnet("render") == (130, "", "wamnet: interrupted\n")
     monkeypatch.undo()
-    monkeypatch.setattr("wamnet.cli.commands.render.load_scene", interrupt)
+    monkeypatch.setattr("wamnet.cli.commands.render.load_scene", fails(KeyboardInterrupt()))
     assert wamnet("render", "minicubes").status == 130
 
 
@@ -163,29 +169,6 @@ def test_as_a_process(tmp_path) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith("wamnet: error: scene 'nowhere': unknown (choose one of")
     assert run_process("--version", cwd=tmp_path).returncode == 0
-
-
-@pytest.mark.nightly(but="True")
-@pytest.mark.parametrize("whole_group", [True, False])
-def test_ctrl_c_in_a_process_leaves_nothing(tmp_path, whole_group) -> None:
-    """A long render with two workers is interrupted, by a terminal or by a program that knows one process.
-
-    No file is left, whole or half, and no traceback.
-    """
-    arguments = ("render", "minicubes", "--spp", "100000", "--workers", "2", "-o", "a.exr")
-    command = [sys.executable, "-m", "wamnet.cli", *arguments]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, start_new_session=True) as process:
-        try:
-            time.sleep(3)
-            assert process.poll() is None
-            (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
-            _, errors = process.communicate(timeout=30)
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    assert process.returncode == 130
-    assert errors == b"wamnet: interrupted\n"
-    assert not list(tmp_path.iterdir())
 
 
 def test_help_imports_nothing_heavy(tmp_path) -> None:
@@ -220,20 +203,6 @@ def test_help_may_be_a_value(refused) -> None:
     assert "output file '--help': must end in .exr or .png" in refused("render", "minicubes", "-o", "--help")
 
 
-def test_ctrl_c_while_an_object_is_made(wamnet, monkeypatch) -> None:
-    """An object whose `__init__` is cut short lacks attributes when it is deleted: of no use to anyone."""
-
-    class HalfMade:
-        def __init__(self) -> None:
-            raise KeyboardInterrupt
-
-        def __del__(self) -> None:
-            self.connection.close()
-
-    monkeypatch.setattr(module, "application", lambda _: lambda *_args, **_options: HalfMade())
-    assert wamnet("render") == (130, "", "wamnet: interrupted\n")
-
-
 def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
     """As the system does when the memory ends."""
     code = (
@@ -252,11 +221,14 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path) -> None:
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.nightly(but=("2-0.9", "15-1.3"))
+@pytest.mark.nightly(but=("2-killpg-0.9", "15-kill-1.3", "2-kill-4.0"))
 @pytest.mark.parametrize("seconds", [0.9, 1.3, 1.8, 4.0])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signals_end_the_workers(tmp_path, number, seconds) -> None:
-    """SIGTERM only to the parent, SIGINT to all, while the workers start and later: no process is left."""
+@pytest.mark.parametrize(
+    ("number", "send"), [(signal.SIGTERM, "kill"), (signal.SIGINT, "killpg"), (signal.SIGINT, "kill")]
+)
+def test_signals_end_the_workers(tmp_path, number, send, seconds) -> None:
+    """To the parent, as of a program that knows one process, or to all as of a terminal, while the workers
+    start and later: no process is left, no file, whole or half, and no traceback."""
     arguments = ("render", "minicubes", "--spp", "100000", "--workers", "2", "-o", "a.exr")
     code = (
         "import sys; from wamnet.cli.main import main\n"
@@ -272,7 +244,8 @@ def test_signals_end_the_workers(tmp_path, number, seconds) -> None:
         try:
             process.stdout.readline()
             time.sleep(seconds)
-            (os.kill if number == signal.SIGTERM else os.killpg)(process.pid, number)
+            assert process.poll() is None
+            getattr(os, send)(process.pid, number)
             # The workers have these pipes too: the reading ends when the last of them has ended.
             _, errors = process.communicate(timeout=30)
         finally:

@@ -34,31 +34,16 @@ def test_the_frame_is_the_references(wamnet, tmp_path) -> None:
 
 def test_double_precision_and_parameters(wamnet, tmp_path) -> None:
     """A furnace is uniform: float64 in the file is float64 rounded to float32."""
-    arguments = [
-        "--set",
-        "albedo=0.25",
-        "--dtype",
-        "float64",
-        "--width",
-        3,
-        "--height",
-        2,
-        "--executor",
-        "numpy",
-    ]
-    assert wamnet("render", "furnace", *arguments, "-o", "f.exr").status == 0
+    arguments = "--set albedo=0.25 --dtype float64 --width 3 --height 2 --executor numpy -o f.exr"
+    assert wamnet("render", "furnace", *arguments.split()).status == 0
     want = render(canonical("furnace", albedo=0.25), Job(3, 2, dtype="float64")).frame
     assert (exr.read_frame(tmp_path / "f.exr")["color"] == want["color"].astype(np.float32)).all()
 
 
 def test_three_numbers(wamnet, tmp_path) -> None:
     """A colour is three numbers."""
-    assert (
-        wamnet(
-            "render", "minicubes", "--set", "warm=1,0,0", "--width", 4, "--height", 3, "-o", "a.exr"
-        ).status
-        == 0
-    )
+    arguments = "--set warm=1,0,0 --width 4 --height 3 -o a.exr"
+    assert wamnet("render", "minicubes", *arguments.split()).status == 0
     want = scene_digest(canonical("minicubes", warm=(1.0, 0.0, 0.0)))
     assert exr.read_frame(tmp_path / "a.exr").info["scene_digest"] == want
 
@@ -99,22 +84,16 @@ def test_camera_and_lamps_are_options(wamnet, tmp_path) -> None:
     assert np.allclose(np.divide(color, color[1]), [0.4, 1.0, 0.6], rtol=8 * 2.0**-53, atol=0)
 
 
-def test_a_scene_that_is_written_has_its_camera(wamnet, tmp_path) -> None:
-    assert wamnet("scene", "minicubes", "--yaw", 20, "-o", "mine.json").status == 0
-    assert wamnet("render", "mine.json", "--width", 4, "--height", 3).status == 0
-    assert wamnet("render", "minicubes", "--yaw", 20, "--width", 4, "--height", 3, "-o", "a.exr").status == 0
-    mine, named = (exr.read_frame(tmp_path / name) for name in ("mine.exr", "a.exr"))
-    assert (mine["color"] == named["color"]).all()
-    assert mine.info["yaw_deg"] == named.info["yaw_deg"] == "20.0"
-
-
 def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
-    """Written by `wamnet scene`, read by `wamnet render`."""
-    assert wamnet("scene", "minicubes", "--time", 2, "-o", "mine.json").out == "mine.json\n"
+    """Written by `wamnet scene`, read by `wamnet render`; with its camera."""
+    look = ("--time", 2, "--yaw", 20)
+    assert wamnet("scene", "minicubes", *look, "-o", "mine.json").out == "mine.json\n"
     assert wamnet("render", "mine.json", "--width", 4, "--height", 3).status == 0
-    want = render(canonical("minicubes", time=2.0), Job(4, 3)).frame
-    assert (exr.read_frame(tmp_path / "mine.exr")["color"] == want["color"]).all()
-    assert wamnet("scene", "minicubes", "--time", 2).out == (tmp_path / "mine.json").read_text()
+    varied = variation.varied(canonical("minicubes", time=2.0), variation.Variation(20.0))
+    mine, want = exr.read_frame(tmp_path / "mine.exr"), render(varied, Job(4, 3)).frame
+    assert (mine["color"] == want["color"]).all()
+    assert mine.info["yaw_deg"] == "20.0"
+    assert wamnet("scene", "minicubes", *look).out == (tmp_path / "mine.json").read_text()
 
 
 @pytest.mark.parametrize(
@@ -125,17 +104,9 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "--set", "orbit"], "--set 'orbit': must be NAME=NUMBER or NAME=NUMBER,NUMBER,NUMBER"),
         (["minicubes", "--set", "warm=x"], "--set 'warm=x': must be"),
         (["minicubes", "--set", "warm=1,2"], "--set 'warm=1,2': must be"),
-        (["minicubes", "--set", "albedo=1"],
-         "parameter 'albedo': unknown to scene minicubes (choose one of time, "),
         (["minicubes", "--set", "warm=1"],
          "parameter warm 1.0: scene minicubes needs three numbers with commas"),
-        (["furnace", "--set", "albedo=1,2,3"],
-         "parameter albedo (1.0, 2.0, 3.0): scene furnace needs one number"),
-        (["minicubes", "--yaw", "181"], "yaw_deg 181.0: must be a number from -180 to 180 (choose"),
         (["minicubes", "--yaw", "nan"], "yaw_deg nan: must be a number from -180 to 180"),
-        (["minicubes", "--pitch", "-86"], "pitch_deg -86.0: must be a number from -85 to 85"),
-        (["minicubes", "--distance", "0"], "distance 0.0: must be a number from 0.1 to 10"),
-        (["minicubes", "--distance", "inf"], "distance inf: must be a number from 0.1 to 10"),
         (["minicubes", "--light", "1,1,1"],
          "--light '1,1,1': must be N=R,G,B: a light's number and its colour (for example --light 1="),
         (["minicubes", "--light", "1=1,2"], "--light '1=1,2': must be N=R,G,B"),
@@ -149,11 +120,10 @@ def test_a_scene_file_renders_the_same(wamnet, tmp_path) -> None:
         (["minicubes", "--light", "1=1,1,1", "--light", "1=1,1,0"],
          "--light '1=1,1,0': light 1 already has a colour (give one per light"),
         (["minicubes", "--width", "0"], "width 0: must be an integer from 1 to"),
-        (["minicubes", "--spp", "-1"], "spp -1: must be an integer from 1 to"),
-        (["minicubes", "--seed", "-1"], "seed -1: must be an integer from 0 to"),
-        (["minicubes", "--feature-spp", "-1"], "feature_spp -1: must be an integer from 0 to"),
-        (["minicubes", "--max-depth", "-1"], "max_depth -1: must be an integer of 0 or more"),
         (["minicubes", "--workers", "0"], "workers 0: at least one process must work (use 1 or more"),
+        (["minicubes", "--time", "1e308"], "time 1e+308: must be a number from -1e+09 to 1e+09 seconds"),
+        (["cornell", "--executor", "opencl", "--workers", 2],
+         "workers 2: opencl shares the work by itself (leave it out"),
         (["minicubes", "-o", "a.jpg"], "output file 'a.jpg': must end in .exr or .png"),
         (["minicubes", "-o", "no/a.exr"], "output folder 'no': not found (create it: mkdir -p 'no'"),
     ],
@@ -186,19 +156,6 @@ def test_a_kernel_renders_the_frame(wamnet, tmp_path, executor_named, name) -> N
     got, want = exr.read_frame(tmp_path / "a.exr"), render(canonical("cornell"), Job(20, 10)).frame
     near = np.abs(got["color"] - want["color"]) <= 1e-5 * (want["color"] + want["color"].mean())
     assert near.all(axis=-1).mean() >= 0.95
-
-
-def test_a_kernel_s_work_is_not_shared_by_processes(wamnet) -> None:
-    outcome = wamnet("render", "cornell", "--executor", "opencl", "--workers", 2)
-    assert outcome.status == 2
-    assert "workers 2: opencl shares the work by itself (leave it out" in outcome.err
-
-
-@pytest.mark.parametrize("command", ["render", "scene"])
-def test_times_beyond_all_turns_are_refused(refused, command):
-    assert "time 1e+308: must be a number from -1e+09 to 1e+09 seconds" in refused(
-        command, "minicubes", "--time", "1e308"
-    )
 
 
 def test_a_pipe_is_no_scene_file(refused, tmp_path):

@@ -25,13 +25,16 @@ def test_names_are_no_markup(capsys, monkeypatch) -> None:
     assert capsys.readouterr().out.count(NAME) == 3
 
 
-def test_descriptions_of_progress_are_no_markup(capsys, monkeypatch) -> None:
-    """On a terminal, where they are shown."""
+@pytest.mark.parametrize(
+    ("title", "shown"), [(NAME, NAME), ("rendering \x07\u202ehome", "rendering \\x07\\u202ehome")]
+)
+def test_titles_of_progress_are_escaped_and_no_markup(capsys, monkeypatch, title, shown) -> None:
+    """On a terminal, where the bar is shown; its own colours and movements are rich's."""
     monkeypatch.setattr(terminal.Console, "is_terminal", True)
     monkeypatch.setenv("COLUMNS", "200")
-    with terminal.progress(NAME, 1) as advance:
+    with terminal.progress(title, 1) as advance:
         advance(1)
-    assert NAME in capsys.readouterr().err
+    assert shown in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -87,15 +90,6 @@ def test_no_control_character_reaches_the_terminal(text) -> None:
     assert controls_of(out.getvalue()) == []
     assert controls_of(err.getvalue()) == []
     assert err.getvalue().count("\n") == 2
-
-
-def test_titles_of_progress_are_escaped(capsys, monkeypatch) -> None:
-    """Where the bar is shown; its own colours and movements are rich's."""
-    monkeypatch.setattr(terminal.Console, "is_terminal", True)
-    monkeypatch.setenv("COLUMNS", "200")
-    with terminal.progress("rendering \x07\u202ehome", 1) as advance:
-        advance(1)
-    assert "rendering \\x07\\u202ehome" in capsys.readouterr().err
 
 
 def test_keys_of_files_do_not_clear_the_screen(wamnet, tmp_path) -> None:

@@ -10,7 +10,6 @@ from wamnet.cli.commands import train
 from wamnet.cli.files import exr
 from wamnet.kernels import train_on
 from wamnet.models.model_file import load_checkpoint, load_model
-from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import train as reference
 
@@ -39,22 +38,28 @@ def test_the_model_is_the_references(wamnet, pair, tmp_path) -> None:
     assert all((a == b).all() for a, b in zip(model.siren.weights, want.weights, strict=True))
 
 
-def test_resuming_gives_the_same_bits(wamnet, pair, tmp_path) -> None:
-    """An interrupt after 2 of 4 steps keeps a checkpoint; --resume needs no other option to be repeated."""
-    assert wamnet("train", *pair, "--steps", 4, "-o", "whole.safetensors").status == 0
-    step = reference.train_step
-    calls = []
+def stopped_after(count: int, patch) -> None:
+    """Let an interrupt end a training after so many steps."""
+    step, calls = reference.train_step, []
 
-    def interrupted(*arguments):
+    def stopped(*arguments):
         calls.append(1)
-        if len(calls) == 3:
+        if len(calls) > count:
             raise KeyboardInterrupt
         return step(*arguments)
 
+    patch.setattr(reference, "train_step", stopped)
+
+
+def test_resuming_gives_the_same_bits(wamnet, pair, tmp_path) -> None:
+    """An interrupt after 2 of 4 steps keeps a checkpoint; --resume needs no other option to be repeated."""
+    assert wamnet("train", *pair, "--steps", 4, "-o", "whole.safetensors").status == 0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reference, "train_step", interrupted)
+        stopped_after(2, patch)
         outcome = wamnet("train", *pair, "--steps", 4, "-o", "parts.safetensors")
     assert outcome.status == 130
+    assert outcome.err.splitlines()[0].startswith("wamnet: ")
+    assert outcome.err.endswith("wamnet: interrupted\n")
     assert not (tmp_path / "parts.safetensors").exists()
     assert load_checkpoint(tmp_path / "parts.checkpoint.safetensors").step == 2
     assert wamnet("train", *pair[:4], "--resume", "-o", "parts.safetensors").status == 0
@@ -73,11 +78,17 @@ def test_resuming_gives_the_same_bits(wamnet, pair, tmp_path) -> None:
         (["--resume"], "wamnet-checkpoint file 'model.checkpoint.safetensors': not found"),
         (["-i", "none.exr", "-t", "noisy.exr"], "input file 'none.exr': not found"),
         (["--preset", "long"], "Invalid value for '--preset'"),
+        (["--features", ""], "at least one, each once"),
+        (["--whole", "--rank", "4"], "recipe: rank 4: integer networks have sines, and no rank"),
+        (["--whole", "--activation", "relu"], "recipe: activation 'relu': integer networks have sines"),
+        (["--whole", "--variant", "whole10"], "--variant 'whole10': --whole is short for whole8"),
+        (["--variant", "whole9"], "variant 'whole9': there are whole8, whole10"),
+        (["--variant", "window8+whole8"], "--variant 'window8+whole8': is derived from a trained model"),
     ],
 )
 def test_refusals(refused, pair, options, text) -> None:
     """Nothing is written, no checkpoint either."""
-    assert text in refused("train", *pair, *options)
+    assert text in refused("train", *pair[:4], *options)
 
 
 def test_refusals_of_frames(refused, pair, tmp_path) -> None:
@@ -130,24 +141,6 @@ def test_resuming_with_another_recipe_or_other_frames(wamnet, refused, pair) -> 
     swapped = ["-i", "reference.exr", "-t", "noisy.exr"]
     assert "digest of the training frames" in refused("train", *swapped, "--resume", "--steps", 3)
     assert "steps 1: the run has done 2 steps" in refused("train", *pair[:4], "--resume", "--steps", 1)
-
-
-def test_no_features_are_refused(refused, pair) -> None:
-    """An empty list is not the preset's."""
-    assert "at least one, each once" in refused("train", *pair[:4], "--steps", "2", "--features", "")
-
-
-def test_an_interrupt_tells_how_to_go_on(wamnet, pair, monkeypatch) -> None:
-    """With the checkpoint's name, if there is one."""
-
-    def interrupt(*_arguments: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(reference, "train_step", interrupt)
-    outcome = wamnet("train", *pair, "--steps", 2)
-    assert outcome.status == 130
-    assert outcome.err.splitlines()[0].startswith("wamnet: ")
-    assert outcome.err.endswith("wamnet: interrupted\n")
 
 
 def test_a_model_is_cut_and_trained_on(wamnet, refused, pair, tmp_path) -> None:
@@ -220,50 +213,13 @@ def test_integers_from_the_start_and_resumed(wamnet, refused, pair, tmp_path) ->
     assert load_checkpoint(tmp_path / "all.checkpoint.safetensors").recipe.whole == 511
     # A recipe of the same length that is stopped after two steps.
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reference, "train_step", _stopped_after(2, reference.train_step))
+        stopped_after(2, patch)
         outcome = wamnet("train", *pair, "--steps", 3, *ten, "-o", "parts.safetensors")
     assert outcome.status == 130
     assert wamnet("train", *pair[:4], "--resume", "-o", "parts.safetensors").status == 0
     assert (tmp_path / "parts.safetensors").read_bytes() == (tmp_path / "all.safetensors").read_bytes()
     text = "--variant 'whole8': a resumed run keeps the checkpoint's (leave it out"
     assert text in refused("train", *pair[:4], "--resume", "--whole", "-o", "parts.safetensors")
-
-
-def _stopped_after(count: int, step):
-    """Return a training step that an interrupt ends after so many."""
-    calls: list[int] = []
-
-    def stopped(*arguments):
-        calls.append(1)
-        if len(calls) > count:
-            raise KeyboardInterrupt
-        return step(*arguments)
-
-    return stopped
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (["--whole", "--rank", "4"], "recipe: rank 4: integer networks have sines, and no rank"),
-        (["--whole", "--activation", "relu"], "recipe: activation 'relu': integer networks have sines"),
-        (["--whole", "--variant", "whole10"], "--variant 'whole10': --whole is short for whole8"),
-        (["--variant", "whole9"], "variant 'whole9': there are whole8, whole10"),
-        (["--variant", "window8+whole8"], "--variant 'window8+whole8': is derived from a trained model"),
-    ],
-)
-def test_refusals_of_integers(refused, pair, options, text) -> None:
-    assert text in refused("train", *pair[:4], *options)
-
-
-def test_a_device_that_is_missing(refused, pair, monkeypatch) -> None:
-    """The reason is reported, and nothing is written."""
-
-    def missing(name: str) -> None:
-        raise ExecutorUnavailable(f"{name}: no such device here; take numpy")
-
-    monkeypatch.setattr("wamnet.kernels.open_executor", missing)
-    assert "opencl: no such device here; take numpy" in refused("train", *pair, "--executor", "opencl")
 
 
 def test_checkpoints_by_time(wamnet, pair, tmp_path, monkeypatch) -> None:

@@ -44,18 +44,8 @@ def test_a_variant_denoises(wamnet, here) -> None:
 
 def test_a_variant_is_trained_on(wamnet, here) -> None:
     frames = ("-i", "noisy.exr", "-t", "reference.exr", "--steps", 2)
-    outcome = wamnet(
-        *(
-            "train",
-            *frames,
-            "--from",
-            "model.safetensors",
-            "--variant",
-            "window3+hidden6+rank4",
-            "-o",
-            "s.safetensors",
-        )
-    )
+    more = "--from model.safetensors --variant window3+hidden6+rank4 -o s.safetensors"
+    outcome = wamnet("train", *frames, *more.split())
     assert outcome.status == 0, outcome.err
     found = load_model(here / "s.safetensors")
     assert (found.window.size, found.siren.widths) == (3, (54, 6, 3))

@@ -5,7 +5,6 @@ A small network and few bounces: SwiftShader traces and denoises 40 x 40 pixels 
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,19 +59,6 @@ def model(small_page):
 @pytest.fixture(scope="module")
 def data(small_page):
     return small_page.data
-
-
-@pytest.fixture(scope="module")
-def path(small_page):
-    return small_page.path
-
-
-@pytest.fixture(scope="module")
-def still(chromium, path):
-    """A tab whose animation stands still, ready."""
-    with chromium.tab(path, **NO_MOTION) as tab:
-        tab.page.evaluate("wamnet.ready")
-        yield tab
 
 
 def test_where_shaders_run_on_the_processor_a_page_begins_with_the_module(chromium, path):
@@ -398,11 +384,6 @@ def test_slow_devices_get_small_pieces(still):
     assert [first for first, _ in rows] == [0, *np.cumsum([count for _, count in rows])[:-1].tolist()]
     assert sum(count for _, count in rows) == 64
     assert rows[-1][1] <= 2 < rows[1][1]
-
-
-def test_a_picture_of_it_is_in_the_documents():
-    picture = Path(__file__).parents[2] / "docs" / "images" / "web-page.png"
-    assert picture.stat().st_size <= 200_000
 
 
 def test_ready_is_what_has_drawn(chromium, path):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_page import FEATURES, NO_MOTION, SIZE, read
 
 from wamnet.cli.reports import webpage
 from wamnet.kernels.run import page as P
@@ -14,20 +15,13 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import forward_whole, rounded
-
-SIZE = 40
-FEATURES = ("color", "normal", "position")
-NO_MOTION = {"reduced_motion": "reduce"}
 
 
 @pytest.fixture(scope="module")
-def model(kit):
-    window = dataset.Window(5, "zero")
-    network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
-    scales = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
-    return Model(rounded(network, window.size), FEATURES, window, scales, {})
+def model(small_page):
+    network = rounded(small_page.model.siren, small_page.model.window.size)
+    return replace(small_page.model, siren=network, info={})
 
 
 @pytest.fixture(scope="module")
@@ -48,12 +42,6 @@ def expected(data):
     return np.frombuffer(base64.b64decode(data["variants"][0]["check"]["expected"]), "<f4")
 
 
-def read(tab, name):
-    """Return the floats (H, W, 3) of an image."""
-    text = tab.page.evaluate("name => wamnet.read(name)", name)
-    return np.frombuffer(base64.b64decode(text), "<f4").reshape(SIZE, SIZE, 4)[..., :3].copy()
-
-
 def test_the_page_shows_the_same_bits_and_their_digest(chromium, data, path, model):
     """The digest is of what the device drew; the moment that is shown has the reference's bits too."""
     digest = hashlib.sha256(expected(data).tobytes()).hexdigest()
@@ -67,12 +55,12 @@ def test_the_page_shows_the_same_bits_and_their_digest(chromium, data, path, mod
         check = tab.page.evaluate("wamnet.page.renderer.check('full')")
         assert (check["error"], check["share"]) == (0, 0)
         tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE, "seed": 5})
-        joined = np.concatenate([read(tab, f"whole_{name}") for name in FEATURES], axis=-1)
+        joined = np.concatenate([read(tab, f"whole_{name}")[..., :3] for name in FEATURES], axis=-1)
         assert (joined == np.rint(joined)).all()
         windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
         held = forward_whole(model.siren, windows).astype(np.float32)
         assert len(np.unique(held)) > 50
-        assert read(tab, "picture").tobytes() == held.tobytes()
+        assert read(tab, "picture")[..., :3].tobytes() == held.tobytes()
         assert tab.said == []
 
 

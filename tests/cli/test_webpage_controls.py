@@ -15,19 +15,6 @@ FITS = """[...document.querySelectorAll("main, main *")].every((element) =>
 """Nothing reaches over the edge that the title keeps."""
 
 
-@pytest.fixture(scope="module")
-def path(small_page):
-    return small_page.path
-
-
-@pytest.fixture(scope="module")
-def still(chromium, path):
-    """A tab whose animation stands still, ready."""
-    with chromium.tab(path, **NO_MOTION) as tab:
-        tab.page.evaluate("wamnet.ready")
-        yield tab
-
-
 def test_controls_work(still):
     page = still.page
     page.evaluate("wamnet.go()")

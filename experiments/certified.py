@@ -8,8 +8,6 @@ Each kernel is compiled, its certificate checked by the independent checker, and
 8 bits too, seconds of the checks, and what the reader says. Status 1 if a check fails.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator, Sequence

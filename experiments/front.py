@@ -10,8 +10,6 @@
 3. All are shown at the same exposure; the order of the panels is that of the caption.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -11,8 +11,6 @@
 3. The folder gets a file for each scene, and `SHA256SUMS` [`written`].
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace

@@ -8,8 +8,6 @@ What names several mutants is refused with a list, and so is what names none. `-
 conformance` does; without it all are asked, except pictures that are judged by chance.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 

@@ -11,8 +11,6 @@ with `--survivors` those that were not caught are. It prints tables of mutants b
 every survivor without a reason in records/survivors.txt.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

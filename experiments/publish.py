@@ -11,8 +11,6 @@
 3. `--picture FILE` adds a picture of frames, made smaller, to docs/images and its digest to the record.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -21,8 +21,6 @@ it is judged, as ours are. A network of one set may be judged on another one's f
 all that the web page moves.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -9,8 +9,6 @@
 3. What waits for a record that is still to be made is listed, with the command that makes it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -11,8 +11,6 @@
 Prints Markdown tables: seconds are medians of rounds, with the least and the most.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import statistics

@@ -9,8 +9,6 @@ The paper's network takes 600 kB of text where weights are inlined: the shelf ha
 which are one file a model, and leaves out what `wamnet export` adds to kernel, manifest and certificate.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

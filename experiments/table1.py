@@ -17,10 +17,8 @@
 Every step is kept, so an interrupted run resumes. Numbers are means over test frames and seeds; records keep
 those of each frame. "worth" is the number of samples per pixel whose render has the same error. "blocks" is
 how much the error jumps at borders of patches, against elsewhere [`baselines/blocks.py`]. "MSE modulo 256" is
-that of arithmetic of 8 bits; that the paper's was so is a conjecture [`lab/paper.py`].
+that of arithmetic of 8 bits; that the paper's was so is a conjecture (record `claims`).
 """
-
-from __future__ import annotations
 
 import argparse
 import json

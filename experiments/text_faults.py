@@ -11,8 +11,6 @@ array with more room changes nothing: such faults are counted by themselves. Sta
 any other. Faults of the language around the arithmetic are in tests/support/text_classes.py.
 """
 
-from __future__ import annotations
-
 import random
 import re
 import sys

@@ -17,8 +17,6 @@ Departures: depth here is the distance along the ray; its gradient is the smalle
 sides. The luminance is that of Rec. 709.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

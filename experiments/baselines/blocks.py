@@ -9,8 +9,6 @@ Assessment of JPEG Compressed Images", ICIP 2002 (equations 2 to 5), which take 
 itself: here they are those of its error, and both directions are taken together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

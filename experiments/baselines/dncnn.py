@@ -15,8 +15,6 @@ paper's pictures were resized from 1024x1024 to 256x256; [`recipe.Recipe.shrink`
 squares of pixels.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import nn

@@ -15,8 +15,6 @@ Sources: those of the methods. Sampling is that of refimpl/network/dataset.py. R
 ends are those of He, Zhang, Ren, Sun, "Deep Residual Learning for Image Recognition", CVPR 2016, section 3.4.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -22,8 +22,6 @@ first level, at most 256. Normalisation is by the statistics of each patch (Isol
 when tested). The noisy colours and the normals are the condition x: the paper's data have both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import nn

@@ -1,7 +1,5 @@
 """What a baseline is trained by; it is read without PyTorch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

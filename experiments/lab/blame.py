@@ -7,8 +7,6 @@
    chapter of one of them.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -6,8 +6,6 @@
 3. What a user can cause ends with one line on standard error and status 2; Ctrl-C with status 130 [`begin`].
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import shlex

@@ -3,8 +3,6 @@
 Drawn on white, to be looked at by themselves, with the colours of the reports [`cli/reports/plots.py`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

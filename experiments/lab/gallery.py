@@ -1,7 +1,5 @@
 """Plots of the records, by name [`PLOTS`]. Those of decided questions are pictures that records name."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Mapping
 from typing import Any

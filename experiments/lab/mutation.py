@@ -11,8 +11,6 @@
    docstrings, assertions, the texts of errors.
 """
 
-from __future__ import annotations
-
 import ast
 import copy
 from collections import Counter

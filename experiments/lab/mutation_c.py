@@ -5,8 +5,6 @@
 2. A mutant changes one line: a number, an operator, a comparison, a condition, a width, or is dropped.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

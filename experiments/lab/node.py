@@ -1,7 +1,5 @@
 """A kernel as a WebAssembly module in Node, whose engine is that of Chromium: its picture, and seconds."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Mapping

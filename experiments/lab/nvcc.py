@@ -3,8 +3,6 @@
 One library more has what the runtime does with memory. Libraries of one process share the device's context.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import tempfile

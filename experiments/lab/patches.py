@@ -1,7 +1,5 @@
 """Parts of an image in which a kernel is compared with the reference, and the share of its bound there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

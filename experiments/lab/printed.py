@@ -6,8 +6,6 @@
    [`results.number`].
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping

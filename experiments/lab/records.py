@@ -11,8 +11,6 @@
    makes it [`pending`]; figures that need no record in `quoted.txt`, with the reason [`quoted`].
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -12,12 +12,10 @@
 
 *WAMnet for Image Denoising* prints MSE on 0 .. 255 and, as PSNR, ten times the natural logarithm of
 255^2 / MSE; so does [`paper_figure`]. Its MSE of 82.93 for pictures of 1 spp is 28.9 dB. Such pictures have
-that if they are some stops darker, but then their SSIM is far above the 0.21 beside it (`paper.py`). Squares
-of 8-bit numbers that wrap around give numbers of that size [`wrapped_mse`]; that the paper's did is a
+that if they are some stops darker, but then their SSIM is far above the 0.21 beside it (record `claims`).
+Squares of 8-bit numbers that wrap around give numbers of that size [`wrapped_mse`]; that the paper's did is a
 conjecture.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence

@@ -8,8 +8,6 @@
 The ranges of `minicubes-page` are those that the model which ships has learned for the web page.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,12 +1,11 @@
 """What texts show of the records: tables, figures in sentences, and plots, by name.
 
 1. A table is a function of the records in `TABLES` [`lab/texts.py`]; most are made by [`study`], from the
-   columns that the record names, or by [`as_printed`], from what a program has printed.
+   columns that the record names, or by [`as_printed`], from what a program has printed. Records of decided
+   questions may hold what is shown of them [`decided`]; the commit that they name has the code.
 2. A figure that is computed from several values is a function in `FIGURES`; one that is a value needs none.
 3. Plots are in lab/gallery.py.
 """
-
-from __future__ import annotations
 
 import importlib
 import statistics
@@ -17,10 +16,10 @@ from typing import Any
 
 from wamnet.refimpl.errors import InputError
 
-from . import paper, printed, same, support, tables
-from .intervals import interval, paired
+from . import paper, printed, support, tables
+from .intervals import paired
 from .records import Records
-from .results import PER_FRAME, Results, number, summary
+from .results import PER_FRAME, Results, number
 from .speeds import TableOf, speed_against_error, speed_short
 from .tables import Column
 
@@ -44,6 +43,21 @@ def intervals(found: Results, columns: Sequence[Column]) -> list[Column]:
 def as_printed(record: str, number: int | None = None, without: Collection[str] = ()) -> TableOf:
     """Return a table as a program has printed it; all of them as one without a number."""
     return lambda records: printed.table(records[record], number, without)
+
+
+DECIDED = {
+    **{name: name for name in ("blender", "claims", "departures", "domain", "generalisation", "house3")},
+    **{name: name for name in ("same-bits", "sines", "sines-every")},
+    **{f"departures-{name}": "departures" for name in ("clip", "loss", "replacement")},
+    "claims-exposures": "claims",
+    "learning-curve": "learning_curve",
+}
+"""Tables and figures of decided questions, and the records that have them as they were shown."""
+
+
+def decided(name: str) -> TableOf:
+    """Return a table or a figure of a decided question."""
+    return lambda records: str(records[DECIDED[name]].data()["shown"][name])
 
 
 def whole_pictures(records: Records) -> str:
@@ -166,66 +180,6 @@ def quality_times(records: Records) -> str:
     return tables.markdown(["a frame, interleaved", "ms, median", "ms, range"], cells)
 
 
-# ---- studies ------------------------------------------------------------------------------------------
-
-
-MARKS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 90.0)
-"""Seconds of training at which the table gives the quality; the last is the paper's."""
-
-
-def learning_curve(records: Records) -> str:
-    """Return the quality after so many seconds, where no seed had been at its end or not looked at yet."""
-    found = records["learning_curve"]
-    heads = ["preset", *(f"after {mark:g} s" for mark in MARKS_S), "at the end, dB", "s"]
-    rows = []
-    for name in found.configurations():
-        curves, cells = found.of(name, "curve"), []
-        for mark in MARKS_S:
-            seen = [[point["psnr"] for point in curve if point["seconds"] <= mark] for curve in curves]
-            inside = all(0 < len(mine) < len(curve) for mine, curve in zip(seen, curves, strict=True))
-            cells.append(summary([mine[-1] for mine in seen]).text() if inside else "")
-        cells += [summary([c[-1][what] for c in curves]).text(n) for what, n in (("psnr", 2), ("seconds", 0))]
-        rows.append([name, *cells])
-    return tables.markdown(heads, rows)
-
-
-def domain(records: Records) -> str:
-    """Return frames outside of a domain, distance and threshold, what is farthest off, and the loss."""
-    found = []
-    for record in records["domain"].records():
-        values = record["values"]
-        if "distance" in values:
-            lost = f"{values['lost']:.2f}" if "lost" in values else "–"
-            far = f"{values['distance']:.1f} ({values['threshold']:.1f})"
-            count = f"{values['outside']} of {values['frames']}"
-            found.append([record["configuration"], count, far, values["farthest"], lost])
-    heads = ["model: frames", "outside", "median distance (threshold)", "largest distance", "PSNR loss, dB"]
-    return tables.markdown(heads, found)
-
-
-def blender(records: Records) -> str:
-    """Return PSNR of the noisy frame, of Open Image Denoise and of the network, and its gain."""
-    found, rows = records["blender"], []
-    for name in found.configurations():
-        if found.of(name, "gain"):
-            means = [found.summary(name, score) for score in ("noisy", "oidn", "network")]
-            gain = paired(found.per_pose(name, "network"), found.per_pose(name, "oidn"))
-            flat = interval(found.per_pose(name, "flat gain"))
-            seconds = f"{max(found.of(name, 'seconds')):.0f}"
-            rows.append([name, *(f"{s.mean:.2f}" for s in means if s), gain.text(), flat.text(), seconds])
-    heads = ["noisy, dB", "Open Image Denoise, dB", "network, dB", "gain, dB", "away from edges, dB"]
-    return tables.markdown(["frames", *heads, "training, s"], rows)
-
-
-def generalisation(records: Records) -> str:
-    """Return the PSNR by the orientation of the camera."""
-    found = records["generalisation"]
-    values = dict.fromkeys(key for record in found.records() for key in record["values"])
-    shown = [value for value in values if value.startswith("psnr at ")]
-    columns = [Column(value, value.removeprefix("psnr at "), 2) for value in shown]
-    return tables.table(found, intervals(found, columns), first="trained on orientations: PSNR, dB; degrees")
-
-
 # ---- speed ----------------------------------------------------------------------------------------------
 
 
@@ -306,9 +260,6 @@ def moving(by: str, way: str, column: str, digits: int) -> Callable[[Records], s
     return made
 
 
-# ---- the sine -------------------------------------------------------------------------------------------
-
-
 def languages(records: Records) -> str:
     """Return the kernels of each language on a processor, the fastest first: time, bound and compilation."""
     rows = [r["values"] | {"name": r["configuration"].split(",")[0]} for r in records["languages"].records()]
@@ -337,28 +288,6 @@ def languages(records: Records) -> str:
         "first frame, s",
     )
     return tables.markdown(heads, cells)
-
-
-def sines(records: Records) -> str:
-    """Return the errors of all sines; the emitted ones once, where all executors print the same digits."""
-    found = [r["values"] for r in records["sines"].records() if r["values"]["table"] == 1]
-    rows: dict[tuple[str, ...], list[str]] = {}
-    for values in found:
-        place, *cells = [text for head, text in values.items() if head != "table"]
-        rows.setdefault(tuple(cells), []).append(place)
-    heads = [head for head in found[0] if head != "table"]
-    return tables.markdown(heads, [[", ".join(places), *cells] for cells, places in rows.items()])
-
-
-def sines_every(records: Records) -> str:
-    """Return the largest errors of sine and cosine over all numbers, side by side."""
-    found = [r["values"] for r in records["sines-every"].records()]
-    sine, cosine = ([row for row in found if row["table"] == number] for number in (1, 2))
-    cells = [
-        [a["degree"], a["sine"], a["at"], b["cosine"], b["at"], a["proven"]]
-        for a, b in zip(sine, cosine, strict=True)
-    ]
-    return tables.markdown(["degree", "sine", "at", "cosine", "at", "proven"], cells)
 
 
 # ---- the demonstration ----------------------------------------------------------------------------------
@@ -394,9 +323,7 @@ FIGURES: Mapping[str, Callable[[Records], str]] = {
     "ahead-of-oidn": ahead("minicubes", ours="page-16"),
     "ahead-of-oidn-lamps": ahead("minicubes-page", ours="shipped"),
     "ahead-of-oidn-outside": ahead("minicubes", "outside", ours="page-16"),
-    "departures-clip": paper.departure("unclipped", -1.0),
-    "departures-loss": paper.departure("summed"),
-    "departures-replacement": paper.departure("without replacement"),
+    **{name: decided(name) for name in DECIDED if name.startswith("departures-")},
     "hard-ms": frame_ms("lit-16", "hard-light-times"),
     "hard-oidn-ms": frame_ms("oidn-past-prefiltered16", "hard-light-times"),
     "hard-oidn-clean-ms": frame_ms("oidn-past-clean16", "hard-light-times"),
@@ -425,29 +352,6 @@ def planted_faults(records: Records) -> str:
     return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
 
 
-SEEDED = {
-    "on a device": ("device",), "by the source checker": ("reader",),
-    "only when compiled": ("compile", "import"),
-    "missed": ("missed",), "no difference": ("equal", "text"), "open": ("open",),
-}  # fmt: skip
-"""Columns of the bugs that were seeded in the emitters, and what a record calls what they count."""
-
-
-def seeded(records: Records) -> str:
-    """Return how many bugs of each group of emitters and origin are detected, and by what."""
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    for values in (record["values"] for record in records["house3"].records()):
-        if values["part"] == "kills":
-            for row in ((values["group"], values["origin"]), ("~", "")):
-                counts.setdefault(row, Counter()).update([values["tier"] or values["state"]])
-    cells = [
-        [group.replace("~", "all"), origin, str(found.total())]
-        + [str(sum(found[kind] for kind in kinds)) for kinds in SEEDED.values()]
-        for (group, origin), found in sorted(counts.items())
-    ]
-    return tables.markdown(["emitters of", "origin", "bugs", *SEEDED], cells)
-
-
 SETS_IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight")
 """Sets beside the mini cubes in which shadow rays are measured."""
 
@@ -459,34 +363,27 @@ AS_PRINTED = (
 """Records that are shown as their command has printed them."""
 TABLES: Mapping[str, TableOf] = {
     **{name: as_printed(name) for name in AS_PRINTED},
-    "blender": blender,
+    **{name: decided(name) for name in DECIDED if not name.startswith("departures-")},
     "bench-pipeline": whole_pictures,
     "bench-c-pipeline": as_printed("bench-c-pipeline"),
     "ablations": study("ablations", "all else as `short`"),
     **{name: bench(name) for name in ("bench-integers", "bench-paper")},
     "bench-train-paper": as_printed("bench-train", 1),
     "bench-train-short": as_printed("bench-train", 2),
-    "claims": paper.claims,
-    "claims-exposures": paper.exposures,
     **{name: as_printed(name, 1) for name in ("reference-mutants", "c99-mutants")},
     "held-back-left": as_printed("held-back", 2),
     **{f"held-back-{n}-left": as_printed(f"held-back-{n}", 2) for n in ("second", "third", "fourth")},
     "gpu": lambda records: importlib.import_module("gpu").rows(records["gpu"]),
-    "house3": seeded,
     "sequence": as_printed("sequence", 2),
     "sequence-frame": as_printed("sequence", 1),
     "demo-pictures": demo_pictures,
     "demo-runs": demo_runs,
-    "departures": paper.departures,
-    "domain": domain,
     "fig-prediction": study("fig_prediction"),
     **{name: study(name) for name in ("flicker", "lights")},
-    "generalisation": generalisation,
     "heads": study("heads", "camera moves"),
     "history": study("history", "`minicubes`, 24 pictures a second"),
     "lamps": study("lamps", "`minicubes`, camera at rest"),
     "languages": languages,
-    "learning-curve": learning_curve,
     "losses": study("losses", "loss"),
     "planted-faults": planted_faults,
     "presets": as_printed("presets", without=TIMES),
@@ -507,10 +404,7 @@ TABLES: Mapping[str, TableOf] = {
     "ranks": as_printed("ranks", without=TIMES),
     **{f"shadows-{name}": as_printed(f"shadows-{name}", without=("ms",)) for name in SETS_IN_SHADOW},
     "shadows-bundled": as_printed("shadows-bundled", without=(*TIMES, "PSNR, range of seeds")),
-    "same-bits": same.summary,
-    "sines": sines,
     **{f"verified{end}": as_printed("verified", table) for end, table in {"": 1, "-deviations": 2}.items()},
-    "sines-every": sines_every,
     "sines-octaves": as_printed("sines", 2),
     "speed-against-error": speed_against_error("bench-minicubes"),
     "speed-short": speed_short("bench-minicubes"),

@@ -1,7 +1,5 @@
 """Tables of speed against error, from a record of `wamnet bench`: all rows, and a few for first readers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

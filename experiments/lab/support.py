@@ -1,7 +1,5 @@
 """The support matrix: what records show of each target, from its source to the hardware that ran it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ A column says which value it shows, its heading and its digits [`Column`]; a con
 has an empty cell [`table`].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -17,8 +17,6 @@
    `pending.txt` names the record.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

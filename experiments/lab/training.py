@@ -6,8 +6,6 @@
 3. A picture is made by the executor, or by the reference [`denoised`].
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -9,8 +9,6 @@
 4. It is caught by a wrong answer, an exception, a refusal, or one that does not come in time [`asked`].
 """
 
-from __future__ import annotations
-
 import functools
 import gc
 import importlib

@@ -6,8 +6,6 @@
    fails, the most elementary kind first [`trial`].
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import subprocess

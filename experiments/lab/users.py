@@ -4,8 +4,6 @@ A constant is read where no tracer sees it, so that text decides: a line that na
 of it as modules are imported is used by those who name that [`Users.lines`].
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """The a-trous filter on pictures whose answer is known, and the measure of blocks on made ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

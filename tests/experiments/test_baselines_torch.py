@@ -3,8 +3,6 @@
 Without PyTorch they are skipped, and the summary says so; `.ci/run` installs and requires it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Denoising kernels on a GPU: the rehearsal on PoCL, missing kernels, and a time limit."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -1,7 +1,5 @@
 """Bootstrap intervals: against exact distributions of resampled means, and against a known coverage."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 

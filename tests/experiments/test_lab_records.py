@@ -1,7 +1,5 @@
 """Nothing becomes a record that cannot be trusted; what does keeps what was found."""
 
-from __future__ import annotations
-
 import json
 import math
 

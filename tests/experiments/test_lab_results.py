@@ -1,7 +1,5 @@
 """Records of experiments: nothing is lost, nothing is done twice, and two experiments are never mixed."""
 
-from __future__ import annotations
-
 import pytest
 from lab import command
 from lab.results import Results, fill

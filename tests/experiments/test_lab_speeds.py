@@ -1,7 +1,5 @@
 """The first page's table of speeds: what it says of texts is what the reader does."""
 
-from __future__ import annotations
-
 import pytest
 from lab import speeds
 from lab.records import Records

@@ -1,7 +1,5 @@
 """The support matrix says what records show, and no more."""
 
-from __future__ import annotations
-
 import pytest
 from lab import support
 from lab.records import Records

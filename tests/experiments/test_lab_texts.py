@@ -1,7 +1,5 @@
 """Tables, figures and plots are what the records give; marks that lead nowhere are refused."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Mutants by machine: which changes there are, how reasons are read, and that vectors notice a sample."""
 
-from __future__ import annotations
-
 import shutil
 
 import mutant

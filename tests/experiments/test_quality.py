@@ -1,7 +1,5 @@
 """The comparison of quality: all of it at toy size, and the models it makes."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

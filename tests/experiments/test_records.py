@@ -1,7 +1,5 @@
 """Texts and plots of the repository are what the records in git give."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from functools import cache

@@ -1,7 +1,5 @@
 """Table 1 and the claims, tiny: every row runs, and nothing is done twice."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Rows of table 1 that are made with PyTorch or Open Image Denoise, tiny."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

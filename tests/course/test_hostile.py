@@ -178,19 +178,8 @@ def test_no_process_and_no_file_outlives_the_command(option, number, tmp_path):
     (tmp_path / "class/ada").mkdir(parents=True)
     (tmp_path / "temporary").mkdir()
     (tmp_path / "class/ada" / LAB.file).write_text("import time\ntime.sleep(600)\n")
-    command = [
-        sys.executable,
-        "-m",
-        "wamnet.cli",
-        "course",
-        "grade",
-        "class",
-        "-o",
-        "out",
-        "--lab",
-        "1",
-        *option,
-    ]
+    words = ["course", "grade", "class", "-o", "out", "--lab", "1", *option]
+    command = [sys.executable, "-m", "wamnet.cli", *words]
     environment = {**os.environ, "TMPDIR": str(tmp_path / "temporary")}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL)
     started = set()

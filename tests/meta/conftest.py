@@ -6,10 +6,12 @@ that states the rule and the fix.
 
 import ast
 import gc
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from quick import DISTRIBUTIONS
@@ -22,6 +24,18 @@ PARTS = ("refimpl", "models", "compiler", "kernels", "spec", "cli", "wamnet")
 
 FOREIGN = {"out", "build", "dist", "__pycache__", "node_modules"}
 """Folders that hold no source; so do hidden ones (but .ci and .github) and virtual environments."""
+
+
+CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
+"""A clause opens a paragraph with its number, as **RNG-1**."""
+
+
+class Clause(NamedTuple):
+    """A numbered paragraph of the spec: where it is, and the text up to the next clause or heading."""
+
+    where: str
+    number: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -84,6 +98,15 @@ class House:
             if path not in self._read:
                 self._read[path] = Source(path.relative_to(self.root).as_posix(), path.read_text())
         return [s for s in map(self._read.__getitem__, paths) if not folders or s.part in folders]
+
+    def clauses(self) -> Iterator[Clause]:
+        """Yield the clauses of the spec; the glossary has none."""
+        for path in sorted((self.root / "spec").glob("*.md")):
+            text = path.read_text()
+            _, *rest = CLAUSE.split(text)
+            lines = [text.count("\n", 0, match.start()) + 1 for match in CLAUSE.finditer(text)]
+            for line, number, body in zip(lines, rest[::2], rest[1::2], strict=True):
+                yield Clause(f"spec/{path.name}:{line}", number, body)
 
     def parts(self) -> list[Source]:
         """Return the Python files of the package."""

@@ -14,7 +14,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,6 +21,7 @@ from typing import NamedTuple
 
 import pytest
 from packages import needed_sandbox
+from programs import run_block
 
 ROOT = Path(__file__).resolve().parents[2]
 """The repository's root folder."""
@@ -41,9 +41,6 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 """An optional mark, then a fenced block, then perhaps what it prints."""
-
-SECONDS_AT_MOST = 300
-"""When a command counts as hanging; no command of a document should take a tenth of it."""
 
 
 class Block(NamedTuple):
@@ -81,30 +78,14 @@ def commands(block: Block) -> list[str]:
 
 
 def run(block: Block, folder: Path) -> str:
-    """Run a block in a folder, and return what it prints; on failure say the place, the text and the last
-    lines of the output."""
-    program = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[block.language]
-    environment = os.environ | {
-        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-        "COLUMNS": "120",
-    }
+    """Run a block in a folder, and return what it prints."""
+    paths = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    environment = os.environ | {"PATH": paths, "COLUMNS": "120"}
     # CI sets it against imports from the working folder; a reader's script finds the modules beside it.
     environment.pop("PYTHONSAFEPATH", None)
-    done = subprocess.run(
-        [*program, block.text],
-        cwd=ROOT if block.clone else folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=SECONDS_AT_MOST,
-        check=False,
+    return run_block(
+        block.where, block.language, block.text, ROOT if block.clone else folder, env=environment
     )
-    if done.returncode:
-        tail = "\n".join(done.stdout.splitlines()[-30:])
-        pytest.fail(f"{block.where} ends with status {done.returncode}:\n{block.text}\n{tail}", pytrace=False)
-    return done.stdout
 
 
 ALL = {

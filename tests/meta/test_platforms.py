@@ -1,6 +1,5 @@
 """Extras and dependency groups can be installed on each processor and Python that the project names."""
 
-import ast
 import itertools
 import re
 
@@ -105,9 +104,3 @@ def test_the_classifiers_name_each_python(project):
     assert tuple(named) == PYTHONS
     assert all(python in SpecifierSet(project["project"]["requires-python"]) for python in PYTHONS)
     assert project["tool"]["ruff"]["target-version"] == f"py{PYTHONS[0].replace('.', '')}"
-
-
-def test_all_sources_are_of_the_oldest_python(house):
-    oldest = tuple(int(part) for part in PYTHONS[0].split("."))
-    for source in house.installed():
-        assert ast.parse((house.root / source.path).read_text(encoding="utf-8"), feature_version=oldest)

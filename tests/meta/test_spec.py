@@ -8,12 +8,7 @@
 
 import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
-
-CLAUSE = re.compile(r"^\*\*([A-Z0-9]+-\d+[a-z]?)\*\*", re.MULTILINE)
-"""A clause opens a paragraph with its number, as **RNG-1**."""
 
 CODE = re.compile(r"`((?:refimpl|compiler|kernels|spec|cli|models|experiments)/[\w/]+\.py): *([\w., ]+)`")
 """Code is named by path and names: `refimpl/rng.py: pcg4d`; several names are separated by commas."""
@@ -29,26 +24,6 @@ NO_CLAUSES = {"AVX", "SHA", "UTF"}
 
 NO_CHAPTER = {"__init__", "errors"}
 """Modules of refimpl without a chapter: the first holds nothing, the second only the form of messages."""
-
-
-class Clause(NamedTuple):
-    """A numbered paragraph of the spec: where it is, and the text up to the next clause or heading."""
-
-    where: str
-    number: str
-    text: str
-
-
-def clauses(house) -> Iterator[Clause]:
-    for path in sorted((house.root / "spec").glob("*.md")):
-        text = path.read_text()
-        starts = list(CLAUSE.finditer(text))
-        if not starts:
-            continue  # the glossary has no clauses
-        for match, after in zip(starts, [*starts[1:], None], strict=True):
-            line = text.count("\n", 0, match.start()) + 1
-            body = text[match.end() : after.start() if after else len(text)]
-            yield Clause(f"spec/{path.name}:{line}", match[1], body)
 
 
 def defined_names(house, path: str) -> set[str]:
@@ -78,7 +53,7 @@ def names_of(node: ast.stmt) -> list[str]:
 def test_clause_numbers_are_unique(house):
     seen: dict[str, str] = {}
     wrong = []
-    for clause in clauses(house):
+    for clause in house.clauses():
         if clause.number in seen:
             wrong.append(f"{clause.where}: {clause.number} is also at {seen[clause.number]}")
         seen[clause.number] = clause.where
@@ -86,7 +61,7 @@ def test_clause_numbers_are_unique(house):
 
 
 def test_clauses_name_code(house):
-    wrong = [f"{c.where}: {c.number}" for c in clauses(house) if not CODE.search(c.text)]
+    wrong = [f"{c.where}: {c.number}" for c in house.clauses() if not CODE.search(c.text)]
     house.refuse(
         wrong, "A clause names the code that it governs: add (`refimpl/rng.py: pcg4d`), or remove the clause."
     )
@@ -124,7 +99,7 @@ def public_names(tree: ast.Module) -> list[str]:
 def named_by_clauses(house) -> dict[str, set[str]]:
     """Return what clauses name of each module; `Class.member` names its class."""
     named: dict[str, set[str]] = {}
-    for clause in clauses(house):
+    for clause in house.clauses():
         for path, names in CODE.findall(clause.text):
             each = {name.strip() for name in names.split(",")}
             named.setdefault(path, set()).update(each | {name.partition(".")[0] for name in each})
@@ -147,7 +122,7 @@ def test_public_code_has_a_clause(house):
 
 
 def test_mentioned_clauses_exist(house):
-    known = {c.number for c in clauses(house)}
+    known = {c.number for c in house.clauses()}
     prefixes = {number.partition("-")[0] for number in known}
     wrong = []
     for path in [*sorted((house.root / "spec").glob("*.md")), *(house.root / s.path for s in house.python())]:

@@ -11,11 +11,10 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from programs import run_block
 from worked import LINES, decided
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,14 +68,6 @@ def fenced(path: Path) -> list[tuple[str | None, str | None, str, str]]:
     return [(m[1], m[2], m[3], m[4]) for m in FENCE.finditer(WORKED.sub("", path.read_text()))]
 
 
-def run(where: str, language: str, text: str, folder: Path) -> None:
-    """Run a block in a folder; on failure say the place and the last lines of the output."""
-    program = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[language]
-    done = subprocess.run([*program, text], cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        pytest.fail(f"{where} ends with status {done.returncode}:\n{done.stderr[-2000:]}", pytrace=False)
-
-
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.name)
 def test_fenced_blocks(path: Path, tmp_path: Path) -> None:
     for mark, argument, language, text in fenced(path):
@@ -87,7 +78,7 @@ def test_fenced_blocks(path: Path, tmp_path: Path) -> None:
             json.loads(text)
         elif mark is None:
             assert language in ("sh", "python"), f"{where}: run it, or mark it with <!-- not run: reason -->"
-            run(where, language, text, tmp_path)
+            run_block(where, language, text, tmp_path)
 
 
 def test_links_lead_somewhere() -> None:

@@ -148,6 +148,7 @@ def test_joined_bands_are_the_reference(monkeypatch) -> None:
         ({"yaw_deg": (10.0, -10.0)}, "range of yaw_deg '10.0:-10.0"),
         ({"scene": "nowhere"}, "scene 'nowhere': unknown"),
         ({"parameters": {"time": 1.0}}, r"parameter time 1.0: each frame has its own \(use --start"),
+        ({"before": -1}, "before -1: must be from 0 to 256 frames"),
         ({"size_px": 0}, "width 0"),
         ({"spp": 0}, "spp 0"),
     ],

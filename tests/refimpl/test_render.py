@@ -194,13 +194,6 @@ def test_four_rays_that_are_spread_are_worth_eight_at_random():
         assert squares["net"] <= squares["pcg4d"]
 
 
-def test_the_spread_of_camera_rays_is_refused_for_paths():
-    with pytest.raises(InputError, match="sampler 'net': samples camera rays only"):
-        Settings(max_depth=1, sampler="net")
-    with pytest.raises(InputError, match=r"feature_sampler 'halton': unknown \(choose one of pcg4d, sobol"):
-        R.Job(4, 4, feature_spp=4, feature_sampler="halton")
-
-
 @pytest.mark.parametrize("feature_spp", [0, 1, 2])
 def test_features_of_no_more_rays_are_the_colour_s(feature_spp):
     job = R.Job(5, 4, 2, seed=5)
@@ -257,6 +250,10 @@ def test_info_names_what_made_the_frame():
         ({"first_sample": 2**32}, "first_sample 4294967296"),
         ({"dtype": "float16"}, "dtype 'float16': must be float32 or float64"),
         ({"feature_spp": -1}, "feature_spp -1: must be an integer from 0 to 4294967296"),
+        (
+            {"feature_spp": 4, "feature_sampler": "halton"},
+            r"feature_sampler 'halton': unknown \(choose one of pcg4d, sobol",
+        ),
     ],
 )
 def test_refuses_jobs(arguments, message):
@@ -268,8 +265,5 @@ def test_refuses_jobs(arguments, message):
 def test_refuses_row_ranges(rows):
     with pytest.raises(InputError, match=r"rows .*: must be a range within 0 to 4"):
         R.render(CORNELL, R.Job(4, 4), rows=rows)
-
-
-def test_refuses_tiles_of_no_pixel():
     with pytest.raises(InputError, match="tile_pixels 0"):
         R.render(CORNELL, R.Job(4, 4), tile_pixels=0)

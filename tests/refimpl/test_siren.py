@@ -49,17 +49,6 @@ def test_initial_weights_have_the_mean_and_variance_of_the_uniform_distribution(
     assert abs(z_square) <= 5.03
 
 
-def test_init_gives_known_bits() -> None:
-    """A change of the generator, the tags or the order of the draws would change every trained model."""
-    network = siren.init((3, 2, 1), 30.0, 30.0, seed=1)
-    assert [float(value).hex() for value in network.weights[0][0]] == WEIGHTS
-    assert [float(value).hex() for value in network.biases[0]] == BIASES
-
-
-WEIGHTS = ["-0x1.4f9ca60000000p-2", "0x1.f4a6000000000p-5", "0x1.4b3e2a0000000p-4"]
-BIASES = ["-0x1.e71bde0000000p-5", "0x1.64aa6a0000000p-2"]
-
-
 def test_seeds_layers_and_kinds_draw_different_numbers() -> None:
     one, two = siren.init((4, 4, 4), 1.0, 1.0, seed=1), siren.init((4, 4, 4), 1.0, 1.0, seed=2)
     draws = [one.weights[0] * 4, one.weights[1] / math.sqrt(6 / 4), two.weights[0] * 4]

@@ -300,6 +300,9 @@ def test_sky_is_mirrors_with_the_sun() -> None:
         ({"features": ("glow",)}, "feature 'glow"),
         ({"activation": "tanh"}, r"activation 'tanh': unknown \(choose one of sine, relu"),
         ({"window": Window(0)}, "window size 0"),
+        ({"whole": 128}, r"whole 128: must be the largest value of an integer sine \(choose one of 127, 511"),
+        ({"whole": 127, "rank": 2}, r"recipe: rank 2: integer networks have sines, and no rank \(use 0"),
+        ({"whole": 127, "activation": "relu"}, "recipe: activation 'relu': integer networks have sines"),
     ],
 )
 def test_recipes_are_checked(changes: Any, message: str) -> None:
@@ -394,22 +397,6 @@ def test_a_trained_network_loses_little_in_integers(amplitude: int) -> None:
     plain = replace(model, siren=whole.rounded(model.siren, 5, amplitude))
     near, far = (metrics.mse(denoise.denoise(m, noisy, np.float64), picture) for m in (found, plain))
     assert near < far
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"whole": 128},
-            r"recipe: whole 128: must be the largest value of an integer sine \(choose one of 127, 511",
-        ),
-        ({"whole": 127, "rank": 2}, r"recipe: rank 2: integer networks have sines, and no rank \(use 0"),
-        ({"whole": 127, "activation": "relu"}, "recipe: activation 'relu': integer networks have sines"),
-    ],
-)
-def test_recipes_of_integers_are_checked(changes: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        train.check_recipe(replace(SMALL, **changes))
 
 
 def test_training_does_not_begin_with_integers() -> None:

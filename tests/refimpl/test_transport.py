@@ -179,6 +179,8 @@ def test_depth_adds_light_and_nothing_else():
         ({"roulette_depth": -1}, "roulette_depth -1: must be 0 or more"),
         ({"strategy": "photon"}, r"strategy 'photon': unknown \(choose one of mis, light, bsdf"),
         ({"heuristic": "max"}, r"heuristic 'max': unknown \(choose one of balance, power"),
+        ({"sampler": "halton"}, r"sampler 'halton': unknown \(choose one of pcg4d, sobol"),
+        ({"max_depth": 1, "sampler": "net"}, "sampler 'net': samples camera rays only"),
     ],
 )
 def test_refuses_settings(settings, message):

@@ -3,8 +3,6 @@
 The path tracer is the skeleton that path kernels have (compiler/scenes/emit_path.py), written again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """The sums over a tile's windows as the FFT schedules compute them, in NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wamnet.compiler.proof import spectra

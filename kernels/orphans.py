@@ -1,7 +1,8 @@
 """Workers that end with the process that started them, however that ended.
 
 A parent that is killed by SIGKILL can end nobody, and a worker that waits for work would wait for ever. The
-system closes what the parent held open: a thread of the worker waits for that [`end_with_parent`].
+system closes what the parent held open: a thread of the worker waits for that [`end_with_parent`]. Signals do
+not meet workers that are not known yet [`starting_workers`].
 
 A [`Worker`] calls functions in a process of its own: that it ends, or never answers, is an answer too.
 """
@@ -12,9 +13,13 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from typing import Any
+
+from ..models.writing import signals_wait
 
 
 def end_with_parent() -> None:
@@ -28,6 +33,24 @@ def _end_after(sentinel: int) -> None:
     """Wait for the end of the parent, and end this process at once, whatever its other threads do."""
     wait([sentinel])
     os._exit(1)
+
+
+@contextmanager
+def starting_workers() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait while workers start: they are known by then, and their parent ends them.
+
+    Threads and processes inherit the mask of signals, so that every worker, also one in place of a lost one,
+    has SIGINT blocked: Ctrl-C in the terminal does not reach it. SIGTERM must not wait in them, and is only
+    noted here. Python's tracker of shared resources unblocks SIGINT in the thread that starts it: it is
+    started before.
+    """
+    resource_tracker.ensure_running()
+    with signals_wait():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class WorkerEnded(Exception):

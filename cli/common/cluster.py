@@ -9,13 +9,12 @@
 
 import logging
 import pickle
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
+from ...kernels.orphans import starting_workers
 from ...models.writing import signals_wait
 from ...refimpl.errors import NO_VALUE, InputError
 from .packages import need
@@ -108,7 +107,7 @@ def open_client(workers: int, scheduler: str | None) -> Iterator[Any]:
 def _local(distributed: Any, workers: int) -> Any:
     """Return a cluster of processes of this machine, or say that they did not start."""
     try:
-        with _undisturbed():
+        with starting_workers():
             return distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -139,22 +138,6 @@ def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
             rule = "this scheduler has no worker"
             raise InputError("--scheduler", scheduler, rule, f"start one: dask worker {scheduler}") from None
         yield client
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Start processes that Ctrl-C in the terminal does not reach: this process ends them in order.
-
-    Threads and processes inherit the mask of signals, so that the cluster's thread, and every worker that it
-    starts, also in place of a lost one, has SIGINT blocked; one that comes meanwhile is delivered afterwards.
-    Python's tracker of shared resources unblocks SIGINT in the thread that starts it: it is started before.
-    """
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -10,19 +10,16 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from typing import Any
 
 from ...refimpl.errors import InputError
 from ...refimpl.light.render import Job, Render, join_rows, render
 from ...refimpl.light.scene import Scene
 from ..memory import cores, keep_freed_memory
-from ..orphans import end_with_parent
+from ..orphans import end_with_parent, starting_workers
 
 PROGRESS_INTERVAL_S = 0.2
 """Seconds between two looks at the workers' counter: smooth for a progress bar, free for the workers."""
@@ -62,7 +59,7 @@ def render_parallel(
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(count, context, _start_worker, (counter,))
     try:
-        with _signals_held():
+        with starting_workers():
             futures = [pool.submit(_render_band, scene, job, rows) for rows in parts]
         _watch(futures, counter, on_progress)
         return join_rows([future.result() for future in futures])
@@ -78,29 +75,6 @@ def render_parallel(
         # Wait: the workers are idle or ended. The pool's own thread, were it left to close its pipes while
         # this process exits, would meet the interpreter that wants to write into them.
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Let SIGINT and SIGTERM wait while workers start: they are known by then, and can be ended.
-
-    Workers keep SIGINT blocked, because their parent ends them, with SIGTERM, which must not wait in them:
-    it is not blocked here but noted.
-    """
-    noted: list[int] = []
-    ours = threading.current_thread() is threading.main_thread()
-    handler = signal.getsignal(signal.SIGTERM)
-    if ours:
-        signal.signal(signal.SIGTERM, lambda number, _frame: noted.append(number))
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if ours:
-            signal.signal(signal.SIGTERM, handler)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if noted:
-            signal.raise_signal(signal.SIGTERM)
 
 
 def bands(job: Job, workers: int) -> list[tuple[int, int]]:

@@ -15,7 +15,7 @@ from wamnet.refimpl import encoding, metrics, rng
 from wamnet.refimpl.light import camera, environment, intersection, sampling, transport
 from wamnet.refimpl.light.materials import conductor, dielectric
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import adam, dataset, siren, smoothing
+from wamnet.refimpl.network import adam, dataset, siren, smoothing, window
 from wamnet.spec.conformance import case, numbers, program, report, run, vectors
 from wamnet.spec.conformance.functions import Field, Function
 from wamnet.spec.conformance.kinds import FUNCTIONS, KINDS, paths
@@ -154,7 +154,7 @@ MUTANTS = {
     "half of Fresnel": (dielectric, "fresnel", lambda c, f, r: 0.0 * c, "material.dielectric", "DIE-4"),
     "NaN of a frame kept": (dataset, "known", lambda values: values, "image.features", "DAT-10"),
     "borders the other way": (
-        dataset,
+        window,
         "BORDERS",
         {"clamp": "reflect", "zero": "constant"},
         "image.window",

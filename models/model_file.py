@@ -37,7 +37,7 @@ from ..refimpl.network.imported import Imported, Source, Step
 from ..refimpl.network.siren import Siren
 from ..refimpl.network.train import TrainState
 from ..refimpl.network.whole import Whole
-from ..refimpl.reading import BROKEN, parse_json, read_file, to_dataclass
+from ..refimpl.reading import BROKEN, parse_json, read_file, to_value
 from .writing import write_bytes
 
 Tensors = Mapping[str, NDArray[Any]]
@@ -133,7 +133,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     path = Path(path)
     versions = (VERSION, ACTIVATION_VERSION, WHOLE_VERSION, IMPORTED_VERSION)
     tensors, texts = _read(path, MODEL_FORMAT, versions)
-    window = _parsed(path, texts, "window", _window)
+    window = _value(path, texts, "window", Window)
     info = {
         name.removeprefix(INFO_PREFIX): text
         for name, text in sorted(texts.items())
@@ -141,15 +141,16 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     }
     if texts["version"] == IMPORTED_VERSION:
         weights, biases = _layers(path, tensors)
-        sources = _parsed(path, texts, "images", lambda text: _records(Source, text, "images"))
-        steps = _parsed(path, texts, "steps", lambda text: _records(Step, text, "steps"))
-        low, high = _parsed(path, texts, "clip", _ends)
-        network = Imported(weights, biases, 1.0, 1.0, SINE, steps, low, high, sources)
+        sources = _value(path, texts, "images", tuple[Source, ...])
+        steps = _value(path, texts, "steps", tuple[Step, ...])
+        low, high = _value(path, texts, "clip", tuple[float | None, float | None])
+        ends = -math.inf if low is None else low, math.inf if high is None else high
+        network = Imported(weights, biases, 1.0, 1.0, SINE, steps, *ends, sources)
         model = imported_model(network, window, info)
     else:
         model = Model(
             siren=_network(path, tensors, texts),
-            features=_parsed(path, texts, "features", _names),
+            features=_value(path, texts, "features", tuple[str, ...]),
             window=window,
             normalization=_parsed(path, texts, "normalization", normalization_from_json),
             info=info,
@@ -161,27 +162,6 @@ def load_model(path: str | os.PathLike[str]) -> Model:
 def imported_model(network: Imported, window: Window, info: Texts) -> Model:
     """Return the model of an imported network, whose features are its images."""
     return Model(network, tuple(source.name for source in network.sources), window, Normalization(), info)
-
-
-def _records(kind: type[Any], text: str, name: str) -> tuple[Any, ...]:
-    """Return the records of a JSON list of objects."""
-    held = parse_json(text, name, "import the network again")
-    if not isinstance(held, list):
-        raise ValueError("a list of objects is needed")
-    return tuple(to_dataclass(kind, each, f"{name}[{i}]", whole=True) for i, each in enumerate(held))
-
-
-def _ends(text: str) -> tuple[float, float]:
-    """Return both ends of a JSON list of two numbers, or null where there is none."""
-    held = parse_json(text, "clip", "import the network again")
-    if (
-        not isinstance(held, list)
-        or len(held) != 2
-        or any(type(x) not in (int, float, type(None)) for x in held)
-    ):
-        raise ValueError("a list of two numbers, or null, is needed")
-    low, high = held
-    return -math.inf if low is None else float(low), math.inf if high is None else float(high)
 
 
 def _layers(path: Path, tensors: Tensors) -> tuple[tuple[NDArray[Any], ...], tuple[NDArray[Any], ...]]:
@@ -324,6 +304,11 @@ def _parsed(path: Path, texts: Texts, name: str, parse: Callable[[str], Any]) ->
         raise InputError(f"{path}: {name}", texts[name], f"cannot be read: {error}", "train again") from None
 
 
+def _value(path: Path, texts: Texts, name: str, hint: Any) -> Any:
+    """Return the header's text `name`, which is JSON, as an annotation asks for."""
+    return _parsed(path, texts, name, lambda text: to_value(hint, text, name, "train or import it again"))
+
+
 def _activation(path: Path, texts: Texts) -> str:
     """Return the name of the activation; files of version 1 have the sine."""
     if texts["version"] == VERSION:
@@ -333,11 +318,6 @@ def _activation(path: Path, texts: Texts) -> str:
             raise InputError(f"{path}: activation", name, rule, "train again")
         return name
     return str(_parsed(path, texts, "activation", lambda name: activation_named(name).name))
-
-
-def _window(text: str) -> Window:
-    """Return the window of a JSON object."""
-    return to_dataclass(Window, parse_json(text, "window", "train again"), "window", whole=True)
 
 
 def _decimal(text: str) -> float:
@@ -352,14 +332,6 @@ def _whole(text: str) -> int:
     if not _WHOLE.fullmatch(text):
         raise ValueError("a decimal integer is needed")
     return int(text)
-
-
-def _names(text: str) -> tuple[str, ...]:
-    """Return a JSON list of strings."""
-    names = parse_json(text, "features", "train again")
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError("a list of names is needed")
-    return tuple(names)
 
 
 def _check(path: Path, check: Callable[[Any], None], content: Any) -> None:

@@ -20,7 +20,7 @@ import resource
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
@@ -299,7 +299,7 @@ def to_dataclass(
             way_out = choice(key, known) if known else "remove it"
             raise InputError(f"{path}.{key}", data[key], f"{kind.__name__} has no such key", way_out)
     hints = _hints(kind)  # type: ignore[arg-type]
-    convert = _Converter(largest, special or {})
+    convert = _Converter(largest, special or {}, whole)
     values = {}
     for name, spec in known.items():
         if name in data:
@@ -309,11 +309,18 @@ def to_dataclass(
     return kind(**values)
 
 
+def to_value(hint: Any, text: str | bytes, path: str, way_out: str) -> Any:
+    """Return what an annotation asks for of a JSON text; its records are whole."""
+    return _Converter(math.inf, {}, True)(hint, parse_json(text, path, way_out), path)
+
+
+@dataclass(frozen=True)
 class _Converter:
     """Turns JSON values into what annotations ask for."""
 
-    def __init__(self, largest: float, special: Special) -> None:
-        self.largest, self.special = largest, special
+    largest: float
+    special: Special
+    whole: bool
 
     def __call__(self, hint: Any, value: Any, path: str) -> Any:
         """Convert a JSON value to what the annotation `hint` asks for."""
@@ -330,7 +337,7 @@ class _Converter:
                 raise InputError(path, value, "must map strings to strings", "write {} for none")
             return {_text(key, path): _text(item, f"{path}.{key}") for key, item in value.items()}
         if is_dataclass(hint):
-            return to_dataclass(hint, value, path, largest=self.largest, special=self.special)  # type: ignore[arg-type]
+            return to_dataclass(hint, value, path, **vars(self))  # type: ignore[arg-type]
         arguments = get_args(hint)
         if type(None) in arguments:
             return None if value is None else self(arguments[0], value, path)

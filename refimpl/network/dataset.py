@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..encoding import to_display
 from ..errors import NO_VALUE, InputError, choice
 from ..frame import DIRECT, FIRST_HIT, LAYERS, SEEN_DIRECT, SUN, Frame, check_finite
-from ..reading import parse_json, to_dataclass
+from ..reading import to_value
 from ..rng import counter, random_block
 from ..vectors import vector
 from .smoothing import DEPTH, GUIDES, LEVELS, dimmed, smooth
@@ -275,9 +275,7 @@ def check_normalization(normalization: Normalization) -> None:
 
 def normalization_from_json(text: str) -> Normalization:
     """Return the normalization written in `text`, or say what is wrong with it."""
-    way_out = "train the model again"
-    data = parse_json(text, "normalization", way_out)
-    normalization = to_dataclass(Normalization, data, "normalization", whole=True)
+    normalization: Normalization = to_value(Normalization, text, "normalization", "train the model again")
     check_normalization(normalization)
     return normalization
 

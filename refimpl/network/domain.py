@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..frame import Frame
-from ..reading import parse_json, to_dataclass
+from ..reading import to_value
 from .dataset import FEATURES, channels_of, check_features, feature_image
 from .denoise import Model
 
@@ -220,7 +220,7 @@ def to_json(domain: Domain) -> str:
 
 def from_json(text: str) -> Domain:
     """Return the domain that a model's text holds, or say what is wrong with it."""
-    domain = to_dataclass(Domain, parse_json(text, DOMAIN, WAY_OUT), DOMAIN, whole=True)
+    domain: Domain = to_value(Domain, text, DOMAIN, WAY_OUT)
     check_features(domain.features)
     channels = channels_of(domain.features)
     for name in ("middle", "scale"):

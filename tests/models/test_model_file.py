@@ -149,7 +149,7 @@ DAMAGE = {
     ),
     "no features": (without("features"), "list of header entries '.*': 'features' must be among them"),
     "features unknown": (with_text("features", '["glow"]'), "model: feature 'glow': unknown"),
-    "features no list": (with_text("features", '"color"'), "features '.*': cannot be read: a list of names"),
+    "features no list": (with_text("features", '"color"'), "features 'color': must be a list"),
     "features no JSON": (with_text("features", "color"), "features 'color': is not acceptable JSON"),
     "other features": (
         with_text("features", '["color"]'),

@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.network import window
-from ..core import weights
 from ..core.ir import DTYPES, Gather, Program
 from ..core.profiles import SineContract
-from ..core.weights import Slot
+from ..core.weights import Slot, weights
 from ..kernel.interface import PLAIN as PLAIN
 from ..kernel.kernel import Kernel
 from ..kernel.sizes import integer, item_bytes
@@ -145,13 +144,22 @@ class Schedule(Nest):
         size = {"pixels": columns, **({"rows": rows} if rows > 1 else {})}
         return {"name": self.name, "idea": self.idea, **size, **self.details(program)}
 
+    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
+        """Return all weights as they are stored, by name: input-major, so that loops walk through memory."""
+        return {key: array.T for key, array in weights(program).items()}
+
     def layout(self, program: Program) -> Mapping[str, Slot]:
         """Return the slot of each weight."""
-        return weights.layout(program)
+        slots, offset = {}, 0
+        for key, array in self.stored(program).items():
+            slots[key] = Slot(key, array.shape, offset)
+            offset += array.size
+        return slots
 
     def pack(self, program: Program) -> NDArray[np.float32]:
         """Return the weights (count,) as `layout` places them."""
-        return weights.pack(program)
+        arrays = (array.ravel() for array in self.stored(program).values())
+        return np.concatenate([np.zeros(0, np.float32), *arrays], dtype=np.float32)
 
     def coded(self, program: Program, parameters: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
         """Return other numbers (count,) in the places of the weights: to find where each one is."""
@@ -176,7 +184,7 @@ def _check_channels(program: Program, dialect: Dialect) -> None:
 
 
 class Stored(Schedule):
-    """A schedule on vectors, whose weights are stored in an order of its own: arrays one after another."""
+    """A schedule on vectors."""
 
     def refusal(self, program: Program) -> str:
         """Return why the values of a program cannot all be vectors, or nothing."""
@@ -197,22 +205,6 @@ class Stored(Schedule):
         if output.op in ("constant", "parameter", "input"):
             return "the output is not computed"
         return ""
-
-    def stored(self, program: Program) -> Mapping[str, NDArray[np.float32]]:
-        """Return all weights as they are stored, by name."""
-        raise NotImplementedError
-
-    def layout(self, program: Program) -> Mapping[str, Slot]:
-        """Return the slot of each weight."""
-        slots, offset = {}, 0
-        for key, array in self.stored(program).items():
-            slots[key] = Slot(key, array.shape, offset)
-            offset += array.size
-        return slots
-
-    def pack(self, program: Program) -> NDArray[np.float32]:
-        """Return the weights (count,) as `layout` places them."""
-        return np.concatenate([np.zeros(0, np.float32), *(a.ravel() for a in self.stored(program).values())])
 
     def beyond_stack(self, program: Program) -> str:
         """Return why an item's memory cannot hold the arrays, or nothing."""

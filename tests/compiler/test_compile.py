@@ -21,11 +21,10 @@ from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.core.weights import layout, pack
 from wamnet.compiler.languages.hosts import ShadertoyDenoise
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.schedules.plain import Packed
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.dataset import Window
@@ -79,7 +78,8 @@ def test_compiling_again_gives_the_same_bytes():
 
 def test_weights_are_packed_input_major():
     program = lower(model())
-    slots, packed = layout(program), pack(program)
+    plain = schedule_named("opencl", "plain")
+    slots, packed = plain.layout(program), plain.pack(program)
     for name, array in program.parameters.items():
         slot = slots[name]
         assert np.array_equal(packed[slot.offset : slot.offset + array.size].reshape(slot.shape), array.T)

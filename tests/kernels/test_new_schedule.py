@@ -9,7 +9,6 @@ import pytest
 
 from wamnet.compiler import targets
 from wamnet.compiler.compile import compile_program
-from wamnet.compiler.core import weights
 from wamnet.compiler.kernel.interface import WEIGHTS
 from wamnet.compiler.kernel.kernel import load, rewritten
 from wamnet.compiler.languages.canonical import canonical
@@ -38,7 +37,7 @@ class Backwards(Plain):
         return replace(kernel, body=rewritten(kernel.body, turned))
 
     def pack(self, program):
-        return weights.pack(program)[::-1].copy()
+        return super().pack(program)[::-1].copy()
 
 
 @pytest.mark.parametrize("target", ["opencl", "opengl", "c"])

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wamnet.compiler.core.ir import Image
-from wamnet.compiler.core.weights import pack
 from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
@@ -79,6 +78,11 @@ def tiled(program, target, lanes=4, pixels=3, vectors=2):
 def plain(program):
     """Return the plain kernel of a program."""
     return Plain(C()).build(program)
+
+
+def pack(program):
+    """Return the weights of the plain kernel."""
+    return Plain(C()).pack(program)
 
 
 def rendered(kernel, target, weights, bounded=True):

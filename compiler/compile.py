@@ -29,7 +29,7 @@ from .core.ir import OUTPUT_ENCODING, Image, Program
 from .core.passes import pipeline
 from .core.profiles import Profile, SineContract
 from .core.sums import is_split
-from .languages.dialect import Dialect
+from .languages.dialect import NOTHING, Dialect
 from .languages.listing import Listing, listed
 from .languages.renderer import Renderer
 from .plan import Bound, Plan, plan_program
@@ -63,6 +63,9 @@ WIDE = 88
 Entry = tuple[str, Sequence[str]]
 """An entry of a header: its title and its lines."""
 
+CALLED = "arguments"
+"""Title of the entry that says how a kernel is called."""
+
 
 def assemble(
     title: str,
@@ -70,21 +73,25 @@ def assemble(
     renderer: Renderer,
     programs_by_name: Sequence[tuple[str, Program]],
     entries: Sequence[Entry],
-    arguments: str,
     facts: Mapping[str, Any],
     programs: Any,
     images: Sequence[Image] = (),
     weights: NDArray[np.float32] | None = None,
     part: str = "",
+    lists: Mapping[str, Sequence[str]] = NOTHING,
+    notes: Mapping[str, str] = NOTHING,
 ) -> Artifact:
     """Return a kernel with its source and its manifest, of what is particular to it.
 
     `renderer` prints it, or where no language is its programs by name are listed; `entries` are those of its
-    header, `facts` of its manifest; `programs` are kept for an interpreter. `part`: what a language calls it
-    whose hosts join it with the denoiser's other kernel.
+    header, of which one may be CALLED, `facts` those of its manifest; `programs` are kept for an interpreter.
+    `part`: what a language calls it whose hosts join it with the denoiser's other kernel; `lists`, `notes`:
+    what else there is to say of its arguments [languages/dialect.py: Dialect.arguments].
     """
     dialect, kernel = renderer.dialect, renderer.kernel
-    role, lines = kernel.interface.role, header(title, dialect, entries)
+    arguments, role = dialect.arguments(kernel, lists, notes), kernel.interface.role
+    called = [(t, arguments.split("\n") if t == CALLED else texts) for t, texts in entries]
+    lines = header(title, dialect, called)
     is_listed, entry = isinstance(dialect, Listing), dialect.entries[role]
     source = listed(lines, programs_by_name) if is_listed else renderer.source(lines)
     if part:
@@ -199,7 +206,6 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
         schedule.renderer(emitted, is_ordered),
         [("", emitted)],
         [*_entries(plan, bound), *notes, ("weights", textwrap.wrap(places, WIDE))],
-        schedule.arguments(emitted),
         _facts(plan, bound, weights),
         emitted,
         images=kernel_gather(emitted).images,
@@ -239,7 +245,7 @@ def _entries(plan: Plan, bound: Bound) -> list[Entry]:
         ("assumes", assumes),
         ("sums", [SUMS] if is_split(gather) and plan.shares_bound else []),
         ("schedule", [] if plan.schedule.name == PLAIN else [schedule_text(plan.schedule_facts)]),
-        ("arguments", plan.schedule.arguments(plan.emitted).split("\n")),
+        (CALLED, []),
     ]
 
 

@@ -64,7 +64,6 @@ class Declared:
     type: tree.Type
     sizes: tuple[int | None, ...] | None = None
     written: bool = True
-    variable: bool = False
 
 
 def verify(kernel: tree.Kernel) -> None:
@@ -229,7 +228,7 @@ class Verifier:
             if sizes:
                 raise KernelError(f"{name} is an array with a first value")
             self.check(value, kind, f"the first value of {name}")
-        self.declare(name, Declared(kind, sizes, variable=not sizes))
+        self.declare(name, Declared(kind, sizes))
 
     def size(self, array: tree.Array, size: int | tree.Expr) -> int | None:
         """Return a size of an array; that of the device's memory may depend on the picture."""

@@ -109,7 +109,7 @@ Two = tuple[str, str]
 
 
 class C(Arguments):
-    """The dialect's table; `steps` move to the pixel of the next call, along a row and down."""
+    """The dialect's table."""
 
     target = "c"
     language = "C99"
@@ -121,7 +121,6 @@ class C(Arguments):
         ENCODE: "wamnet_encode",
     }
     ends = {**dict.fromkeys(INTEGERS, POPPED), PATH: f"{RESTORED}{POPPED[1:]}"}
-    steps = ("++x", "++y")
     heading = "static inline void {entry}"
     reads = "const float *restrict {name}"
     writes = "float *restrict {name}"

@@ -232,7 +232,7 @@ class Dialect:
     # ---- words of kernels as data [renderer.py] ------------------------------------------------------------
 
     def arguments(
-        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+        self, kernel: Kernel, lists: Mapping[str, Sequence[str]] = NOTHING, notes: Mapping[str, str] = NOTHING
     ) -> str:
         """Return how a kernel is called: what its arguments are, and how many items are started.
 
@@ -246,8 +246,9 @@ class Dialect:
                 continue
             number = f"{numbers[array.name]} " if self.numbered else ""
             note = f", {notes[array.name]}" if array.name in notes else ""
-            listed = f":\n{lists[array.name]}" if array.name in lists else ""
-            said.append(textwrap.fill(f"{number}{self.about(array)}{note}", 98) + listed)
+            listed = "\n".join(textwrap.wrap(", ".join(lists.get(array.name, ())), 98))
+            about = textwrap.fill(f"{number}{self.about(array)}{note}", 98)
+            said.append(f"{about}:\n{listed}" if listed else about)
         names = [name for name in interface.integers if name in notes or not self.numbered]
         said.append("; ".join(f"{n}: {notes[n]}" if n in notes else n for n in names))
         return ";\n".join(filter(None, said)) + f".\n{self.launch(kernel)}"

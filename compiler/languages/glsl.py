@@ -176,7 +176,7 @@ class GLSL(Dialect):
         return [*(f"uniform {kind} {name};" for name, kind in kinds.items()), *scene]
 
     def arguments(
-        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+        self, kernel: Kernel, lists: Mapping[str, Sequence[str]] = NOTHING, notes: Mapping[str, str] = NOTHING
     ) -> str:
         """Return how a kernel is called."""
         return self.called or super().arguments(kernel, lists, notes)

@@ -26,7 +26,7 @@ class Listing(Dialect):
     native_sine = SineContract("np.sin, whose documentation promises nothing", None)
 
     def arguments(
-        self, kernel: Kernel, lists: Mapping[str, str] = NOTHING, notes: Mapping[str, str] = NOTHING
+        self, kernel: Kernel, lists: Mapping[str, Sequence[str]] = NOTHING, notes: Mapping[str, str] = NOTHING
     ) -> str:
         """Return how a program is called."""
         return PRINTED

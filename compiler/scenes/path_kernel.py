@@ -14,7 +14,6 @@ schedule, to the byte.
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -23,7 +22,7 @@ from ...refimpl.errors import CompileError
 from ...refimpl.light.scene import Scene
 from ...refimpl.network.dataset import Normalization
 from ..artifact import Artifact
-from ..compile import Entry, asdict_finite, assemble
+from ..compile import CALLED, Entry, asdict_finite, assemble
 from ..core import ir, profiles
 from ..core.passes import pipeline
 from ..core.profiles import Profile
@@ -96,8 +95,6 @@ def compile_path(
     described = (f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images)
     means = (SUMS[0], "encoded features, means over the samples of one launch:", *described)
     written = (*(means if images else SUMS), *_notes(programs, bool(images)))
-    listed = {} if images else {interface.SUMS: "\n".join(textwrap.wrap(", ".join(planes), 98))}
-    arguments = renderer.dialect.arguments(renderer.kernel, listed, {"samples": "to add up"})
     at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
     entries = _entries(programs, promised, at_once, written)
     facts = {
@@ -119,11 +116,12 @@ def compile_path(
         promised,
         renderer,
         list(passed.items()),
-        [*entries, ("arguments", [] if isinstance(dialect, Listing) else arguments.split("\n"))],
-        arguments,
+        [*entries, *([] if isinstance(dialect, Listing) else [(CALLED, ())])],
         facts,
         emitted,
         images=images,
+        lists={} if images else {interface.SUMS: planes},
+        notes={"samples": "to add up"},
     )
 
 

@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ..artifact import Artifact
-from ..compile import assemble
+from ..compile import CALLED, assemble
 from ..core import ir
 from ..core.ir import Image, Program
 from ..core.profiles import Profile
@@ -63,13 +62,11 @@ def compiled(
     dialect, profile = how[0].dialect, how[1]
     renderer = Renderer(dialect, kernel, profile.sine is not None)
     kernel, digests, role = renderer.kernel, [ir.digest(each) for each in used], kernel.interface.role
-    columns = {key: "\n".join(textwrap.wrap(", ".join(names), 98)) for key, names in lists.items()}
-    arguments = dialect.arguments(kernel, columns, notes)
     entries = [
         *(("program", [digest[:32]]) for digest in digests),
         ("images", [f"{i.name}: {i.channels} channels in {i.range_text}, {i.encoding}" for i in images]),
         ("bound", [bound]),
-        ("arguments", arguments.split("\n")),
+        (CALLED, []),
     ]
     several = {"role": role, "programs": digests, "lanes": kernel.step[0].value}
     own = {"program": digests[0]} if role == ENCODE else several
@@ -79,10 +76,11 @@ def compiled(
         renderer,
         [("", each) for each in used],
         entries,
-        arguments,
         {**own, **facts},
         programs,
         images=images,
+        lists=lists,
+        notes=notes,
     )
 
 

@@ -113,11 +113,6 @@ class Schedule(Nest):
             _check_channels(program, self.dialect)
         return Renderer(self.dialect, self.kernel(program), bounded, self.pack(program))
 
-    def arguments(self, program: Program) -> str:
-        """Return how the kernel is called."""
-        renderer = self.renderer(program, False)
-        return renderer.dialect.arguments(renderer.kernel)
-
     def enclosures(
         self, program: Program, sine: SineContract, images: Images | None = None, rows: slice = ALL
     ) -> list[Enclosure]:

@@ -132,8 +132,11 @@ def compile_lowered(step: Step, size: int) -> Artifact:
         renderer,
         [("", step.program)],
         [("program", [digest[:32]])],
-        "by the launches of the kernel: see spec/train_kernel.md",
-        {"program": digest, "passes": profile.passes},
+        {
+            "program": digest,
+            "passes": profile.passes,
+            "arguments": "by the launches of the kernel: see spec/train_kernel.md",
+        },
         step,
     )
 

@@ -30,7 +30,7 @@ from .schedules.fft import Fourier
 from .schedules.group import Grouped
 from .schedules.names import parse
 from .schedules.passes import FourierPasses
-from .schedules.plain import Packed, Plain, Printed
+from .schedules.plain import Packed, Plain
 from .schedules.schedules import Schedule
 from .schedules.straight import Inline
 from .schedules.tile import Tile
@@ -88,21 +88,10 @@ TILES = {
 }
 """Pixels of a tile, and its idea: AVX-512, AVX2, and SSE or NEON have those registers."""
 
-FFT_IDEA = "the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {}"
-"""What an FFT schedule says of itself."""
-
-DOT_IDEA = "products of bytes, four at a time, of a network of integers"
-"""What the schedule of bytes for processors says of itself."""
-
-PASSES_IDEA = (
-    "the sums over the window by FFT, in passes: an item is a line, a frequency or a pixel of a tile"
-)
-"""What the FFT schedule in passes says of itself."""
-
 
 def passes(dialect: Dialect, instead: str = "group:4") -> tuple[Schedule, ...]:
     """Return the schedule of transforms for languages whose functions do not take such places."""
-    return (FourierPasses(dialect, "fftpasses:32", PASSES_IDEA, instead=instead, points=32),)
+    return (FourierPasses(dialect, "fftpasses:32", instead=instead, points=32),)
 
 
 def groups(dialect: Dialect) -> tuple[Schedule, ...]:
@@ -114,7 +103,7 @@ def groups(dialect: Dialect) -> tuple[Schedule, ...]:
         idea = f"the same with {pixels} pixels an item, which share each weight"
         found.append(Grouped(dialect, f"group:{pixels}", idea, pixels=pixels, instead="group:1", **of))
     if dialect.words:
-        idea = f"group:4 with {DOT_IDEA}: {dialect.words}"
+        idea = f"group:4 with {Dot.idea}: {dialect.words}"
         found.append(GroupDot(dialect, "groupdot:4", idea, pixels=4, instead="group:4", **of))
     return tuple(found)
 
@@ -140,10 +129,11 @@ def processor(dialect: Dialect) -> Language:
     for lanes in dialect.tiles if dialect.transforms else ():
         tile = f"tile:{lanes}"
         sizes = {"lanes": lanes, "pixels": TILES[tile][0], "points": 32, "tiles": 2}
-        found.append(Fourier(dialect, f"fft:{lanes}", FFT_IDEA.format(lanes), instead=tile, **sizes))
+        idea = f"the sums over the window by FFT, in tiles of 32 x 32 pixels and vectors of {lanes}"
+        found.append(Fourier(dialect, f"fft:{lanes}", idea, instead=tile, **sizes))
     found += () if dialect.transforms else passes(dialect)
     if dialect.dot_of_bytes:
-        found.append(Dot(dialect, "dot:16", DOT_IDEA, lanes=16, pixels=14))
+        found.append(Dot(dialect, "dot:16", lanes=16, pixels=14))
     return _of(dialect, *found, *(groups(dialect) if dialect.group else ()))
 
 
@@ -174,7 +164,13 @@ take 8,000 operations, in 1 to 5 s, those of 300 in 9 to 60 s. A walk is slower 
 LANGUAGES: Mapping[str, Language] = {
     target.name: target
     for target in (
-        Language(Listing(), (Printed(Listing()),), paths=(1,), planes=(1,), runs=SHOWN),
+        Language(
+            Listing(),
+            (Plain(Listing(), idea="one operation after another, all pixels at once"),),
+            paths=(1,),
+            planes=(1,),
+            runs=SHOWN,
+        ),
         replace(processor(OpenCL()), paths=LANES, planes=LANES, forms=Forms(trees=True), runs=SHOWN),
         replace(
             _of(GLSL(), Inline(GLSL()), *passes(GLSLCompute(), "inlined"), *groups(GLSLCompute())),

@@ -16,11 +16,14 @@ VERSION = "#version 300 es"
 MOST_BUFFERS = 4
 """Colour buffers that every implementation draws into at once (MAX_DRAW_BUFFERS)."""
 
-ES_PREAMBLE = """\
+NO_PRECISE = "#define PRECISE /* GLSL ES 3.00 has no `precise` */"
+"""What stands for a word that the language lacks."""
+
+ES_PREAMBLE = f"""\
 precision highp float;
 precision highp int;
 precision highp sampler2D;
-#define PRECISE /* GLSL ES 3.00 has no `precise` */"""
+{NO_PRECISE}"""
 """What replaces the first lines of GLSL 3.30: numbers of 32 bits everywhere."""
 
 ASSUMES = (
@@ -28,9 +31,6 @@ ASSUMES = (
     "the language has no word to demand it. Run the check pair on a new device before you rely on the bound"
 )
 """What a bound rests on in a language without `precise`."""
-
-NATIVE_SINE = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
-"""The target's own sine."""
 
 TEXTURES = "float textures to draw into need EXT_color_buffer_float in OpenGL ES 3.0 and WebGL 2"
 """What callers of all these shaders must know."""
@@ -41,7 +41,7 @@ class GLSLES(GLSL):
 
     target = "glsl-es"
     language = "GLSL ES 3.00, fragment shader"
-    native_sine = NATIVE_SINE
+    native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     assumes = ASSUMES
     unordered = ("", "")
     first: tuple[str, ...] = (VERSION,)

@@ -11,13 +11,9 @@ the tab that is shown turns the picture.
 
 from __future__ import annotations
 
-from ..core.profiles import SineContract
 from ..kernel.interface import DENOISE
 from .glsl import GLSL
-from .glsl_es import ASSUMES, GLSLES
-
-NO_PRECISE = "#define PRECISE /* GLSL ES 3.00 has no `precise` */"
-"""The first line of a tab."""
+from .glsl_es import ASSUMES, GLSLES, NO_PRECISE
 
 CHANNEL_OF = (
     "float channel_of(vec4 texel, int c)",
@@ -42,7 +38,6 @@ class ShadertoyDenoise(GLSLES):
     sampler, colour, started = "#define {name} iChannel{number} /* Buffer */", "", "vec4 "
     main = "void mainImage(out vec4 fragColor, in vec2 fragCoord)"
     fragment = ("int(fragCoord.x)", "int(iResolution.y) - 1 - int(fragCoord.y)")
-    native_sine = SineContract("sin() of GLSL ES 3.00, which promises nothing", None)
     max_output_channels = 4
     called = (
         "iChannel0, iChannel1, ...: the buffers of the images in this order, of the size of the view,\n"
@@ -58,7 +53,7 @@ class GodotDenoise(GLSL):
     suffix = ".gdshader"
     entries = {DENOISE: "fragment"}
     ends = {DENOISE: "    COLOR = result;\n}"}
-    native_sine = ShadertoyDenoise.native_sine
+    native_sine = GLSLES.native_sine
     assumes = ASSUMES
     unordered = ("", "")
     qualifiers = {}

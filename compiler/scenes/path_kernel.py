@@ -29,8 +29,7 @@ from ..core.profiles import Profile
 from ..kernel import interface
 from ..kernel.kernel import Kernel
 from ..languages.dialect import Dialect
-from ..languages.glsl_es import GLSLES
-from ..languages.hosts import NO_PRECISE, GodotDenoise
+from ..languages.hosts import GodotDenoise, ShadertoyDenoise
 from ..languages.listing import Listing
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named
@@ -200,14 +199,10 @@ def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Se
 # ---- passes of hosts --------------------------------------------------------------------------------------
 
 
-class _ShadertoyPath(GLSLES):
+class _ShadertoyPath(ShadertoyDenoise):
     """The words of a path, and of the encoding at its end, whose channels are those of a variable."""
 
-    target = "shadertoy"
     language = "Shadertoy (GLSL ES 3.00), one buffer a feature"
-    suffix = ".glsl"
-    first: tuple[str, ...] = ()
-    preamble = NO_PRECISE
     most_numbers = 0
     paints = True
     fragment = ("at.x", "at.y")

@@ -71,6 +71,7 @@ def used(kernel: tree.Kernel, launch: tree.Launch) -> list[str]:
 class FourierPasses(Transformed, Straight):
     """Tiles of `points` x `points` pixels, one launch after another."""
 
+    idea = "the sums over the window by FFT, in passes: an item is a line, a frequency or a pixel of a tile"
     order = (
         "the spectrum of the matrix that reads the window: columns of frequencies 0 to points / 2, groups "
         "of 32 neurons, rows of frequencies, pairs of channels, (real, imaginary) of the first and of the "

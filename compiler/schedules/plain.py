@@ -239,9 +239,3 @@ class Packed(Stored, Plain):
 def lanes(value: tree.Expr, count: int) -> list[tree.Expr]:
     """Return the first components of a vector, or a single value."""
     return [value.lane(c) for c in range(count)] if value.type.lanes > 1 else [value]
-
-
-class Printed(Plain):
-    """The program as text, which is all that the interpreter needs."""
-
-    idea = "one operation after another, all pixels at once"

@@ -179,16 +179,15 @@ def _report(plan: Plan, cut: Cut) -> Mapping[str, Any]:
 
 def _joined(before: Artifact, found: Artifact, report: Mapping[str, Any]) -> Artifact:
     """Return both passes as one artifact, whose manifest holds the first one's."""
-    digest = ir.sha256(f"{before.digest} {found.digest}".encode())
-    factored = {**report, HORIZONTAL: before.manifest}
-    files = {f"{artifact.FIRST_PASS}{name}": value for name, value in before.manifest["files"].items()}
-    files = {**files, **found.manifest["files"]}
-    bound = {**found.manifest["bound"], "against": "float64 reference of the program that was cut"}
-    sizes = {f"{artifact.FIRST_PASS}{name}": size for name, size in before.manifest[SIZES].items()}
-    own = {"digest": digest, "files": files, SIZES: {**sizes, **found.manifest[SIZES]}, "bound": bound}
-    own["factored"] = factored
-    manifest = {**found.manifest, **own}
-    return replace(found, manifest=manifest, before=before)
+    own = {
+        "digest": ir.sha256(f"{before.digest} {found.digest}".encode()),
+        "bound": {**found.manifest["bound"], "against": "float64 reference of the program that was cut"},
+        "factored": {**report, HORIZONTAL: before.manifest},
+    }
+    for key in ("files", SIZES):
+        first = {f"{artifact.FIRST_PASS}{name}": value for name, value in before.manifest[key].items()}
+        own[key] = {**first, **found.manifest[key]}
+    return replace(found, manifest={**found.manifest, **own}, before=before)
 
 
 def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: str = "") -> Artifact:

@@ -171,7 +171,13 @@ class Plan:
             ranges.append((float(argument.low.min()), float(argument.high.max())))
             # What a sine without a contract passes on is unknown: there is no domain to check against.
             if self.sine.error is not None and not bounds.argument_reach(argument).max() <= self.sine.domain:
-                _refuse_domain(number + 1, len(sines), index, ranges[-1], self.sine)
+                low, high = ranges[-1]
+                raise CompileError(
+                    f"sine {number + 1} of {len(sines)} (layer {number}, %{index}) may get arguments from "
+                    f"{low:.6g} to {high:.6g}: the sine ({self.sine.text}) is proven for |x| <= "
+                    f"{self.sine.domain:g}; use a smaller omega_0, smaller weights or features of a smaller "
+                    "range, or profile native, which guarantees less"
+                )
         errors = bounds.output_errors(program, found)[program.outputs[0][0]]
         if not all(math.isfinite(error) for error in errors):
             return Bound(None, tuple(ranges))
@@ -282,18 +288,6 @@ def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:
                 f"maximum is {np.finfo(np.float32).max:.3g}; use smaller weights, a smaller omega_0 or "
                 "features of a smaller range, or profile native, which then has no bound"
             )
-
-
-def _refuse_domain(
-    number: int, count: int, index: int, found: tuple[float, float], contract: SineContract
-) -> None:
-    """Raise: a sine may be given an argument for which nothing is proven."""
-    raise CompileError(
-        f"sine {number} of {count} (layer {number - 1}, %{index}) may get arguments from {found[0]:.6g} "
-        f"to {found[1]:.6g}: the sine ({contract.text}) is proven for |x| <= {contract.domain:g}; "
-        "use a smaller omega_0, smaller weights or features of a smaller range, or profile native, which "
-        "guarantees less"
-    )
 
 
 def _per_pixel(array: Any, size: tuple[int, ...]) -> NDArray[np.float64]:

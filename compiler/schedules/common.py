@@ -88,6 +88,12 @@ def loop(counter: str, count: tree.Expr | int, *body: tree.Statement) -> tree.Fo
     return tree.For(counter, expr(count), body)
 
 
+def constant(node: Node) -> tree.Expr:
+    """Return the value of a constant node."""
+    value: Any = node["value"]
+    return const(float(value) if node.type.dtype == "float32" else value, tree.Type(node.type.dtype))
+
+
 class _Statements:
     """The statements of a program, one an operation, and the value of each node [`lets`].
 
@@ -120,8 +126,7 @@ class _Statements:
             key = str(node["name"])
             return self.known.get(key) or name(key, kind)
         if node.op == "constant":
-            number: Any = node["value"]
-            return splat(const(float(number) if kind.of(1) == tree.FLOAT else number, kind.of(1)), self.lanes)
+            return splat(constant(node), self.lanes)
         if node.op == "loop":
             return self.values[node.args[int(node["index"])]]  # type: ignore[arg-type]
         return name(f"{self.prefix}{index}", kind)
@@ -306,12 +311,6 @@ class Nest:
             readers = [r for r in readers if self.program.nodes[r].op != "affine"]
         return bool(readers) or any(index == output for _, output in self.program.outputs)
 
-    def constant(self, node: Node) -> tree.Expr:
-        """Return the value of a constant node."""
-        dtype = node.type.dtype
-        value = node["value"]
-        return const(float(value) if dtype == "float32" else value, tree.Type(dtype))  # type: ignore[arg-type]
-
     def statements(self, group: Sequence[int], read: Read, lanes: int) -> list[tree.Let]:
         """Return a statement for each node of an elementwise group; `read`: values of other groups."""
         found: dict[int, tree.Expr] = {}
@@ -356,7 +355,7 @@ class Nest:
     def operand(self, index: int, read: Read) -> tree.Expr:
         """Return a constant, or what another group has computed."""
         node = self.program.nodes[index]
-        return self.constant(node) if node.op == "constant" else read(index)
+        return constant(node) if node.op == "constant" else read(index)
 
     def span(self, group: Sequence[int]) -> tree.Comment:
         """Return the comment above an elementwise group."""

@@ -24,7 +24,7 @@ from ..core.sums import is_split
 from ..kernel import kernel as tree
 from ..kernel.interface import PLAIN, RESULT
 from ..kernel.kernel import apply, const, load, name, splat
-from .common import HEIGHT, X, Y, clamp, loop, output_channels, weight
+from .common import HEIGHT, X, Y, clamp, constant, loop, output_channels, weight
 from .schedules import Schedule, Stored
 from .straight import VECTOR, ZERO
 
@@ -80,7 +80,7 @@ class Plain(Schedule):
         """Return a value, or one component of it."""
         node = self.program.nodes[index]
         if node.op == "constant":
-            return self.constant(node)
+            return constant(node)
         if node.op == "parameter":
             return weight(self.offset(node["name"]) + lane if lane else self.offset(node["name"]))
         kind = tree.Type(node.type.dtype)

@@ -19,8 +19,7 @@ from .languages.cuda import CUDA
 from .languages.dialect import Dialect
 from .languages.glsl import GLSL, GLSLCompute
 from .languages.glsl_buffers import Compute, Vulkan
-from .languages.glsl_es import GLSLES
-from .languages.hosts import GodotDenoise, ShadertoyDenoise
+from .languages.glsl_es import GLSLES, GodotDenoise, ShadertoyDenoise
 from .languages.listing import Listing
 from .languages.metal import Metal
 from .languages.opencl import LANES, OpenCL

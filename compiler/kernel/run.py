@@ -2,7 +2,7 @@
 
 1. A value of one lane is an array (items,), or one number where it is the same for all items; a vector is an
    array (lanes, items). Branches and loops whose bounds depend on the item only change the mask.
-2. Floats belong to a domain [domain.py]: float32 rounded after every operation gives the bits of the C source
+2. Floats belong to a domain [memory.py]: float32 rounded after every operation gives the bits of the C source
    compiled without contraction.
 3. Every access is checked [memory.py]: an index beyond its array, a value that is read before it is written,
    two items of a group that use one element without a barrier between, a pixel written twice or never.
@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from ..core.ops import OPS
 from . import kernel as tree
-from .domain import STORED, Domain, computed
 from .interface import IMAGE, RESULT, UNSIGNED, WEIGHTS
 from .interface import Array as Declared
-from .memory import Items, Memory, Part
+from .memory import STORED, Domain, Items, Memory, Part, computed
 from .verify import STEPS, KernelError, verify
 from .walker import Walker
 

@@ -29,7 +29,7 @@ from ..core.profiles import Profile
 from ..kernel import interface
 from ..kernel.kernel import Kernel
 from ..languages.dialect import Dialect
-from ..languages.hosts import GodotDenoise, ShadertoyDenoise
+from ..languages.glsl_es import GodotDenoise, ShadertoyDenoise
 from ..languages.listing import Listing
 from ..languages.renderer import Renderer
 from ..targets import Language, language_named

@@ -21,7 +21,7 @@ from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.profiles import PROFILES
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.languages.hosts import ShadertoyDenoise
+from wamnet.compiler.languages.glsl_es import ShadertoyDenoise
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.schedules.plain import Packed
 from wamnet.compiler.targets import DENOISERS, schedule_named

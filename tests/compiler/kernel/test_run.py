@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.ir import Gather, Image
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.kernel.domain import Domain
 from wamnet.compiler.kernel.interface import RESULT, denoiser
 from wamnet.compiler.kernel.kernel import (
     BOOL,
@@ -45,6 +44,7 @@ from wamnet.compiler.kernel.kernel import (
     name,
     splat,
 )
+from wamnet.compiler.kernel.memory import Domain
 from wamnet.compiler.kernel.run import Runner, run
 from wamnet.compiler.kernel.verify import KernelError
 from wamnet.compiler.languages.c import C

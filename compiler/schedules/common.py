@@ -53,10 +53,15 @@ def output_channels(program: Program) -> int:
     return shape[0] if shape else 1
 
 
+def reading_window(program: Program) -> list[int]:
+    """Return the indices of the nodes that read the window."""
+    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
+    return [index for index, node in enumerate(program.nodes) if inputs & set(node.args)]
+
+
 def readers_of_window(program: Program) -> list[Node]:
     """Return the nodes that read the window."""
-    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
-    return [node for node in program.nodes if inputs & set(node.args)]
+    return [program.nodes[index] for index in reading_window(program)]
 
 
 def groups_of(program: Program) -> list[tuple[int, ...]]:

@@ -35,7 +35,7 @@ from ..core.trace import trace
 from ..core.verify import verify
 from ..proof import bounds
 from ..proof.bounds import Enclosure
-from .common import kernel_gather
+from .common import kernel_gather, reading_window
 from .schedules import Images, windows
 
 Array = NDArray[np.float64]
@@ -172,8 +172,7 @@ def at_images(cut: Cut, contract: SineContract, images: Images, of_cut: bool = T
 
 def _layer(program: Program) -> int:
     """Return the index of the affine map that is the window's only reader, or refuse the program."""
-    inputs = {index for index, node in enumerate(program.nodes) if node.op == "input"}
-    readers = [index for index, node in enumerate(program.nodes) if inputs & set(node.args)]
+    readers = reading_window(program)
     names = [node["weight"] for node in program.nodes if node.op == "affine"]
     if len(readers) != 1 or program.nodes[readers[0]].op != "affine":
         found = ", ".join(f"%{index} ({program.nodes[index].op})" for index in readers) or "nothing"

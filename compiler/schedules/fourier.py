@@ -41,7 +41,7 @@ from ..core.ops import OPS
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..proof import bounds, scaled, spectra
 from ..proof.bounds import Enclosure
-from .common import kernel_gather
+from .common import kernel_gather, reading_window
 
 Array = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def arrangement(program: Program, lanes: int) -> Arrangement:
     of one is an error of the other. Where something but sines, rectifiers and matrices reads the layer, or
     its parameters are used twice, the order is that of the program.
     """
-    index = next(i for i in range(len(program.nodes)) if _reads_window(program, i))
+    index = reading_window(program)[0]
     node = program.nodes[index]
     weight, bias = str(node["weight"]), node.get("bias")
     uses = [
@@ -210,7 +210,7 @@ def enclose(
 
     `x`: the windows' box (low, high); `norm` (...): largest norm of the tile, centred, that holds a window.
     """
-    index = next(i for i in range(len(program.nodes)) if _reads_window(program, i))
+    index = reading_window(program)[0]
     node = program.nodes[index]
     until = replace(program, nodes=program.nodes[: index + 1], outputs=())
     exact = bounds.enclose(until, {"window": x}, sine)[index]
@@ -232,12 +232,6 @@ def _bias(program: Program, node: Node) -> Array:
     """Return a layer's bias (D_out,), zeros where it has none."""
     held = node.get("bias")
     return np.zeros(node.type.shape[0]) if held is None else program.parameters[str(held)].astype(np.float64)
-
-
-def _reads_window(program: Program, index: int) -> bool:
-    """Return whether a node is an affine map of the window."""
-    node = program.nodes[index]
-    return node.op == "affine" and program.nodes[node.args[0]].op == "input"
 
 
 def radius(gather: Gather, centres: Array) -> Array:

@@ -8,7 +8,6 @@ a word; `wamnet_floats` makes sums floats; `wamnet_numbers` reads four words of 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 
 PORTABLE = "WAMNET_PORTABLE"
 """What to define where a kernel may use nothing beyond its language's own standard."""
@@ -80,24 +79,7 @@ float4 wamnet_numbers(int4 bits)
 """
 """Words of bytes: no sum is near the ends of 32 bits, where the instruction would saturate."""
 
-Calls = Sequence[tuple[str, str, str, str]]
-"""Functions of C: name, arguments, what is done by operators or instructions, and for each lane `i`."""
-
-VECTOR_CALLS: Calls = (
-    ("clear", "VECTOR *to", "*to = (VECTOR){0};", "to->lane[i] = 0.0f;"),
-    ("load", "VECTOR *to, const float *from", "*to = *(const VECTOR *)from;", "to->lane[i] = from[i];"),
-    ("store", "float *to, const VECTOR *from", "*(VECTOR *)to = *from;", "to[i] = from->lane[i];"),
-    ("add", "VECTOR *sum, const VECTOR *term", "*sum += *term;", "sum->lane[i] += term->lane[i];"),
-    (
-        "add_product",
-        "VECTOR *sum, const VECTOR *weight, float value",
-        "*sum += *weight * value;",
-        "sum->lane[i] += weight->lane[i] * value;",
-    ),
-)
-"""What is done with vectors."""
-
-BYTE_CALLS: Calls = (
+BYTE_CALLS = (
     (
         "start",
         "wamnet_sums *to, const float *from",
@@ -125,23 +107,23 @@ BYTE_CALLS: Calls = (
         "to[i] = (float)from->lane[i];",
     ),
 )
-"""What is done with vectors of bytes, and of their sums."""
+"""What is done with vectors of bytes and their sums: name, arguments, by instructions, in each lane `i`."""
 
 
-def functions(calls: Calls, loops: bool) -> str:
-    """Return functions of C; those in loops may take for granted that several vectors are apart."""
+def functions(loops: bool) -> str:
+    """Return these functions of C; those in loops may take for granted that several vectors are apart."""
     found = []
-    for name, takes, at_once, each in calls:
+    for name, takes, at_once, each in BYTE_CALLS:
         body = each if loops else at_once
         if loops and "[i]" in each:
             lines = textwrap.indent(each, "    ")
             body = f"WAMNET_ROLLED\nfor (int i = 0; i < LANES; ++i) {{\n{lines}\n}}"
-        if loops and takes.count("VECTOR") + takes.count("wamnet_") > 1:
+        if loops and takes.count("wamnet_") > 1:
             takes = takes.replace("*", "*restrict ")
-        head = f"static inline void wamnet_{name}({takes})".replace("VECTOR", "wamnet_vector")
+        head = f"static inline void wamnet_{name}({takes})"
         if len(head) > 100:
             head = head.replace(", ", ",\n    ").replace("(", "(\n    ", 1)
-        found.append(f"{head}\n{{\n{textwrap.indent(body, '    ')}\n}}\n".replace("VECTOR", "wamnet_vector"))
+        found.append(f"{head}\n{{\n{textwrap.indent(body, '    ')}\n}}\n")
     return "\n".join(found)
 
 
@@ -151,7 +133,7 @@ C_TILE = f"""\
 typedef __m512i wamnet_sums;
 typedef __m512i wamnet_bytes;
 
-{functions(BYTE_CALLS, False)}#else
+{functions(False)}#else
 typedef struct {{
     int32_t lane[LANES];
 }} wamnet_sums;
@@ -159,7 +141,7 @@ typedef struct {{
     int8_t byte[4 * LANES];
 }} wamnet_bytes;
 
-{functions(BYTE_CALLS, True)}#endif
+{functions(True)}#endif
 """
 """The types of vectors of sums and of bytes, and what is done with them."""
 
@@ -300,20 +282,20 @@ STRAIGHT = """\
 GCC would make straight code of the loops over lanes too, instead of vectors."""
 
 
-def gnu_vectors(lanes: str) -> str:
-    """Return GCC's type of vectors of so many floats, which need no alignment, and what is done with them."""
-    kind = f"__attribute__((vector_size(4 * {lanes}), aligned(4), may_alias))"
-    return f"typedef float wamnet_vector {kind};\n\n{functions(VECTOR_CALLS, False)}"
-
-
 CLONES = """\
-/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+/* Without options for newer processors they are compiled for too, and a program takes what its own suits:
+   by GCC each function on vectors, by clang all of them within wamnet_image. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \\
-    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+    !defined(__AVX__) && !defined(WAMNET_PORTABLE)
+#if defined(__clang__) && __clang_major__ >= 14
+#define WAMNET_CLONES __attribute__((always_inline))
+#define WAMNET_IMAGE_CLONES __attribute__((target_clones("fma", "default")))
+#elif !defined(__clang__) && __GNUC__ >= 12
 #define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #endif
+#endif
 """
-"""The attribute of functions on vectors; on x86 without AVX2 its copy is slow: define WAMNET_PORTABLE."""
+"""The attributes of functions on vectors."""
 
 CLONED = """\
 #if defined(WAMNET_CLONES)
@@ -321,33 +303,47 @@ WAMNET_CLONES
 #endif"""
 """The attribute of the function that is declared next."""
 
-VECTORS = f"""\
-{CLONES}/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \\
-    defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
-{gnu_vectors("LANES")}#else
+CLONED_IMAGE = CLONED.replace("CLONES", "IMAGE_CLONES")
+"""The same of the function of all pixels."""
+
+TRANSFORMS = "\n".join(
+    f"{CLONED}\nstatic void wamnet_{name}(const wamnet_vector *from, int step, wamnet_vector *to, int leap);"
+    for name in ("forward", "backward")
+)
+"""The attribute of transforms, which are defined below."""
+
+LANEWISE = (
+    ("wamnet_sum", "wamnet_vector b", "+", "b.lane[i]"),
+    ("wamnet_difference", "wamnet_vector b", "-", "b.lane[i]"),
+    ("wamnet_scaled", "float b", "*", "b"),
+)
+"""Operations on vectors in C: name, second argument, operator, and that argument in lane `i`."""
+
+
+def c_vectors(lanes: str) -> str:
+    """Return the type of vectors of so many floats, and what is done with them, by operators or in loops."""
+    calls = [
+        (name, f"wamnet_vector a, {other}", "", f"{sign}= {lane}") for name, other, sign, lane in LANEWISE
+    ]
+    others = "\n".join(
+        f"static inline wamnet_vector {name}({takes})\n{{\n{first}    WAMNET_ROLLED\n"
+        f"    for (int i = 0; i < {lanes}; ++i) {{\n        a.lane[i] {each};\n    }}\n    return a;\n}}\n"
+        for name, takes, first, each in (("wamnet_zero", "void", "    wamnet_vector a;\n", "= 0.0f"), *calls)
+    )
+    macros = "".join(f"#define {name}(a, b) ((a) {sign} (b))\n" for name, _, sign, _ in LANEWISE)
+    return f"""\
+{CLONES}/* GCC's vectors are fast where the processor has registers of so many floats, else very slow. */
+#if defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE) && (defined(__clang__) || \\
+    {lanes} <= 4 || ({lanes} <= 8 && defined(__AVX__)) || defined(__AVX512F__) || defined(WAMNET_CLONES))
+typedef float wamnet_vector __attribute__((vector_size(4 * {lanes}), aligned(4), may_alias));
+#define wamnet_zero() ((wamnet_vector){{0}})
+{macros}#else
 typedef struct {{
-    float lane[LANES];
+    float lane[{lanes}];
 }} wamnet_vector;
 
-{functions(VECTOR_CALLS, True)}#endif
-{CLONED}
-"""
-"""The type of vectors and what is done with them, by GCC and clang, and by other compilers."""
+{others}#endif"""
 
-
-def transform_vectors(lanes: str) -> str:
-    """Return GCC's vectors, and the attribute of the functions of transforms, which are defined behind it."""
-    takes = "(const wamnet_vector *from, int step, wamnet_vector *to, int leap);"
-    declared = (f"{CLONED}\nstatic void wamnet_{name}{takes}" for name in ("forward", "backward"))
-    return "\n".join([f"{CLONES}{gnu_vectors(lanes)}", *declared])
-
-
-REFUSED = """\
-#if !defined(__GNUC__)
-#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
-#endif"""
-"""What other compilers say: C99 has no vector type with operators."""
 
 CUDA_VECTOR = """\
 #ifndef WAMNET_VECTOR

@@ -17,14 +17,14 @@ from ..core.profiles import SineContract
 from ..kernel.instructions import (
     C_TILE,
     CLONED,
+    CLONED_IMAGE,
     FUSED,
     PRAGMAS,
-    REFUSED,
     RESTRICT,
     STRAIGHT,
+    TRANSFORMS,
     UNFUSED,
-    VECTORS,
-    transform_vectors,
+    c_vectors,
 )
 from ..kernel.interface import DENOISE, ENCODE, INTEGERS, PATH, UNSIGNED, Array, Interface
 from ..kernel.kernel import Kernel, operations
@@ -218,11 +218,9 @@ class C(Arguments):
             above = [*includes(DENOISE, *names, "string"), FUSED, top, STRAIGHT, C_TILE]
         elif kernel.weights.lanes == 1:
             above = [*head, UNFUSED, top]
-        elif kernel.functions:
-            vectors = transform_vectors(str(kernel.weights.lanes))
-            above = [*head, REFUSED, FUSED, STRAIGHT, vectors, top, CLONED]
         else:
-            above = [*head, FUSED, top, STRAIGHT, VECTORS]
+            vectors = [c_vectors(str(kernel.weights.lanes)), *([TRANSFORMS] if kernel.functions else [])]
+            above = [*head, FUSED, STRAIGHT, *vectors, top, CLONED]
         said = "One pixel (x, y): its channels are written to `result`, the whole picture's array."
         said = said if interface.role == DENOISE else "One pixel (x, y)."
         if kernel.step[0].value != 1:
@@ -235,8 +233,10 @@ class C(Arguments):
         steps = (f"x += {along}" if along else "++x", f"y += {down}" if down else "++y")
         clamps = interface.role == DENOISE or "clamp" in operations(kernel)
         limit = CLAMP.replace(C.clamp, self.clamp) if clamps else ""
-        functions_of = self.functions(interface, said, kernel.place, steps, limit)
-        return "\n".join([*above, *functions_of, unused, *self.strides(interface)])
+        functions_of = "\n".join(self.functions(interface, said, kernel.place, steps, limit))
+        if above[-1] == CLONED:
+            functions_of = functions_of.replace(ALL_PIXELS, f"{ALL_PIXELS}\n{CLONED_IMAGE}")
+        return "\n".join([*above, functions_of, unused, *self.strides(interface)])
 
     def listed(self, kernel: Interface) -> list[str]:
         """Return all arguments: the integers of a path kernel are in one structure."""
@@ -279,24 +279,26 @@ class C(Arguments):
         return f"{every} does all pixels, {name}_pixel {one}: call that from your own loops{stack}"
 
     def fitted(self, kernel: Kernel) -> Dialect:
-        """Return the dialect for a kernel: transforms need operators on vectors, which C99 does not have.
+        """Return the dialect for a kernel: vectors of floats have operations in expressions.
 
         Headers of several roles may be in one source, and share no name.
         """
         found, role = super().fitted(kernel), kernel.interface.role
-        found.calls_vectors = not kernel.functions and role != PATH
+        found.calls_vectors = kernel.weights.dtype == "int32" and role != PATH
         if not found.calls_vectors:
             found.mixed = (self.mixed[0], f"*(wamnet_vector *)({self.mixed[1]})", self.mixed[2])
+            named = {"add": "wamnet_sum", "subtract": "wamnet_difference", "multiply": "wamnet_scaled"}
+            found.vector_operations = {op: f"{name}({{0}}, {{1}})" for op, name in named.items()}
         found.clamp = self.clamp if role == DENOISE else f"wamnet_{role}_clamp"
         if role == PATH:
             vars(found).update(vector_kinds=TYPES, vector_operations=OPERATIONS, helpers=HELPERS)
         return found
 
     def vector_of(self, kind: str, values: Sequence[str]) -> str:
-        """Return a vector of one value in all lanes."""
+        """Return a vector of one value in all lanes, which is that value where a vector is scaled by it."""
         if kind in TYPES.values():
             return f"wamnet_all({kind}, {MASKS.get(values[0], values[0])})"
-        return f"({kind}){{0}}" if values[0] == "0.0f" else f"(({kind}){{0}} + {values[0]})"
+        return "wamnet_zero()" if values[0] == "0.0f" else values[0]
 
     def opening(self, kernel: Interface) -> list[str]:
         """Return the first statements: the functions have the place of a pixel already."""

@@ -342,9 +342,8 @@ class Renderer:
             self._line(self.dialect.index(statement.name, self.text(statement.value)))
             return
         if kind.lanes > 1 and self.dialect.calls_vectors:
-            factors = kind.dtype == "int32"
-            self._line(f"{'wamnet_bytes' if factors else self.kind(kind)} {statement.name};")
-            self._vector_call(f"&{statement.name}", statement.value, False, not factors)
+            self._line(f"wamnet_bytes {statement.name};")
+            self._vector_call(f"&{statement.name}", statement.value, False)
             return
         text = self.text(statement.value)
         kind_of = self.variable(kind, statement.kept)
@@ -380,11 +379,15 @@ class Renderer:
             self._line(self._dotted(target, *value.args))
             return
         if value.type.lanes > 1 and self.dialect.calls_vectors:
-            self._vector_call(target if statement.array in self.mixed else f"&{target}", value, statement.add)
+            self._vector_call(target if statement.array in self.mixed else f"&{target}", value)
             return
         sign = "+" if statement.add else ""
         if sign and value.op == "negative":
             sign, value = "-", value.args[0]
+        operation = self.dialect.vector_operations.get({"+": "add", "-": "subtract"}.get(sign, ""))
+        if operation and value.type.lanes > 1:
+            self._line(f"{target} = {operation.format(target, self.text(value))};")
+            return
         self._line(f"{target} {sign}= {self.text(value)};")
 
     def _dotted(self, total: str, weights: tree.Expr, four: tree.Expr) -> str:
@@ -412,27 +415,17 @@ class Renderer:
             return f"({self.kind(value.type)}){self.text(value.args[0], UNARY)}", UNARY
         return self._operation(value)
 
-    def _vector_call(self, into: str, value: tree.Expr, add: bool, starts: bool = True) -> None:
-        """Write a change of a vector as a call of one of the language's own functions.
+    def _vector_call(self, into: str, value: tree.Expr, starts: bool = True) -> None:
+        """Write a change of sums of bytes' products as a call of one of the language's own functions.
 
         `starts`: words of weights are where a sum begins, not factors.
         """
         if value.op == "convert":
             place = self.element(value.args[0].value, value.args[0].args, value.type.lanes)
-            call, given = "floats", [f"&{place}"]
-        elif value.op == "splat":
-            call, given = "clear", []
-        elif value.op == "multiply":
-            factor, number = value.args
-            call, given = "add_product", [f"&{self.text(factor)}", self.text(number.args[0])]
-        elif value.value == WEIGHTS:
-            call = {"float32": "load", "int32": "start"}[value.type.dtype] if starts else "weights"
-            given = [f"weights + {self.text(value.args[0], 11)} * LANES"]
-        else:
-            place = self.element(value.value, value.args, value.type.lanes)
-            call = "add" if add else "load" if value.value in self.mixed else "store"
-            given = [place if value.value in self.mixed else f"&{place}"]
-        self._line(f"wamnet_{call}({', '.join([into, *given])});")
+            self._line(f"wamnet_floats({into}, &{place});")
+            return
+        call = "start" if starts else "weights"
+        self._line(f"wamnet_{call}({into}, weights + {self.text(value.args[0], 11)} * LANES);")
 
     def _result(self, index: Sequence[tree.Expr], value: tree.Expr) -> None:
         """Write a channel of the result; a language may have lines around those of a pixel."""

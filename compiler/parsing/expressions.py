@@ -10,7 +10,7 @@ import numpy as np
 
 from ..kernel.interface import IMAGE, RESULT, WEIGHTS
 from ..kernel.kernel import FLOAT, INT, Expr, Type, const, load, name, parts, terms, total
-from .grammar import BINARY, COMPARED, PRODUCTS, SHIFTS
+from .grammar import BINARY, COMPARED, LANEWISE, PRODUCTS, SHIFTS
 from .reader import Reader, Unread
 
 
@@ -83,7 +83,7 @@ class Expressions(Reader):
             value = self._unary()
             self._check_vectors("-", value)
             return const(-value.value, value.type) if value.op == "const" else self._made("negative", value)
-        if self.in_floats and self._has("*", "("):
+        if self.by_calls and self._has("*", "("):
             self._has("const")
             self._form("wamnet_vector * ) (")
             vector = self._vector()
@@ -91,9 +91,6 @@ class Expressions(Reader):
             return vector
         if self.language.casts and self._now() == "(" and self._now(1) in self.types and self._now(2) == ")":
             (kind,) = self._form("( K )")
-            if kind.lanes > 1 and self.in_floats:
-                self._take("{", "0", "}")
-                return Expr("splat", (const(0.0),), kind)
             if kind.lanes > 1 and self.language.makers:
                 raise Unread("several values behind a cast, which is a comma here")
             if kind.lanes > 1:
@@ -136,7 +133,8 @@ class Expressions(Reader):
         if kind != "word":
             raise Unread(f"{text!r} is not a value")
         self._take()
-        return self._call(text) if self._has("(") else self._postfix(text)
+        read = self._lanewise if text in LANEWISE else self._call
+        return read(text) if self._has("(") else self._postfix(text)
 
     def _float(self, text: str) -> Expr:
         """Return a constant; its digits are so many that each reader finds the same float32."""
@@ -185,6 +183,17 @@ class Expressions(Reader):
         if word.startswith("f") and any(value.type.dtype != "float32" for value in values):
             raise Unread(f"{word} of integers")
         return self._made(operation, *values)
+
+    def _lanewise(self, word: str) -> Expr:
+        """Read an operation of C on vectors in an expression: of two, or of one and a single value."""
+        kind = self.types["wamnet_vector"]
+        if word == "wamnet_zero":
+            self._take(")")
+            return Expr("splat", (const(0.0),), kind)
+        values = self._arguments()
+        if [value.type for value in values] != [kind, FLOAT if word == "wamnet_scaled" else kind]:
+            raise Unread(f"{word} of other values than it takes")
+        return self._made(LANEWISE[word], *values)
 
     def _mixed(self, no: Expr, yes: Expr, where: Expr) -> Expr:
         """Return one of two values; GLSL takes a truth for each lane, in fragment shaders floats only."""
@@ -259,7 +268,7 @@ class Expressions(Reader):
         in_union = mixed and "wamnet_vector" not in self.types
         part = self._take(".") and self._take() if in_union else ""
         indices = self._sizes()
-        if len(indices) == count + 1 and kind.lanes > 1 and not self.in_floats:
+        if len(indices) == count + 1 and kind.lanes > 1 and not self.by_calls:
             place, lane = indices
             index = place.args[0] if place.args else place
             halves = self._made("divide", index, const(4)), self._made("remainder", index, const(4))

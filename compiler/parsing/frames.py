@@ -15,20 +15,20 @@ from ..kernel.instructions import (
     BUILTINS,
     C_TILE,
     CLONED,
+    CLONED_IMAGE,
     CUDA_GROUP,
     CUDA_VECTOR,
     FUSED,
     OPENCL_GROUP,
     OPENCL_TILE,
-    REFUSED,
     RESTRICT,
     STRAIGHT,
+    TRANSFORMS,
     UNFUSED,
-    VECTORS,
     VULKAN_EXTENSION,
     VULKAN_GROUP,
     WGSL_GROUP,
-    transform_vectors,
+    c_vectors,
 )
 from ..kernel.interface import ITEMS
 
@@ -44,7 +44,7 @@ OPEN: Mapping[str, str] = {
     "images": r"(?P=images)",
     "given": r"(?P<given>(?:image_\w+, )+)",
     "first": r"(?P<first>image_\w+)", "same_first": r"(?P=first)",
-    "group": r"(?P<grouped>)", "words": r"(?P<words>)", "gnu": r"(?P<gnu>)", "tiled": r"(?P<tiled>)",
+    "group": r"(?P<grouped>)", "words": r"(?P<words>)", "gnu": r"(?P<gnu>)",
     "bounded": r"(?P<bounded>)",
     "column": r"(?P<column>x|tile_x)", "row": r"(?P<row>y|tile_y)",
     "x": r"(?P=column)", "y": r"(?P=row)",
@@ -55,7 +55,8 @@ OPEN: Mapping[str, str] = {
     "vector": r"(?P<vector>(?:float|int)(?:2|4|8|16)|wamnet_vector|i?vec4|vec4<[fi]32>)",
     "same_vector": r"(?P=vector)",
     "shared": r"(?P<shared>float|int|f32|i32)",
-    "lanes": r"(?P<lanes>\d+)",
+    "lanes": r"(?P<lanes>\d+)", "same_lanes": r"(?P=lanes)",
+    "dropped": r"(?:#undef wamnet_(?:difference|scaled|sum|zero)\n)*",
     "body": r"(?P<body>.*\n)?",
     "memory": r"(?P<memory>(?:layout\(std430, binding = \d+\) restrict buffer \w+ \{ vec2 \w+\[\]; \};\n)+)",
     "launches": r"(?P<launches>#if STAGE == 0\n.*)",
@@ -64,7 +65,7 @@ OPEN: Mapping[str, str] = {
 
 BLOCKS = (
     "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
-    "tiled", "memory", "launches", *"(|)<>",
+    "dropped", "memory", "launches", *"(|)<>",
 )  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
@@ -195,28 +196,27 @@ FRAMES: dict[str, str] = {
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
 @)@
-@(@@gnu@{REFUSED}
-@)@
 @<@{UNFUSED}
 @|@{FUSED}
 @>@
 @(@@gnu@{STRAIGHT}
-{transform_vectors("@lanes@")}
+{c_vectors("@same_lanes@").replace("@same_lanes@", "@lanes@", 1)}
+@(@{TRANSFORMS}
+@)@
 @)@
 @constants@
 @functions@
 @(@@gnu@{CLONED}
 @)@
-@(@@tiled@{STRAIGHT}
-{VECTORS}
-@|@@words@
-@tiled@
+@(@@words@
 {STRAIGHT}
 {C_TILE}
 @)@
 static inline void wamnet_pixel({ARGUMENTS},
 int @column@,
 int @row@);
+@(@{CLONED_IMAGE}
+@)@
 static inline void wamnet_image({SAME})
 {{
 for (int y = 0; y < height; @advance_y@) {{
@@ -238,6 +238,7 @@ int @y@)
 #endif
 @undefined@
 #undef restrict
+@dropped@
 #endif
 """,
     "opencl": f"""

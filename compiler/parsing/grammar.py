@@ -48,6 +48,11 @@ OPENCL_CALLS = {
 }  # fmt: skip
 """Further functions of OpenCL C."""
 
+LANEWISE = {
+    "wamnet_zero": "splat", "wamnet_sum": "add", "wamnet_difference": "subtract", "wamnet_scaled": "multiply",
+}  # fmt: skip
+"""Functions of C on vectors in expressions."""
+
 LEAST_MOST = {"min": "minimum", "max": "maximum"}
 """Functions of integers."""
 
@@ -171,9 +176,7 @@ FUNCTION = re.compile(r"elementwise_\d+(_of_one)?|forward|backward")
 """The names of functions."""
 
 CALLS = {
-    "clear": "wamnet_vector", "load": "wamnet_vector float", "store": "float wamnet_vector",
     "start": "wamnet_sums float", "weights": "wamnet_bytes float", "floats": "float wamnet_sums",
-    "add": "wamnet_vector wamnet_vector", "add_product": "wamnet_vector wamnet_vector",
     "dot": "wamnet_sums wamnet_bytes",
 }  # fmt: skip
 """C's functions on vectors, and what they take the addresses of: first the vector that they set."""

@@ -114,8 +114,6 @@ class Parser(Expressions):
         known = {each.name: each.value for each in constants}
         if set(re.findall(r"#undef (\w+)", parts.get("undefined", ""))) - {*known}:
             raise Unread("an #undef of what is not a constant of this source")
-        if "tiled" in parts and "LANES" not in known:
-            raise Unread("vectors of no stated lanes")
         self._vectors(known.get("LANES"))
         self._read(parts.get("functions", ""))
         while self._now():
@@ -165,15 +163,14 @@ class Parser(Expressions):
             self.vector = self._kind(parts["vector"])
             if parts.get("lanes", str(self.vector.lanes)) != str(self.vector.lanes):
                 raise Unread(f"words of {parts['lanes']} sums in vectors of {self.vector.lanes}")
-        elif "lanes" in parts:  # of C with operators on vectors
-            self.vector = self.types["wamnet_vector"] = tree.FLOAT.of(int(parts["lanes"]))
-        elif lanes is not None and "wamnet_" in parts.get("body", "") and not self.language.number:
-            kind = tree.INT if "wamnet_sums" in parts["body"] else tree.FLOAT
-            self.vector = kind.of(int(lanes.value))
-            self.types |= {"wamnet_vector": tree.FLOAT.of(int(lanes.value))}
-            self.types |= dict.fromkeys(("wamnet_sums", "wamnet_bytes"), tree.INT.of(int(lanes.value)))
-        self.by_calls = "lanes" not in parts and "wamnet_sums" in self.types
-        self.in_floats = self.by_calls or ("lanes" in parts and "vector" not in parts)
+        elif "lanes" in parts or "words" in parts:  # of C
+            if lanes is None or str(lanes.value) != parts.get("lanes", str(lanes.value)):
+                raise Unread("vectors of no stated lanes")
+            self.types["wamnet_vector"] = self.vector = tree.FLOAT.of(int(lanes.value))
+            if "words" in parts:
+                self.vector = tree.INT.of(int(lanes.value))
+                self.types |= dict.fromkeys(("wamnet_sums", "wamnet_bytes"), self.vector)
+        self.by_calls = "wamnet_vector" in self.types and not self.language.number
 
     def _step(self, text: str | None) -> tree.Expr:
         """Return how many pixels an item takes along an axis."""
@@ -396,7 +393,7 @@ class Parser(Expressions):
         space: Space = "item",
     ) -> tree.Array:
         """Return an array; in C one of floats of LANES times a count holds vectors."""
-        if self.in_floats and len(sizes) == 1 and kind == tree.FLOAT:
+        if self.by_calls and len(sizes) == 1 and kind == tree.FLOAT:
             size = sizes[0]
             if size.op == "multiply" and size.args[1] == tree.name("LANES"):
                 kind, sizes, mixed = self.types["wamnet_vector"], [size.args[0]], True
@@ -470,12 +467,15 @@ class Parser(Expressions):
         if target.type == tree.BYTE and value.op == "const":
             value = tree.const(value.value, tree.BYTE)
         value = self._of(value, target.type, target.value)
+        summed = value.op in ("add", "subtract") and target.type.lanes > 1 and value.args[0] == target
         product = sign == "+=" and value.op == "multiply" and any(map(self._is_weight, value.args))
         product = product and not any(map(rounds, value.args))
         if not (product and LAYER.fullmatch(target.value)):
             self._check_order(target.value, value, word, sign != "=")
         if sign == "-=" or (sign == "+=" and target.type.dtype != "float32"):
             self._check_vectors(sign, value)
+        if summed and self.by_calls and sign == "=":
+            sign, value = {"add": "+=", "subtract": "-="}[value.op], value.args[1]
         value = self._made("negative", value) if sign == "-=" else value
         return tree.Store(target.value, target.args, value, sign != "=")
 
@@ -542,22 +542,18 @@ class Parser(Expressions):
         target = self._vector()
         if target.op != "load":
             raise Unread("a call that sets a value which never changes")
-        add, pointers = call in ("add", "add_product", "dot"), [self.pointer]
+        pointers = [self.pointer]
         vectors: list[tree.Expr] = []
         while len(pointers) < len(CALLS.get(call, "").split()) and self._has(","):
             vectors.append(self._vector())
             pointers.append(self.pointer)
         if pointers != CALLS.get(call, "").split():
             raise Unread(f"wamnet_{call} of {', '.join(pointers)}")
-        if call == "clear":
-            value = tree.Expr("splat", (tree.const(0.0),), target.type)
-        elif call == "add_product":
-            self._take(",")
-            value = self._made("multiply", *vectors, self._expression())
-        elif call == "dot":
+        if call == "dot":
             self._take(",")
             value = tree.Expr("dot4", (*vectors, self._four()), target.type)
         else:
             value = self._made("convert", *vectors, value="float32") if call == "floats" else vectors[0]
         self._take(")")
-        return tree.Store(target.value, target.args, self._of(value, target.type, target.value), add)
+        value = self._of(value, target.type, target.value)
+        return tree.Store(target.value, target.args, value, call == "dot")

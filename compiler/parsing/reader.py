@@ -46,8 +46,8 @@ class Scope:
 class Reader:
     """The tokens of a part of a source, and the scope at one of them.
 
-    `vector`: the type of the weights. C has vectors in arrays of floats (`in_floats`), and functions in
-    place of operators (`by_calls`). `bounded`: what an error bound rests on must be there.
+    `vector`: the type of the weights. C has vectors in arrays of floats, and functions in place of
+    operators (`by_calls`). `bounded`: what an error bound rests on must be there.
     """
 
     def __init__(self, language: Language, parts: Mapping[str, str], channels: dict[str, int]) -> None:
@@ -57,7 +57,7 @@ class Reader:
         grouped = ("local_x", "local_y", "item") if "shared" in parts else ()
         self.scope = Scope(dict.fromkeys((*places, *grouped, "width", "height"), INT))
         self.place = places
-        self.by_calls = self.in_floats = self.bounded = False
+        self.by_calls = self.bounded = False
         self.passes: Passes | None = None
         self.functions: dict[str, Function] = {}
         self.tokens: list[tuple[str, str]] = []

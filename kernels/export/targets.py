@@ -211,8 +211,8 @@ on others; the latter is for graphics processors."""
 ON_PROCESSORS = (*SPECTRA, "tile:16", "tile:8", "tile:4", "vector:16", BYTES[0])
 """Schedules of OpenCL for processors."""
 
-IN_C = ("tile:8", "tile:16", "tile:4", *SPECTRA, BYTES[0], PLAIN)
-"""Schedules of C. Those of spectra are the fastest, but only GCC and clang take them."""
+IN_C = (*SPECTRA, "tile:8", "tile:16", "tile:4", BYTES[0], PLAIN)
+"""Schedules of C."""
 
 ROWS: tuple[Row, ...] = (
     Row(

@@ -13,9 +13,6 @@
 #if defined(__FAST_MATH__) || !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error the error bound needs float arithmetic as in IEEE 754: no -ffast-math, and on x86 -msse2 -mfpmath=sse
 #endif
-#if !defined(__GNUC__)
-#error this schedule needs the vectors of GCC or clang: export a schedule of tiles for other compilers
-#endif
 /* A product may be fused with a sum: the bound holds either way. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
@@ -38,38 +35,67 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
-/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+/* Without options for newer processors they are compiled for too, and a program takes what its own suits:
+   by GCC each function on vectors, by clang all of them within wamnet_image. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
-    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+    !defined(__AVX__) && !defined(WAMNET_PORTABLE)
+#if defined(__clang__) && __clang_major__ >= 14
+#define WAMNET_CLONES __attribute__((always_inline))
+#define WAMNET_IMAGE_CLONES __attribute__((target_clones("fma", "default")))
+#elif !defined(__clang__) && __GNUC__ >= 12
 #define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #endif
+#endif
+/* GCC's vectors are fast where the processor has registers of so many floats, else very slow. */
+#if defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE) && (defined(__clang__) || \
+    4 <= 4 || (4 <= 8 && defined(__AVX__)) || defined(__AVX512F__) || defined(WAMNET_CLONES))
 typedef float wamnet_vector __attribute__((vector_size(4 * 4), aligned(4), may_alias));
+#define wamnet_zero() ((wamnet_vector){0})
+#define wamnet_sum(a, b) ((a) + (b))
+#define wamnet_difference(a, b) ((a) - (b))
+#define wamnet_scaled(a, b) ((a) * (b))
+#else
+typedef struct {
+    float lane[4];
+} wamnet_vector;
 
-static inline void wamnet_clear(wamnet_vector *to)
+static inline wamnet_vector wamnet_zero(void)
 {
-    *to = (wamnet_vector){0};
+    wamnet_vector a;
+    WAMNET_ROLLED
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] = 0.0f;
+    }
+    return a;
 }
 
-static inline void wamnet_load(wamnet_vector *to, const float *from)
+static inline wamnet_vector wamnet_sum(wamnet_vector a, wamnet_vector b)
 {
-    *to = *(const wamnet_vector *)from;
+    WAMNET_ROLLED
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] += b.lane[i];
+    }
+    return a;
 }
 
-static inline void wamnet_store(float *to, const wamnet_vector *from)
+static inline wamnet_vector wamnet_difference(wamnet_vector a, wamnet_vector b)
 {
-    *(wamnet_vector *)to = *from;
+    WAMNET_ROLLED
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] -= b.lane[i];
+    }
+    return a;
 }
 
-static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
+static inline wamnet_vector wamnet_scaled(wamnet_vector a, float b)
 {
-    *sum += *term;
+    WAMNET_ROLLED
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] *= b;
+    }
+    return a;
 }
-
-static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
-{
-    *sum += *weight * value;
-}
-
+#endif
 #if defined(WAMNET_CLONES)
 WAMNET_CLONES
 #endif
@@ -100,22 +126,22 @@ static void wamnet_forward(const wamnet_vector *from, int step, wamnet_vector *t
     wamnet_vector t5 = from[step * 4 + 1];
     wamnet_vector t6 = from[step * 6];
     wamnet_vector t7 = from[step * 6 + 1];
-    wamnet_vector t8 = t0 + t4;
-    wamnet_vector t9 = t1 + t5;
-    wamnet_vector t10 = t0 - t4;
-    wamnet_vector t11 = t1 - t5;
-    wamnet_vector t12 = t2 + t6;
-    wamnet_vector t13 = t3 + t7;
-    wamnet_vector t14 = t2 - t6;
-    wamnet_vector t15 = t3 - t7;
-    wamnet_vector t16 = t8 + t12;
-    wamnet_vector t17 = t9 + t13;
-    wamnet_vector t18 = t8 - t12;
-    wamnet_vector t19 = t9 - t13;
-    wamnet_vector t20 = t10 - t15;
-    wamnet_vector t21 = t11 + t14;
-    wamnet_vector t22 = t10 + t15;
-    wamnet_vector t23 = t11 - t14;
+    wamnet_vector t8 = wamnet_sum(t0, t4);
+    wamnet_vector t9 = wamnet_sum(t1, t5);
+    wamnet_vector t10 = wamnet_difference(t0, t4);
+    wamnet_vector t11 = wamnet_difference(t1, t5);
+    wamnet_vector t12 = wamnet_sum(t2, t6);
+    wamnet_vector t13 = wamnet_sum(t3, t7);
+    wamnet_vector t14 = wamnet_difference(t2, t6);
+    wamnet_vector t15 = wamnet_difference(t3, t7);
+    wamnet_vector t16 = wamnet_sum(t8, t12);
+    wamnet_vector t17 = wamnet_sum(t9, t13);
+    wamnet_vector t18 = wamnet_difference(t8, t12);
+    wamnet_vector t19 = wamnet_difference(t9, t13);
+    wamnet_vector t20 = wamnet_difference(t10, t15);
+    wamnet_vector t21 = wamnet_sum(t11, t14);
+    wamnet_vector t22 = wamnet_sum(t10, t15);
+    wamnet_vector t23 = wamnet_difference(t11, t14);
     to[0] = t16;
     to[1] = t17;
     to[leap * 2] = t22;
@@ -135,20 +161,20 @@ static void wamnet_backward(const wamnet_vector *from, int step, wamnet_vector *
     wamnet_vector t5 = from[step * 4 + 1];
     wamnet_vector t6 = from[step * 6];
     wamnet_vector t7 = from[step * 6 + 1];
-    wamnet_vector t8 = t0 + t4;
-    wamnet_vector t9 = t1 + t5;
-    wamnet_vector t10 = t0 - t4;
-    wamnet_vector t11 = t1 - t5;
-    wamnet_vector t12 = t2 + t6;
-    wamnet_vector t13 = t3 + t7;
-    wamnet_vector t14 = t2 - t6;
-    wamnet_vector t15 = t3 - t7;
-    wamnet_vector t16 = t8 + t12;
-    wamnet_vector t17 = t9 + t13;
-    wamnet_vector t18 = t8 - t12;
-    wamnet_vector t19 = t9 - t13;
-    wamnet_vector t20 = t10 - t15;
-    wamnet_vector t21 = t11 + t14;
+    wamnet_vector t8 = wamnet_sum(t0, t4);
+    wamnet_vector t9 = wamnet_sum(t1, t5);
+    wamnet_vector t10 = wamnet_difference(t0, t4);
+    wamnet_vector t11 = wamnet_difference(t1, t5);
+    wamnet_vector t12 = wamnet_sum(t2, t6);
+    wamnet_vector t13 = wamnet_sum(t3, t7);
+    wamnet_vector t14 = wamnet_difference(t2, t6);
+    wamnet_vector t15 = wamnet_difference(t3, t7);
+    wamnet_vector t16 = wamnet_sum(t8, t12);
+    wamnet_vector t17 = wamnet_sum(t9, t13);
+    wamnet_vector t18 = wamnet_difference(t8, t12);
+    wamnet_vector t19 = wamnet_difference(t9, t13);
+    wamnet_vector t20 = wamnet_difference(t10, t15);
+    wamnet_vector t21 = wamnet_sum(t11, t14);
     to[0] = t16;
     to[1] = t17;
     to[leap * 2] = t20;
@@ -172,6 +198,9 @@ static inline void wamnet_pixel(
     int tile_y);
 
 /* All pixels, one after another. */
+#if defined(WAMNET_IMAGE_CLONES)
+WAMNET_IMAGE_CLONES
+#endif
 static inline void wamnet_image(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -208,7 +237,7 @@ static inline void wamnet_pixel(
     float gathered[INPUTS * POINTS * 2 * LANES];
     wamnet_vector rows[INPUTS * POINTS * STRIDE];
     for (int i = 0; i < INPUTS * POINTS * 2; ++i) {
-        *(wamnet_vector *)(gathered + (i) * LANES) = (wamnet_vector){0};
+        *(wamnet_vector *)(gathered + (i) * LANES) = wamnet_zero();
     }
     for (int dy = 0; dy < POINTS; ++dy) {
         int top = tile_y + dy - WINDOW_CENTRE;
@@ -247,10 +276,10 @@ static inline void wamnet_pixel(
                 wamnet_vector b = columns[0][2 * f + 1];
                 wamnet_vector c = columns[apart][2 * g];
                 wamnet_vector d = columns[apart][2 * g + 1];
-                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4) * LANES) = a + c;
-                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 1) * LANES) = b - d;
-                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 2) * LANES) = b + d;
-                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 3) * LANES) = c - a;
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4) * LANES) = wamnet_sum(a, c);
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 1) * LANES) = wamnet_difference(b, d);
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 2) * LANES) = wamnet_sum(b, d);
+                *(wamnet_vector *)(spectra + ((i * POINTS + f) * 4 + 3) * LANES) = wamnet_difference(c, a);
             }
         }
         for (int q = 0; q < NEURONS; ++q) {
@@ -259,10 +288,10 @@ static inline void wamnet_pixel(
                 wamnet_vector imaginary[TILES][2];
                 WAMNET_UNROLL
                 for (int t = 0; t < TILES; ++t) {
-                    real[t][0] = (wamnet_vector){0};
-                    real[t][1] = (wamnet_vector){0};
-                    imaginary[t][0] = (wamnet_vector){0};
-                    imaginary[t][1] = (wamnet_vector){0};
+                    real[t][0] = wamnet_zero();
+                    real[t][1] = wamnet_zero();
+                    imaginary[t][0] = wamnet_zero();
+                    imaginary[t][1] = wamnet_zero();
                 }
                 for (int pair = 0; pair < BLOCK; ++pair) {
                     wamnet_vector w0 = *(const wamnet_vector *)(weights + ((((k * NEURONS + q) * POINTS + f) * PAIRS + pair) * 8) * LANES);
@@ -280,31 +309,31 @@ static inline void wamnet_pixel(
                         float b = spectra[at + LANES];
                         float c = spectra[at + LANES * 2];
                         float d = spectra[at + LANES * 3];
-                        real[t][0] += w0 * a;
-                        real[t][0] -= w2 * b;
-                        real[t][0] += w4 * c;
-                        real[t][0] -= w6 * d;
-                        imaginary[t][0] += w2 * a;
-                        imaginary[t][0] += w0 * b;
-                        imaginary[t][0] += w6 * c;
-                        imaginary[t][0] += w4 * d;
-                        real[t][1] += w1 * a;
-                        real[t][1] -= w3 * b;
-                        real[t][1] += w5 * c;
-                        real[t][1] -= w7 * d;
-                        imaginary[t][1] += w3 * a;
-                        imaginary[t][1] += w1 * b;
-                        imaginary[t][1] += w7 * c;
-                        imaginary[t][1] += w5 * d;
+                        real[t][0] = wamnet_sum(real[t][0], wamnet_scaled(w0, a));
+                        real[t][0] = wamnet_difference(real[t][0], wamnet_scaled(w2, b));
+                        real[t][0] = wamnet_sum(real[t][0], wamnet_scaled(w4, c));
+                        real[t][0] = wamnet_difference(real[t][0], wamnet_scaled(w6, d));
+                        imaginary[t][0] = wamnet_sum(imaginary[t][0], wamnet_scaled(w2, a));
+                        imaginary[t][0] = wamnet_sum(imaginary[t][0], wamnet_scaled(w0, b));
+                        imaginary[t][0] = wamnet_sum(imaginary[t][0], wamnet_scaled(w6, c));
+                        imaginary[t][0] = wamnet_sum(imaginary[t][0], wamnet_scaled(w4, d));
+                        real[t][1] = wamnet_sum(real[t][1], wamnet_scaled(w1, a));
+                        real[t][1] = wamnet_difference(real[t][1], wamnet_scaled(w3, b));
+                        real[t][1] = wamnet_sum(real[t][1], wamnet_scaled(w5, c));
+                        real[t][1] = wamnet_difference(real[t][1], wamnet_scaled(w7, d));
+                        imaginary[t][1] = wamnet_sum(imaginary[t][1], wamnet_scaled(w3, a));
+                        imaginary[t][1] = wamnet_sum(imaginary[t][1], wamnet_scaled(w1, b));
+                        imaginary[t][1] = wamnet_sum(imaginary[t][1], wamnet_scaled(w7, c));
+                        imaginary[t][1] = wamnet_sum(imaginary[t][1], wamnet_scaled(w5, d));
                     }
                 }
                 int g = (POINTS - f) % POINTS;
                 WAMNET_UNROLL
                 for (int t = 0; t < TILES; ++t) {
-                    product[t * 2][2 * f] = real[t][0] - imaginary[t][1];
-                    product[t * 2][2 * f + 1] = imaginary[t][0] + real[t][1];
-                    product[t * 2 + apart][2 * g] = real[t][0] + imaginary[t][1];
-                    product[t * 2 + apart][2 * g + 1] = real[t][1] - imaginary[t][0];
+                    product[t * 2][2 * f] = wamnet_difference(real[t][0], imaginary[t][1]);
+                    product[t * 2][2 * f + 1] = wamnet_sum(imaginary[t][0], real[t][1]);
+                    product[t * 2 + apart][2 * g] = wamnet_sum(real[t][0], imaginary[t][1]);
+                    product[t * 2 + apart][2 * g + 1] = wamnet_difference(real[t][1], imaginary[t][0]);
                 }
             }
             for (int tile = 0; tile < TILES; ++tile) {
@@ -319,7 +348,7 @@ static inline void wamnet_pixel(
     /* rows back, and the other layers */
     wamnet_vector sums[2 * PIXELS * NEURONS * 2];
     for (int i = 0; i < (2 * PIXELS - TILES * OUT) * NEURONS * 2; ++i) {
-        sums[TILES * OUT * NEURONS * 2 + i] = (wamnet_vector){0};
+        sums[TILES * OUT * NEURONS * 2 + i] = wamnet_zero();
     }
     for (int line = 0; line < OUT && tile_y + line < height; ++line) {
         for (int tile = 0; tile < TILES * NEURONS; ++tile) {
@@ -350,14 +379,14 @@ static inline void wamnet_pixel(
                 wamnet_vector sum[PIXELS][1];
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
-                    sum[p][0] = (wamnet_vector){0};
+                    sum[p][0] = wamnet_zero();
                 }
                 for (int i = 0; i < 5; ++i) {
                     wamnet_vector w0 = *(const wamnet_vector *)(weights + (192 + i) * LANES);
                     WAMNET_UNROLL
                     for (int p = 0; p < PIXELS; ++p) {
                         float value = v2[p * 2 * LANES + i];
-                        sum[p][0] += w0 * value;
+                        sum[p][0] = wamnet_sum(sum[p][0], wamnet_scaled(w0, value));
                     }
                 }
                 WAMNET_UNROLL
@@ -392,4 +421,8 @@ static inline void wamnet_pixel(
 #undef WINDOW_CENTRE
 #undef WINDOW_SIZE
 #undef restrict
+#undef wamnet_difference
+#undef wamnet_scaled
+#undef wamnet_sum
+#undef wamnet_zero
 #endif

@@ -43,11 +43,6 @@
 #else
 #pragma STDC FP_CONTRACT ON
 #endif
-#define WINDOW_SIZE 2
-#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
-#define PIXELS 6 /* neighbours in a row that a work item computes */
-#define LANES 4 /* components of a vector */
-#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 #if defined(__clang__)
 #define WAMNET_UNROLL _Pragma("unroll")
 #elif defined(__GNUC__) && __GNUC__ >= 8
@@ -63,92 +58,75 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
-/* Without options for newer processors GCC compiles for them too, and a program takes what its own suits. */
+/* Without options for newer processors they are compiled for too, and a program takes what its own suits:
+   by GCC each function on vectors, by clang all of them within wamnet_image. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
-    !defined(__AVX__) && !defined(__clang__) && __GNUC__ >= 12 && !defined(WAMNET_PORTABLE)
+    !defined(__AVX__) && !defined(WAMNET_PORTABLE)
+#if defined(__clang__) && __clang_major__ >= 14
+#define WAMNET_CLONES __attribute__((always_inline))
+#define WAMNET_IMAGE_CLONES __attribute__((target_clones("fma", "default")))
+#elif !defined(__clang__) && __GNUC__ >= 12
 #define WAMNET_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #endif
-/* GCC's vectors are fast where the processor has registers of LANES floats, else very slow. */
-#if (LANES <= 4 || (LANES <= 8 && (defined(__AVX__) || defined(WAMNET_CLONES))) || \
-    defined(__AVX512F__)) && defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE)
-typedef float wamnet_vector __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
-
-static inline void wamnet_clear(wamnet_vector *to)
-{
-    *to = (wamnet_vector){0};
-}
-
-static inline void wamnet_load(wamnet_vector *to, const float *from)
-{
-    *to = *(const wamnet_vector *)from;
-}
-
-static inline void wamnet_store(float *to, const wamnet_vector *from)
-{
-    *(wamnet_vector *)to = *from;
-}
-
-static inline void wamnet_add(wamnet_vector *sum, const wamnet_vector *term)
-{
-    *sum += *term;
-}
-
-static inline void wamnet_add_product(wamnet_vector *sum, const wamnet_vector *weight, float value)
-{
-    *sum += *weight * value;
-}
+#endif
+/* GCC's vectors are fast where the processor has registers of so many floats, else very slow. */
+#if defined(__GNUC__) && __GNUC__ >= 4 && !defined(WAMNET_PORTABLE) && (defined(__clang__) || \
+    4 <= 4 || (4 <= 8 && defined(__AVX__)) || defined(__AVX512F__) || defined(WAMNET_CLONES))
+typedef float wamnet_vector __attribute__((vector_size(4 * 4), aligned(4), may_alias));
+#define wamnet_zero() ((wamnet_vector){0})
+#define wamnet_sum(a, b) ((a) + (b))
+#define wamnet_difference(a, b) ((a) - (b))
+#define wamnet_scaled(a, b) ((a) * (b))
 #else
 typedef struct {
-    float lane[LANES];
+    float lane[4];
 } wamnet_vector;
 
-static inline void wamnet_clear(wamnet_vector *to)
+static inline wamnet_vector wamnet_zero(void)
 {
+    wamnet_vector a;
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = 0.0f;
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] = 0.0f;
     }
+    return a;
 }
 
-static inline void wamnet_load(wamnet_vector *to, const float *from)
+static inline wamnet_vector wamnet_sum(wamnet_vector a, wamnet_vector b)
 {
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to->lane[i] = from[i];
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] += b.lane[i];
     }
+    return a;
 }
 
-static inline void wamnet_store(float *to, const wamnet_vector *from)
+static inline wamnet_vector wamnet_difference(wamnet_vector a, wamnet_vector b)
 {
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        to[i] = from->lane[i];
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] -= b.lane[i];
     }
+    return a;
 }
 
-static inline void wamnet_add(wamnet_vector *restrict sum, const wamnet_vector *restrict term)
+static inline wamnet_vector wamnet_scaled(wamnet_vector a, float b)
 {
     WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += term->lane[i];
+    for (int i = 0; i < 4; ++i) {
+        a.lane[i] *= b;
     }
-}
-
-static inline void wamnet_add_product(
-    wamnet_vector *restrict sum,
-    const wamnet_vector *restrict weight,
-    float value)
-{
-    WAMNET_ROLLED
-    for (int i = 0; i < LANES; ++i) {
-        sum->lane[i] += weight->lane[i] * value;
-    }
+    return a;
 }
 #endif
+#define WINDOW_SIZE 2
+#define WINDOW_CENTRE 1 /* the tap that lies on the pixel itself */
+#define PIXELS 6 /* neighbours in a row that a work item computes */
+#define LANES 4 /* components of a vector */
+#define PATCH_WIDTH (WINDOW_SIZE + PIXELS - 1) /* columns that all windows touch */
 #if defined(WAMNET_CLONES)
 WAMNET_CLONES
 #endif
-
 /* Pixels (x, y), (x + 1, y), ..., PIXELS of them or to the end of the row: their channels are written
    to `result`, the whole image's array. */
 static inline void wamnet_pixel(
@@ -162,6 +140,9 @@ static inline void wamnet_pixel(
     int y);
 
 /* All pixels, one after another. */
+#if defined(WAMNET_IMAGE_CLONES)
+WAMNET_IMAGE_CLONES
+#endif
 static inline void wamnet_image(
     const float *restrict image_i0,
     const float *restrict image_i1,
@@ -236,63 +217,59 @@ static inline void wamnet_pixel(
         wamnet_vector sum[PIXELS][2];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_load(&sum[p][0], weights + 24 * LANES);
-            wamnet_load(&sum[p][1], weights + 25 * LANES);
+            sum[p][0] = *(const wamnet_vector *)(weights + (24) * LANES);
+            sum[p][1] = *(const wamnet_vector *)(weights + (25) * LANES);
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
             wamnet_vector part[PIXELS][2];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                wamnet_clear(&part[p][0]);
-                wamnet_clear(&part[p][1]);
+                part[p][0] = wamnet_zero();
+                part[p][1] = wamnet_zero();
             }
             for (int i = 0; i < WINDOW_SIZE * 2; ++i) {
-                wamnet_vector w0;
-                wamnet_load(&w0, weights + (dy * 4 * 2 + i * 2) * LANES);
-                wamnet_vector w1;
-                wamnet_load(&w1, weights + (dy * 4 * 2 + i * 2 + 1) * LANES);
+                wamnet_vector w0 = *(const wamnet_vector *)(weights + (dy * 4 * 2 + i * 2) * LANES);
+                wamnet_vector w1 = *(const wamnet_vector *)(weights + (dy * 4 * 2 + i * 2 + 1) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
                     float value = patch_i0[(dy * PATCH_WIDTH + p) * 2 + i];
-                    wamnet_add_product(&part[p][0], &w0, value);
-                    wamnet_add_product(&part[p][1], &w1, value);
+                    part[p][0] = wamnet_sum(part[p][0], wamnet_scaled(w0, value));
+                    part[p][1] = wamnet_sum(part[p][1], wamnet_scaled(w1, value));
                 }
             }
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                wamnet_add(&sum[p][0], &part[p][0]);
-                wamnet_add(&sum[p][1], &part[p][1]);
+                sum[p][0] = wamnet_sum(sum[p][0], part[p][0]);
+                sum[p][1] = wamnet_sum(sum[p][1], part[p][1]);
             }
         }
         for (int dy = 0; dy < WINDOW_SIZE; ++dy) {
             wamnet_vector part[PIXELS][2];
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                wamnet_clear(&part[p][0]);
-                wamnet_clear(&part[p][1]);
+                part[p][0] = wamnet_zero();
+                part[p][1] = wamnet_zero();
             }
             for (int i = 0; i < WINDOW_SIZE; ++i) {
-                wamnet_vector w0;
-                wamnet_load(&w0, weights + ((dy * 2 + 8) * 2 + i * 2) * LANES);
-                wamnet_vector w1;
-                wamnet_load(&w1, weights + ((dy * 2 + 8) * 2 + i * 2 + 1) * LANES);
+                wamnet_vector w0 = *(const wamnet_vector *)(weights + ((dy * 2 + 8) * 2 + i * 2) * LANES);
+                wamnet_vector w1 = *(const wamnet_vector *)(weights + ((dy * 2 + 8) * 2 + i * 2 + 1) * LANES);
                 WAMNET_UNROLL
                 for (int p = 0; p < PIXELS; ++p) {
                     float value = patch_i1[dy * PATCH_WIDTH + p + i];
-                    wamnet_add_product(&part[p][0], &w0, value);
-                    wamnet_add_product(&part[p][1], &w1, value);
+                    part[p][0] = wamnet_sum(part[p][0], wamnet_scaled(w0, value));
+                    part[p][1] = wamnet_sum(part[p][1], wamnet_scaled(w1, value));
                 }
             }
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
-                wamnet_add(&sum[p][0], &part[p][0]);
-                wamnet_add(&sum[p][1], &part[p][1]);
+                sum[p][0] = wamnet_sum(sum[p][0], part[p][0]);
+                sum[p][1] = wamnet_sum(sum[p][1], part[p][1]);
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v1 + (p * 2) * LANES, &sum[p][0]);
-            wamnet_store(v1 + (p * 2 + 1) * LANES, &sum[p][1]);
+            *(wamnet_vector *)(v1 + (p * 2) * LANES) = sum[p][0];
+            *(wamnet_vector *)(v1 + (p * 2 + 1) * LANES) = sum[p][1];
         }
     }
 
@@ -331,20 +308,19 @@ static inline void wamnet_pixel(
         wamnet_vector sum[PIXELS][1];
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_clear(&sum[p][0]);
+            sum[p][0] = wamnet_zero();
         }
         for (int i = 0; i < 5; ++i) {
-            wamnet_vector w0;
-            wamnet_load(&w0, weights + (26 + i) * LANES);
+            wamnet_vector w0 = *(const wamnet_vector *)(weights + (26 + i) * LANES);
             WAMNET_UNROLL
             for (int p = 0; p < PIXELS; ++p) {
                 float value = v49[p * 2 * LANES + i];
-                wamnet_add_product(&sum[p][0], &w0, value);
+                sum[p][0] = wamnet_sum(sum[p][0], wamnet_scaled(w0, value));
             }
         }
         WAMNET_UNROLL
         for (int p = 0; p < PIXELS; ++p) {
-            wamnet_store(v50 + (p) * LANES, &sum[p][0]);
+            *(wamnet_vector *)(v50 + (p) * LANES) = sum[p][0];
         }
     }
 
@@ -373,4 +349,8 @@ static inline void wamnet_pixel(
 #undef WINDOW_CENTRE
 #undef WINDOW_SIZE
 #undef restrict
+#undef wamnet_difference
+#undef wamnet_scaled
+#undef wamnet_sum
+#undef wamnet_zero
 #endif

@@ -292,33 +292,21 @@ def test_a_library_is_compiled_once_for_a_compiler_and_a_processor(case, monkeyp
     assert all(np.array_equal(picture, pictures[0]) for picture in pictures)
 
 
-def test_spectra_say_to_other_compilers_what_they_take(executor_named, kit, tmp_path):
-    """FOU-9: without the vectors of GCC and clang the text is one error, before anything else goes wrong."""
-    executor_named("c")
-    program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
-    artifact = compile_program(program, "c", "ieee", "fft:8")
-    assert artifact.manifest["schedule"]["name"] == "fft:8"
-    (tmp_path / "denoise.c").write_text(artifact.source)
-    for options, status in (((), 0), (("-U__GNUC__",), 1)):
-        command = ["cc", "-E", *options, "-o", "out", "denoise.c"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert (done.returncode, "export a schedule of tiles" in done.stderr) == (status, bool(status))
-
-
-def test_a_plain_build_has_transforms_for_newer_processors(executor_named, kit, tmp_path):
-    """KER-22, FOU-9: GCC on x86 with glibc compiles them for AVX2 and AVX-512 too, within their bound."""
+@pytest.mark.parametrize("portable", [False, True])
+def test_a_plain_build_has_transforms_for_newer_processors(executor_named, kit, tmp_path, portable):
+    """KER-22, FOU-9: GCC on x86 with glibc compiles them for AVX2 and AVX-512 too; others take C99."""
     if platform.machine() != "x86_64" or "(Debian" not in executor_named("c").device:
         pytest.skip("the compiler is not Debian's GCC for x86-64")
     program = kit.denoiser(kit.network([864, 8, 3], (3.0, 3.0)), {"a": 6}, 12, "clamp")
     images = {"a": np.random.default_rng(5).uniform(-1, 1, (23, 47, 6)).astype(np.float32)}
     (expected,) = interpret(program, {"window": kit.windows(program, images)}, np.float64).values()
-    options = ["-std=c99", "-O2", *WARNINGS]
+    options = ["-std=c99", "-O2", *WARNINGS, *["-DWAMNET_PORTABLE"][: int(portable)]]
     found = built(tmp_path, (program, images, expected), "ieee", options, "fft:8")
     bound = compile_program(program, "c", "ieee", "fft:8").manifest["bound"]["output"]
     assert np.all(np.abs(found - expected) <= bound)
     held = (tmp_path / "main").read_bytes()
     for name in ("forward", "backward", "pixel"):
-        assert f"wamnet_{name}.arch_x86_64_v3".encode() in held
+        assert (f"wamnet_{name}.arch_x86_64_v3".encode() in held) != portable
 
 
 @pytest.mark.parametrize("relaxed", ["-funsafe-math-optimizations", "-ffp-contract=fast -mfma", "-Ofast"])

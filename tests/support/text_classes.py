@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from wamnet.compiler.kernel.instructions import REFUSED, STRAIGHT, VECTORS
+from wamnet.compiler.kernel.instructions import STRAIGHT, c_vectors
 
 C_LIKE = ("c", "opencl", "cuda", "metal", "opengl", "glsl-es", "glsl-vulkan")
 GLSL = ("opengl", "glsl-es", "glsl-vulkan")
@@ -179,8 +179,9 @@ CLASSES: tuple[tuple[str, Sequence[str], str, str], ...] = (
         "PRECISE float q[1][1]; PRECISE float p"),
     ("a mix of integers", ("glsl-es", "opengl"), TAP, f"{TAP}0 * mix(0, 1, true) + "),
     ("two blocks of one name", ("glsl-vulkan",), "Image_normal {", "Image_color {"),
-    ("a message of another schedule", ("c",), "\n/* No product may", f"\n{REFUSED}\n/* No product may"),
-    ("vectors of no size", ("c",), "static inline void wa", f"{STRAIGHT}\n{VECTORS}static inline void wa"),
+    ("a message of no schedule", ("c",), "\n/* No product may", "\n#error plain\n/* No product may"),
+    ("vectors of no size", ("c",), "static inline void wa",
+        f"{STRAIGHT}\n{c_vectors('8')}\nstatic inline void wa"),
     ("a picture of another kernel", ("opengl",),
         "    for (int i = 0; i < 3; ++i) {\n        result[i] = v90[i];\n    }",
         "vec4 color = vec4(0.0, 0.0, 0.0, 1.0);\ncolor[0] = v90[0]; color[1] = v90[1]; color[2] = v90[2];\n"
@@ -229,7 +230,8 @@ OF_SCHEDULES: tuple[tuple[str, str, str, str], ...] = (
     ("a union of other sizes", "opencl tile:8 full", " * 8]; }", " * 4]; }"),
     ("a component of a colour", "cuda group:1 full", "v90_0_0.x;", "v90_0_0.r;"),
     ("a pragma of no loop", "c tile:8 full", "    int top = y", "    WAMNET_UNROLL int top = y"),
-    ("a row of an array by another", "c tile:8 full", "&sum[p][0], &part[p][0]", "sum[0] + p, part[0] + p"),
+    ("a row of an array by another", "c tile:8 full", "wamnet_sum(sum[p][0], part[p][0])",
+        "wamnet_sum(sum[p][0], *(part[0] + p))"),
     ("sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 part_0_0", "vec4 part_0_0"),
     ("sums of sums that may be reordered", "glsl-vulkan group:1 full", "PRECISE vec4 v1_0_0", "vec4 v1_0_0"),
     ("a product in an argument", "glsl-vulkan group:1 full", LAST, ARGUMENT),

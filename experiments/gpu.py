@@ -168,7 +168,7 @@ TORCH, NODE = "torch", "webassembly"
 """Names of the peer, and of C's kernels in Node, among the languages."""
 
 NODE_SCHEDULES = "tile:4", "fft:4"
-"""Of vectors as WebAssembly has them: the page's, and the fastest."""
+"""Tiles and transforms of vectors as WebAssembly has them; the page has the latter."""
 
 # ---- one language and network, in a process of its own ----------------------------------------------------
 

@@ -49,6 +49,7 @@ from numpy.typing import NDArray
 from wamnet.cli.common.inputs import load_model
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_plan
+from wamnet.compiler.kernel.interface import staged
 from wamnet.compiler.plan import Plan
 from wamnet.compiler.reading.languages import is_read
 from wamnet.compiler.schedules.common import kernel_gather
@@ -132,8 +133,8 @@ def spirv(source: str, folder: Path | None) -> bytes:
     return made
 
 
-GROUPS = ("plain", "group:1", "group:2", "group:4")
-"""Schedules for graphics processors, and the simplest."""
+GROUPS = ("plain", "group:1", "group:2", "group:4", "fftpasses:32")
+"""Schedules for graphics processors, and the simplest; OpenCL has all but the last."""
 
 EXPORTED, ADVISED = ("tile:8", "fft:8"), ("-O3", "-march=native")
 """Schedules of C that are compiled as an export's user does, and the advised options."""
@@ -147,7 +148,7 @@ WAYS: Mapping[str, Way] = {
     ),
     "opencl": Way(
         (lambda _: open_executor("opencl"),),
-        GROUPS,
+        GROUPS[:-1],
         ("tile:4", "fft:4", "groupdot:4"),
         (*FLOATS, "minicubes, integers", "minicubes, rank 16"),
     ),
@@ -538,7 +539,9 @@ def prepare(given: argparse.Namespace) -> None:
     for name in FLOATS:
         for schedule in WAYS["glsl-vulkan"].schedules:
             for kernel in compile_plan(planned(name, "glsl-vulkan", schedule)).kernels:
-                spirv(kernel.source, given.prepared)
+                count = kernel.source.count(" STAGE == ")
+                for text in [staged(kernel.source, n) for n in range(count)] or [kernel.source]:
+                    spirv(text, given.prepared)
     for name in MODELS:
         for size in (ODD, (given.size, given.size)):
             images = images_for(name, size)

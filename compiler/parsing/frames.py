@@ -44,8 +44,8 @@ OPEN: Mapping[str, str] = {
     "images": r"(?P=images)",
     "given": r"(?P<given>(?:image_\w+, )+)",
     "first": r"(?P<first>image_\w+)", "same_first": r"(?P=first)",
-    "group": r"(?P<grouped>)", "words": r"(?P<words>)", "gnu": r"(?P<gnu>)",
-    "bounded": r"(?P<bounded>)",
+    "group": r"(?P<grouped>)", "passes": r"(?P<passes>)", "words": r"(?P<words>)",
+    "gnu": r"(?P<gnu>)", "bounded": r"(?P<bounded>)",
     "column": r"(?P<column>x|tile_x)", "row": r"(?P<row>y|tile_y)",
     "x": r"(?P=column)", "y": r"(?P=row)",
     "scale": r"(?: \* (?P<across>[A-Z]+(?: \* [A-Z]+)*))?",
@@ -358,30 +358,24 @@ uint2 group_place [[threadgroup_position_in_grid]])
 #define PRECISE precise
 @constants@
 @functions@
-@group@layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
+@<@@group@layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
+@|@@passes@layout(local_size_x = ITEMS, local_size_y = 1) in;
+@>@
 @each uniform sampler2D IMAGE;@
 layout(std430, binding = 0) restrict readonly buffer weight_buffer {{ @vector@ w[]; }};
 layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
-shared @shared@ tile[TILE_NUMBERS];
+@<@shared @shared@ tile[TILE_NUMBERS];
 void main()
 {{
 {begun(*PLACES, SIZE)}
 @body@
 }}
-@|@@bounded@
-#version 430 core
-#define PRECISE precise
-@constants@
-@functions@
-layout(local_size_x = ITEMS, local_size_y = 1) in;
-@each uniform sampler2D IMAGE;@
-layout(std430, binding = 0) restrict readonly buffer weight_buffer {{ @vector@ w[]; }};
-layout(rgba32f, binding = 0) restrict writeonly uniform image2D result;
-@memory@
+@|@@memory@
 uniform int first_tile;
 uniform int tile_count;
 @launches@
 #endif
+@>@
 @>@
 """,
     "glsl-es": f"""
@@ -393,7 +387,7 @@ precision highp sampler2D;
 {FRAGMENT}
 """,
     "glsl-vulkan": f"""
-@<@#version 450
+#version 450
 #define PRECISE precise
 @(@{EXTENSION}
 @)@
@@ -401,10 +395,14 @@ precision highp sampler2D;
 @functions@
 @<@layout(local_size_x = 8, local_size_y = 8) in;
 @|@@group@layout(local_size_x = GROUP_WIDTH, local_size_y = GROUP_HEIGHT) in;
+@|@@passes@layout(local_size_x = {ITEMS}, local_size_y = 1) in;
 @>@
 layout(std140, binding = 0) uniform Size {{
 int width;
 int height;
+@(@@passes@int first_tile;
+int tile_count;
+@)@
 }};
 layout(std430, binding = 1) restrict readonly buffer Weights {{ @<@float weights@|@@vector@ w@>@[]; }};
 layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
@@ -413,27 +411,12 @@ layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
 @)@
 @(@{VULKAN_GROUP}
 @)@
-void main()
+@<@void main()
 {{
 {begun(*PLACES)}
 @body@
 }}
-@|@
-#version 450
-#define PRECISE precise
-@constants@
-@functions@
-layout(local_size_x = {ITEMS}, local_size_y = 1) in;
-layout(std140, binding = 0) uniform Size {{
-int width;
-int height;
-int first_tile;
-int tile_count;
-}};
-layout(std430, binding = 1) restrict readonly buffer Weights {{ @vector@ w[]; }};
-layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
-@each layout(std430, binding = NUMBER) restrict readonly buffer BLOCK {{ float IMAGE[]; }};@
-@memory@
+@|@@memory@
 @launches@
 #endif
 @>@
@@ -504,7 +487,7 @@ def frame(language: str) -> re.Pattern[str]:
 def parts_of(match: re.Match[str]) -> dict[str, str] | None:
     """Return what stands in the open places, by name; nothing of half a kernel of groups, or of bytes."""
     texts = [(name.rstrip("0123456789"), text) for name, text in match.groupdict().items()]
-    for together in (("grouped", "shared"), ("words",), ("gnu",)):
+    for together in (("grouped", "shared"), ("passes", "launches"), ("words",), ("gnu",)):
         if len({text is None for name, text in texts if name in together}) > 1:
             return None
     return {name: text for name, text in texts if text is not None}

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -23,27 +22,9 @@ from .field import P, Words, drawn, hashed, literal
 from .integers import Ranges, Stored, filled, stated
 from .lanes import Lanes, Unread
 from .spectra import Tiles, patches
-from .terms import Fold, Term, compared, constant, expression, known_floats, known_integers, operate, select
+from .terms import COMMUTE, Fold, Term, applied, constant, expression, known_floats, known_integers, select
 
-COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
-"""Operations whose operands may be exchanged, sums and products apart."""
-
-
-def combine(name: str, a: Term, b: Term) -> Term:
-    """Return what an operation makes of two numbers: equal where its name, kinds and operands are."""
-    commutes = name in COMMUTE or (name in ("add", "multiply") and a.kind != "float32")
-    return Term(expression(name, a, b, commutes=commutes), kind=b.kind)
-
-
-def _exact(name: str, a: Term, b: Term) -> Term:
-    """Return a sum, a difference or a product: of integers it is an operation like any other."""
-    return operate(name, a, b) if a.kind == "float32" else combine(name, a, b)
-
-
-OPERATIONS: dict[str, Callable[[Term, Term], Term]] = {
-    **{name: partial(_exact, name) for name in ("multiply", "add", "subtract")},
-    **{name: partial(combine, name) for name in (*COMMUTE, "right_shift", "left_shift")},
-}  # fmt: skip
+OPERATIONS = ("multiply", "add", "subtract", *COMMUTE, "right_shift", "left_shift")
 """Operations of a program's text, in addition to affine maps, sines, constants and conversions."""
 
 
@@ -54,11 +35,8 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         self.number = number
 
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any) -> Any:
-        a = [one.number if isinstance(one, Traced) else constant(float(one)) for one in given]
-        name = ufunc.__name__
-        if name in OPERATIONS:
-            return Traced(OPERATIONS[name](*a))
-        return Traced(compared(name, *a) if name == "less_equal" else Term(expression(name, *a)))
+        terms = [one.number if isinstance(one, Traced) else constant(float(one)) for one in given]
+        return Traced(applied(ufunc.__name__, *terms))
 
     def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
         return Traced(select(*(one.number for one in given)))
@@ -192,7 +170,7 @@ class Claim:
             elif op == "sin" and self.sine:
                 values[number] = self.sine(Traced(given[0])).number
             elif op in OPERATIONS:
-                values[number] = OPERATIONS[op](*given)
+                values[number] = applied(op, *given)
             else:
                 raise Unread(f"operation {op} of %{number}")
             if kind == "int32" or (op == "convert" and kind != "float32"):

@@ -4,7 +4,7 @@
    Its sums stay exact while they stay in 32 bits, which the span shows [`operate`]. Nothing rounds: both rows
    have signs.
 2. The weights of such kernels are known: they are read bit by bit, as what a text takes them for [`Stored`].
-3. A word is a vector of its four bytes, with signs, the lowest first [`packed`].
+3. A word is a vector of the four floats that its bytes are made of, the lowest first [`packed`].
 4. What instructions add to a sum is four products of bytes [`dots`].
 
 Spans come from the claim: those of its images' numbers, and of what its affine maps read [`Ranges`], as the
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..proof.evidence import INTEGERS, inputs_of
 from ..proof.integer_checker import check_integers, ranges
-from .field import P, Words, drawn, hashed
+from .field import P, drawn, hashed
 from .lanes import Unread, Wrong
 from .terms import Span, Term, aligned, constant, expression, known_floats, known_integers, stacked
 
@@ -55,32 +55,27 @@ def spans(ok: NDArray[np.bool_], low: Any, high: Any) -> Span | None:
     return (np.where(ok, low, 1), np.where(ok, high, 0)) if ok.any() else None
 
 
-def operate(what: str, a: Term, b: Term, fold: Callable[[Term], Term], wrong: Wrongs) -> Term:
+def operate(what: str, a: Term, b: Term, wrong: Wrongs) -> Term:
     """Return the sum, difference or product of two integers: a sum is exact where their spans show it."""
     kind = "uint32" if "uint32" in (a.kind, b.kind) else "int32"
-    if what != "add" or a.span is None or b.span is None or b.is_wide or a.leaf is None:
-        a, b = fold(a), fold(b)
     shape = expression(what, a, b, commutes=what != "subtract")
     if what != "add" or a.span is None or b.span is None or a.sums is None or b.sums is None:
         return Term(shape, kind=kind)
     low, high = (x + y for x, y in zip(a.span, b.span, strict=True))
     both, (least, most) = (a.span[0] <= a.span[1]) & (b.span[0] <= b.span[1]), LIMITS[kind]
+    beyond = both & ((low < least) | (high > most))
     if kind == "int32":
-        wrong(both & ((low < least) | (high > most)), "an integer may be beyond what int32 holds")
-    both = both & (low >= least) & (high <= most)
-    if not both.all():
-        if a.leaf is not None:
-            return operate(what, fold(a), b, fold, wrong)
+        wrong(beyond, "an integer may be beyond what int32 holds")
+    if not both.all() or beyond.any():
         return Term(shape, kind=kind)
-    sums = aligned(np.add, a.sums, b.sums) % P
-    return Term(shape, sums, kind=kind, span=(low, high), leaf=a.leaf)
+    return Term(shape, aligned(np.add, a.sums, b.sums) % P, kind=kind, span=(low, high))
 
 
 # ---- conversions ------------------------------------------------------------------------------------------
 
 
-def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term]) -> Term:
-    """Return a number as an integer of a kind: the same where that holds it, else another unknown."""
+def convert(term: Term, kind: str, ranges: Ranges) -> Term:
+    """Return a number of all lanes as an integer of a kind: the same if that holds it, or another unknown."""
     if term.literal is not None:
         value = int(term.literal)
         if not LIMITS[kind][0] <= value <= LIMITS[kind][1]:
@@ -89,18 +84,15 @@ def convert(term: Term, kind: str, ranges: Ranges, fold: Callable[[Term], Term])
     whole = term.kind != "float32"
     if kind == "int8" or (kind == "uint8" and not whole):
         raise Unread(f"a {term.kind} as {kind}")
-    if not ranges.stated or (term.span is None and not whole):
-        term = fold(term)
-    span = term.span if whole or not ranges.stated else term.span or ranges.of(term.known)
+    span = ranges.of(term)
     good = span is not None and bool(within(span, LIMITS[kind]).all())
     good = good and (term.shape is not None or whole)
     if kind == "uint8" and not good:
         raise Wrong("it makes a byte of an integer that is not one")
-    shape, leaf = expression("convert", term), term.leaf if whole or not term.is_wide else term.shape
-    sums = term.sums if whole else np.zeros((2, 1, 1), np.uint64) if term.is_wide else drawn(term.known)
+    sums = term.sums if whole else drawn(term.known)
     if sums is None or not good:
-        return Term(shape, kind=kind)
-    return Term(shape, sums, kind=kind, span=span, leaf=leaf)
+        return Term(expression("convert", term), kind=kind)
+    return Term(expression("convert", term), sums, kind=kind, span=span)
 
 
 def as_float(term: Term, found: Callable[[Term], Term], wrong: Wrongs) -> Term:
@@ -125,21 +117,22 @@ def bits(term: Term) -> Term:
 # ---- bytes ------------------------------------------------------------------------------------------------
 
 
-def packed(four: Sequence[Term], wrong: Wrongs) -> Term:
-    """Return a word of four integers that are known to be bytes."""
+def packed(four: Sequence[Term], ranges: Ranges, wrong: Wrongs) -> Term:
+    """Return a word of four numbers that are known to be bytes, of an image in each lane or of all lanes."""
+    if len({each.is_wide for each in four if each.literal is None}) > 1:
+        raise Unread("a word of numbers of an image and others")
     for each in four:
-        wrong(
-            True if each.span is None else ~within(each.span, LIMITS["int8"]),
-            "it makes a byte of an integer that is not one",
-        )
-    return replace(stacked([replace(each, kind="int32") for each in four]), kind="word")
+        span = ranges.of(each)
+        bad = True if span is None else ~within(span, LIMITS["int8"])
+        wrong(bad, "it makes a byte of an integer that is not one")
+    return replace(stacked([replace(each, span=ranges.of(each)) for each in four]), kind="word")
 
 
 def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:
     """Return the products of the bytes of known words, which have a sign, with four bytes, added up."""
     if weights.span is None or not (weights.span[0] == weights.span[1]).all():
         raise Unread("products of bytes that are not weights")
-    if four.span is None or four.sums is None or four.kind not in ("uint8", "word"):
+    if four.span is None or four.kind not in ("uint8", "word"):
         raise Unread("products of bytes of the picture")
     wrong(four.span[0] > four.span[1], "it multiplies bytes that are not known")
     sums: Any = np.uint64(0)
@@ -148,10 +141,10 @@ def dots(weights: Term, four: Term, wrong: Wrongs) -> Term:
     for k in range(4):
         byte = (weights.span[0] >> 8 * k & 255 ^ 128) - 128
         one = four.part(k)
-        assert one.sums is not None
         assert one.span is not None
         row = (byte % np.int64(P)).astype(np.uint64)
-        sums = (sums + aligned(lambda x, y: x * y % P, np.stack([row, row]), one.sums % P)) % P
+        factor = drawn(one.known) if four.kind == "word" else one.term % P
+        sums = (sums + aligned(lambda x, y: x * y % P, np.stack([row, row]), factor)) % P
         ends = byte * one.span[0], byte * one.span[1]
         low, high = low + np.minimum(*ends), high + np.maximum(*ends)
     return Term(hashed("sum", *sums), sums, kind="int32", span=(low, high))
@@ -216,15 +209,15 @@ class Ranges:
             one = k % len(low)
             self.noted.setdefault(shape, (low[one] << grain, high[one] << grain))
 
-    def of(self, shape: Words) -> Span | None:
-        """Return the spans of numbers that have been noted."""
-        if not self.noted:
-            return None
+    def of(self, number: Term) -> Span | None:
+        """Return the span of a number: its own, or one that has been noted."""
+        if number.span is not None or number.kind != "float32" or not self.noted:
+            return number.span
         if len(self.keys) < len(self.noted):
             self.keys = np.array(sorted(self.noted), dtype=np.uint64)
             self.ends = np.array([self.noted[key] for key in self.keys.tolist()], dtype=np.int64)
-        at = np.minimum(np.searchsorted(self.keys, shape), len(self.keys) - 1)
-        return spans(self.keys[at] == shape, self.ends[at, 0], self.ends[at, 1])
+        at = np.minimum(np.searchsorted(self.keys, number.known), len(self.keys) - 1)
+        return spans(self.keys[at] == number.known, self.ends[at, 0], self.ends[at, 1])
 
     def images(self, text: str) -> dict[str, tuple[int, int]]:
         """Return the spans of the images' numbers by name, where a program's text is one of these."""

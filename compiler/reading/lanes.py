@@ -16,14 +16,13 @@ Zippel, as in field.py]. All integers are of 32 bits, and no larger than an inde
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...refimpl.rng import pcg4d
 from ..parsing.parse import Unread as Unread
 
 FAR = 1000
@@ -41,6 +40,7 @@ class Lanes:
     No constant beyond `caps`, of a row and of a column, may be compared with them. Of work groups `known` has
     the first pixel's x and y, multiples of `steps`, and `inside` (2, lanes) are the items' places in their
     group, one group behind the other. `channels`: the most of an image, so that no index is larger [`most`].
+    `batch`: how many tiles launches have, and of how many this is a multiple.
     """
 
     known: NDArray[np.int64]
@@ -48,6 +48,7 @@ class Lanes:
     inside: NDArray[np.int64] | None = None
     steps: tuple[int, int] | None = None
     channels: int = 1
+    batch: tuple[int, int] = (0, 1)
 
     @cached_property
     def most(self) -> NDArray[np.int64]:
@@ -89,12 +90,6 @@ class Lanes:
     def y(self) -> NDArray[np.int64]:
         """The row (lanes,) of each lane's pixels."""
         return np.asarray(self.known[2] if self.inside is None else self.known[2] + self.inside[1])
-
-
-def words(seed: int) -> Iterator[int]:
-    """Yield words of 32 bits."""
-    for n in itertools.count():
-        yield int(pcg4d(*np.array([[n], [seed], [0], [0]], dtype=np.uint32))[0][0])
 
 
 def lanes_for(caps: tuple[int, int], step: int, seed: int) -> Lanes:
@@ -140,11 +135,11 @@ def _cases(
 
     The other axis is far from its borders.
     """
-    random = words(seed)
+    far = np.random.default_rng(seed).integers
 
     def drawn(before: int | None, behind: int | None, step: int) -> tuple[int, int]:
-        at = (FAR + next(random) % FAR) // step * step if before is None else before
-        return at, at + (FAR + next(random) % FAR if behind is None else behind)
+        at = int(far(FAR, 2 * FAR)) // step * step if before is None else before
+        return at, at + (int(far(FAR, 2 * FAR)) if behind is None else behind)
 
     across, down = (
         [*itertools.product((None, *first), (None, *range(1, cap + 2)))]

@@ -25,10 +25,17 @@ COMPARES: Mapping[str, Callable[[Any, Any], Any]] = {
 """Comparisons of two integers."""
 
 
+TILE = 2
+"""The axis of an index that a tile's number, or how many there are, goes into.
+
+Nothing is compared with these, so that what is true of the tiles that are computed is true of all.
+"""
+
+
 class Place:
     """An integer `values` (lanes, turns) of one `axis`: 0 along a row, 1 along a column, None in a group.
 
-    `form` (2, lanes, turns): how often the coordinate and the extent of that axis go into it.
+    `form` (2, lanes, turns): how often the coordinate and the extent of that axis go into it; 0 of tiles.
     """
 
     def __init__(self, values: NDArray[np.int64], form: NDArray[np.int64], axis: int | None) -> None:
@@ -63,6 +70,8 @@ class Place:
     def operated(cls, lanes: Lanes, what: str, a: Any, b: Any, mask: Any) -> Place:
         """Return what arithmetic makes of two integers: `Wrong` for one that may not fit 32 bits."""
         (va, fa), (vb, fb), axis = _both(a, b)
+        if axis == TILE:
+            return cls._of_tiles(lanes, what, va, vb)
         if what in ("minimum", "maximum"):
             first = cls.compared(lanes, "less_equal" if what == "minimum" else "greater_equal", a, b, mask)
             found = cls(np.where(first, va, vb), np.where(first, fa, fb), axis)
@@ -90,9 +99,22 @@ class Place:
         return found
 
     @classmethod
+    def _of_tiles(cls, lanes: Lanes, what: str, a: Any, b: Any) -> Place:
+        """Return an index of tiles, or how many groups of tiles there are."""
+        if what == "divide" and (a.tolist(), b.tolist()) == ([[lanes.batch[0]]], [[lanes.batch[1]]]):
+            return cls(a // b, NOTHING, TILE)
+        if what not in ("add", "subtract", "multiply"):
+            raise Wrong(OTHERWISE)
+        if (np.abs(ARRAYS[what](a.astype(float), b)) > 2.0**62).any():
+            raise Wrong("an index leaves 32 bits, whatever the number of tiles")
+        return cls(ARRAYS[what](a, b), NOTHING, TILE)
+
+    @classmethod
     def compared(cls, lanes: Lanes, what: str, a: Any, b: Any, mask: Any) -> NDArray[np.bool_]:
         """Return a comparison (lanes, turns): `Wrong` unless lanes decide its sign."""
         (va, fa), (vb, fb), axis = _both(a, b)
+        if axis == TILE:
+            raise Wrong(OTHERWISE)
         values, (own, extent) = va - vb, fa - fb
 
         def refuse(bad: Any, why: str) -> None:
@@ -113,6 +135,9 @@ class Place:
         found: NDArray[np.bool_] = COMPARES[what](values, 0)
         return found
 
+
+OTHERWISE = "it uses the number of a tile otherwise than in an index"
+"""Why what is done with tiles' numbers is refused."""
 
 NOTHING: NDArray[np.int64] = np.zeros((2, 1, 1), np.int64)
 """The form of an integer that no coordinate goes into."""

@@ -9,7 +9,7 @@ operation or an array is given is folded into one number for all lanes first [`F
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -43,20 +43,20 @@ class Fold:
             return hashed("fold", np.einsum("...lt,l->...t", shape, factors))
         return hashed("fold", np.einsum("...lt,lt->...t", shape, factors))
 
-    def term(self, term: Term, slot: Any) -> Term:
-        """Return a term that all lanes share."""
-        if term.shape is None or term.shape.shape[-2] == 1:
+    def term(self, term: Term, slot: Any, near: Any = None) -> Term:
+        """Return a term that all lanes share; `near`: with a second line of those lanes (lanes, turns)."""
+        if not term.is_wide:
             return term
-        if term.folded is None:
-            shape, sums = self.of(term.shape, slot)[..., None, :], term.sums
-            if term.leaf is not None:
-                own = shape if term.leaf is term.shape else self.of(term.leaf, slot)[..., None, :]
-                nothing = term.leaf[..., :1, :] == zero()
-                if nothing.any():
-                    nothing = (term.leaf == zero()).all(axis=-2, keepdims=True)
-                sums = (np.where(nothing, np.uint64(0), drawn(own)) + sums) % P
-            term.folded = replace(term, shape=shape, sums=sums, leaf=None)
-        return term.folded
+        if term.folded is None or term.folded[0] is not near:
+            shape = term.known
+            lines = [shape] if near is None else [shape, shape * near]
+            # A number that is 0 in all lanes fills up a word.
+            nothing = shape[..., :1, :] == zero()
+            if nothing.any():
+                nothing = (shape == zero()).all(axis=-2, keepdims=True)
+            found = np.stack([self.of(line, slot) for line in lines], axis=-2)
+            term.folded = near, replace(term, shape=np.where(nothing, zero(), found))
+        return term.folded[1]
 
 
 @dataclass(eq=False)
@@ -65,8 +65,7 @@ class Term:
 
     `kind` is its type. `literal`: what a constant is. `factors`: of a product with that, which is a term of a
     sum if need be. `span`: of an integer, whose value is that of its `sums`, with signs in both rows, and of
-    a float that is one. `leaf`: shapes of an integer that differs between lanes and is these numbers plus its
-    `sums`. `folded`: the same for all lanes, once it has been made.
+    a float that is one. `folded`: the same for all lanes, once it has been made, and for which near borders.
     """
 
     shape: Words | None
@@ -76,8 +75,7 @@ class Term:
     literal: float | None = None
     factors: tuple[Term, Term] | None = None
     span: Span | None = None
-    leaf: Words | None = None
-    folded: Term | None = None
+    folded: tuple[Any, Term] | None = None
 
     @property
     def known(self) -> Words:
@@ -109,8 +107,8 @@ class Term:
 
     @property
     def is_wide(self) -> bool:
-        """Return whether it differs between lanes."""
-        return self.shape is not None and self.shape.shape[-2] > 1
+        """Return whether it differs between lanes, which are more than two."""
+        return self.shape is not None and self.shape.shape[-2] > 2
 
     def part(self, index: Any) -> Term:
         """Return some of a vector's numbers."""
@@ -119,9 +117,9 @@ class Term:
     def each(self, one: Any, two: Any) -> Term:
         """Return a term of changed arrays: of shapes, and of values."""
         sums, draw = (None if a is None else two(a) for a in (self.sums, self.draw))
-        shape, leaf = (None if a is None else one(a) for a in (self.shape, self.leaf))
+        shape = None if self.shape is None else one(self.shape)
         span = self.span and (one(self.span[0]), one(self.span[1]))
-        return Term(shape, sums, draw, self.kind, self.literal, span=span, leaf=leaf)
+        return Term(shape, sums, draw, self.kind, self.literal, span=span)
 
 
 def constant(value: float, kind: str = "float32") -> Term:
@@ -150,29 +148,20 @@ def known_floats(values: NDArray[Any]) -> Term:
 def stacked(terms: Sequence[Term]) -> Term:
     """Return a vector of single numbers."""
 
-    def together(arrays: Sequence[Any], axis: int) -> Any:
+    def together(arrays: Sequence[Any], axis: int = 0) -> Any:
         return np.stack(np.broadcast_arrays(*arrays), axis=axis)
 
-    kind = terms[0].kind
+    kind, spans = terms[0].kind, [term.span for term in terms if term.span]
     if any(term.kind != kind for term in terms):
         raise Unread("a vector of numbers of several kinds")
-    if kind != "float32" and all(term.span for term in terms):
-        return _integers(terms, together)
+    shape, span = together([term.known for term in terms]), None
+    if len(spans) == len(terms):
+        span = together([low for low, _ in spans]), together([high for _, high in spans])
+        if kind != "float32":
+            return Term(shape, together([term.term for term in terms], 1), kind=kind, span=span)
     if any(term.begins for term in terms):
         raise Unread("a vector of weights, or of sums on their way")
-    return Term(together([term.known for term in terms], 0), kind=kind)
-
-
-def _integers(terms: Sequence[Term], together: Callable[[Sequence[Any], int], Any]) -> Term:
-    """Return a vector of integers; if one has a leaf, so have the others, of which only 0 has a constant."""
-    shape, leaf = together([term.known for term in terms], 0), None
-    if any(term.leaf is not None for term in terms):
-        leaves = [np.full((1, 1), zero()) if term.leaf is None else term.leaf for term in terms]
-        leaf = together(leaves, 0)
-        shape = np.broadcast_to(shape, leaf.shape)
-    sums = together([term.sums for term in terms], 1)
-    spans = [together([term.span[end] for term in terms if term.span], 0) for end in (0, 1)]
-    return Term(shape, sums, kind=terms[0].kind, span=(spans[0], spans[1]), leaf=leaf)
+    return Term(shape, kind=kind, span=span)
 
 
 def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
@@ -198,8 +187,7 @@ def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
         if name == "add":
             sums = aligned(np.add, a.term, b.term)
         else:  # magnitudes add up
-            va, vb = a.term % P, b.term % P
-            sums = np.stack([aligned(np.add, va[0], P - vb[0]), aligned(np.add, va[1], vb[1])])
+            sums = aligned(lambda x, y: np.stack([x[0] + (P - y[0]), x[1] + y[1]]), a.term % P, b.term % P)
     dual = dual or any(each.shape is not None and each.sums is not None for each in (a, b))
     if sums is not None and not dual:
         return Term(None, sums)
@@ -227,8 +215,8 @@ def _vanishes(term: Term, other: Term | None = None) -> bool:
 
 
 def aligned(function: Any, a: Words, b: Words) -> Words:
-    """Return a function of values (2, ...) or shapes, of which one may be of a vector and the other not."""
-    if a.ndim != b.ndim and a.shape[0] == b.shape[0] == 2:
+    """Return a function of values (2, ...), of which one may be of a vector and the other not."""
+    if a.ndim != b.ndim:
         a, b = (x if x.ndim >= max(a.ndim, b.ndim) else x[:, None] for x in (a, b))
     found: Words = function(a, b)
     return found
@@ -245,11 +233,21 @@ def select(where: Term, a: Term, b: Term) -> Term:
     return Term(expression("select", where, a, b), kind=a.kind)
 
 
-def compared(what: str, a: Term, b: Term) -> Term:
-    """Return the truth of a comparison."""
+COMMUTE = ("minimum", "maximum", "bitwise_and", "bitwise_xor", "bitwise_or")
+"""Operations whose operands may be exchanged, sums and products apart."""
+
+
+def applied(what: str, *terms: Term, dual: bool = False) -> Term:
+    """Return what an operation makes of numbers: equal where its name, kinds and operands are."""
     if what.startswith("greater"):
-        a, b, what = b, a, what.replace("greater", "less")
-    return Term(expression(what, a, b), kind="bool")
+        terms, what = terms[::-1], what.replace("greater", "less")
+    if what.startswith("less") or what in ("equal", "not_equal"):
+        return Term(expression(what, *terms), kind="bool")
+    arithmetic = what in ("add", "subtract", "multiply")
+    if arithmetic and terms[0].kind == "float32":
+        return operate(what, terms[0], terms[1], dual)
+    commutes = what in COMMUTE or (arithmetic and what != "subtract")
+    return Term(expression(what, *terms, commutes=commutes), kind=terms[-1].kind)
 
 
 def chosen(where: NDArray[np.bool_], a: Term, b: Term) -> Term:

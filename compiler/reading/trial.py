@@ -37,12 +37,12 @@ from ..kernel.kernel import (
     walk,
 )
 from ..kernel.verify import STEPS
-from .cells import Cells, Device, Race, Shared, Slice, Tile, Turns
+from .cells import Cells, Device, Race, Shared, Slice, Turns
 from .claim import Claim
 from .field import Words, hashed
 from .integers import Stored
 from .lanes import Unread, Wrong
-from .places import NOTHING, Place, corner
+from .places import NOTHING, TILE, Place, corner
 from .terms import Term, constant
 from .values import Values
 
@@ -79,7 +79,6 @@ class Trial(Values):
         self.apart: Counter[tuple[int, int]] = Counter()
         self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
         self.number_of = {self.masks[0].tobytes(): 0}
-        self.looking: NDArray[np.bool_] | None = None
         self.ran: set[int] = set()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
@@ -90,11 +89,11 @@ class Trial(Values):
         self.outputs = claim.expected
         slots, pixels, channels = self.outputs.shape
         self.written = np.zeros((slots, pixels, channels, lanes.count), bool)
-        of = 2**36 + secrets.randbelow(2**36)
-        self.tile_count = of * claim.fold.slots
-        self.tiles = secrets.randbelow(of) + of * np.arange(claim.fold.slots)
+        of, slots = 2**36 + secrets.randbelow(2**36), claim.fold.slots
+        lanes.batch = of * slots, slots
+        self.tiles = secrets.randbelow(of) + of * np.arange(slots)
         if kernel.launches:
-            self.names[BATCH[1]] = Tile(np.array([[self.tile_count]]))
+            self.names[BATCH[1]] = Place(np.array([[of * slots]]), NOTHING, TILE)
         else:
             self.names |= dict(zip(kernel.place, self.start, strict=True))
 
@@ -198,11 +197,19 @@ class Trial(Values):
             return
         if not isinstance(value, Term) or value.kind != cells.kind:
             raise Unread(f"anything but numbers of type {cells.kind} in {array}")
-        if self.mask is not None and value.is_wide and self.mask.shape[0] > 1:
-            cells.store_wide(place, kind.lanes, value, self.turns, self.active, self.mask, self.looking)
+        value, at = self.folded(value), (self.turns, self.active)
+        if value.known.shape[-2] == 1:
+            self._alike(array)
+            cells.store(place, kind.lanes, value, *at, self._number())
             return
-        self._alike(array)
-        cells.store(place, kind.lanes, self.folded(value), self.turns, self.active, self._number())
+        parts = [value.known] if kind.dtype == "float32" else value.term
+        due = hashed("due", *(part[..., 1:, :] for part in parts))
+        if self.looking is None:
+            cells.confirm(place, kind.lanes, due, *at)
+        elif self._number():
+            raise Wrong(f"{array} is read before it is written, in some lanes")
+        else:
+            cells.store(place, kind.lanes, value, *at, due=due)
 
     def _alike(self, array: str) -> None:
         """Refuse what is written near borders only, where all lanes look at it [`_run_if`]."""
@@ -221,7 +228,7 @@ class Trial(Values):
         if kind.dtype != memory.kind.dtype:
             raise Unread(f"{array} as {kind.dtype}")
         if isinstance(memory.cells, Shared):
-            if len(index) != 1 or isinstance(index[0], Tile) or kind.lanes != 1:
+            if len(index) != 1 or kind.lanes != 1:
                 raise Wrong(f"{array} is an array of single numbers")
             return memory.cells, Place.values_of(index[0])
         index = [self._plain(each) for each in index]
@@ -245,7 +252,7 @@ class Trial(Values):
 
     def _plain(self, index: Any) -> Any:
         """Return an index that no coordinate goes into."""
-        if isinstance(index, Place | Tile):
+        if isinstance(index, Place):
             raise Wrong("an array has an index that differs between lanes, or tiles")
         return index
 
@@ -290,8 +297,7 @@ class Trial(Values):
         lanes = self.mask, self.looking
         count, written = len(turns), self.written.copy() if _writes(loop) else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
-        self.turns = Turns(outer.count * count, slot)
-        self.turns.undoes, self.turns.ordered = True, outer.count == 1
+        self.turns = Turns(outer.count * count, slot, undoes=True, ordered=outer.count == 1)
         self.names = {key: _repeated(value, count) for key, value in names.items()}
         self.names[loop.name] = np.tile(np.array(turns, dtype=np.int64), outer.count)[None]
         self.mask, self.looking = (_repeated(each, count) for each in lanes)
@@ -322,9 +328,11 @@ class Trial(Values):
         if found.shape[0] == 1:
             self._only(~found, statement.otherwise)
         elif statement.otherwise:
-            outer, self.looking = self.looking, found if self.looking is None else found | self.looking
+            if self.looking is not None:
+                raise Unread("branches near borders in each other")
+            self.looking = found
             self._only(np.ones_like(found), statement.otherwise)
-            self.looking = outer
+            self.looking = None
         self._only(found, statement.body)
 
     def _run_barrier(self, statement: Any) -> None:
@@ -360,21 +368,21 @@ class Trial(Values):
         if not 0 < count < MOST:
             raise Wrong(f"{statement.name} has {count} elements for each tile")
         lanes = statement.type.lanes
-        self.memory[statement.name] = Device(statement.name, lanes, count, self.tiles, self.tile_count)
+        self.memory[statement.name] = Device(statement.name, lanes, count, self.tiles, self.lanes.batch[0])
 
     def _run_launch(self, statement: Launch) -> None:
         """Run the items of a launch for the tiles that are computed; the end is a barrier."""
         across, down = statement.counts
-        count, slots, lines = self.tile_count, self.claim.fold.slots, integer(self.kernel, down)
+        (count, slots), lines = self.lanes.batch, integer(self.kernel, down)
         items = self.value(across)
-        if not isinstance(items, Tile) or items.values.item() not in (count, count // slots):
+        if not isinstance(items, Place) or items.values.tolist() not in ([[count]], [[count // slots]]):
             raise Unread("a launch of other items than tiles, or than groups of tiles")
         tiles = self.tiles if items.values == count else self.tiles[:1]
         outer = self.turns, self.names
         self.turns = Turns(lines * len(tiles), np.tile(np.arange(len(tiles)), lines))
         column, row = statement.place
-        own = {column: Tile(np.tile(tiles, lines)[None]), row: np.repeat(np.arange(lines), len(tiles))[None]}
-        self.names = {**self.names, **own}
+        self.names = {**self.names, row: np.repeat(np.arange(lines), len(tiles))[None]}
+        self.names[column] = Place(np.tile(tiles, lines)[None], NOTHING, TILE)
         body = statement.body
         first = corner(column)
         if body[: len(first)] == first and self.constants.get("OUT") == self.claim.rows:
@@ -383,6 +391,7 @@ class Trial(Values):
             self.names |= dict(zip(("tile_x", "tile_y"), self.start, strict=True))
         try:
             self.body(body)
+            self.turns.end(outer[0])
         except Race as error:
             raise Wrong("items of a launch read and write one element") from error
         self.turns, self.names = outer
@@ -403,7 +412,7 @@ class Trial(Values):
         cells, place = self._place_of(array, index, kind)
         if isinstance(cells, Shared):
             return cells.load(place, self.mask)
-        return cells.load(place, kind.lanes, self.turns, self.active, self.folded, self._number())
+        return cells.load(place, kind.lanes, self.turns, self.active, self._number())
 
     def _of_weights(self, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of the file: of spectra no sums are made."""
@@ -508,7 +517,7 @@ def _repeated(value: Any, count: int) -> Any:
     """Return a value of each turn for each of so many turns inside it."""
     if isinstance(value, np.ndarray) and value.ndim and value.shape[-1] > 1:
         return np.repeat(value, count, axis=-1)
-    if isinstance(value, Term | Place | Slice | Tile):
+    if isinstance(value, Term | Place | Slice):
         return value.each(lambda a: _repeated(a, count), lambda a: _repeated(a, count))
     return value
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from ..kernel.kernel import Expr, Kernel
 from ..kernel.walker import Walker
 from . import integers
-from .cells import Tile, Turns
-from .claim import COMMUTE, Claim, renamed, word_of
+from .cells import Turns
+from .claim import Claim, renamed, word_of
 from .field import P, hashed
 from .lanes import Unread, Wrong
 from .places import COMPARES, Place, indices
-from .terms import Term, chosen, compared, constant, expression, operate, select, stacked
+from .terms import Term, applied, chosen, constant, select, stacked
 
 EVALUATED = (
     "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
@@ -37,17 +37,17 @@ class Values(Walker):
     claim: Claim
     turns: Turns
     mask: NDArray[np.bool_] | None
+    looking: NDArray[np.bool_] | None
 
     def __init__(self, kernel: Kernel, claim: Claim) -> None:
         self.kernel, self.claim, self.lanes = kernel, claim, claim.lanes
-        self.dual, self.turns, self.mask = bool(kernel.launches), Turns(1), None
+        self.dual, self.turns, self.mask, self.looking = bool(kernel.launches), Turns(1), None, None
         self.numbers: dict[Any, Any] = {}
         self.evaluators = {key: getattr(self, f"_value_{key}") for key in EVALUATED}
         self.keys = np.array(sorted(claim.first), dtype=np.uint64)
         self.ids = np.array([claim.first[key] for key in self.keys.tolist()], dtype=np.int64)
         parts = np.array([kind == "part" for kind, _ in claim.tables], bool)
         self.is_part = parts[self.ids // claim.together]
-        self.tile_count = 0
 
     # ---- lanes and turns -----------------------------------------------------------------------------------
 
@@ -65,10 +65,17 @@ class Values(Walker):
         if found and (self.mask is None or np.logical_and(bad, self.mask).any()):
             raise Wrong(what)
 
+    def _doubt(self, bad: Any, what: str) -> None:
+        """Refuse what is wrong of a number of all lanes, in a turn that is active."""
+        bad = np.atleast_2d(bad)
+        self._wrong(bad.reshape(-1, bad.shape[-1]).any(axis=0)[None], what)
+
     def folded(self, term: Term) -> Term:
-        """Return a number of all lanes together."""
-        slot = self.turns.slot
-        return self.claim.fold.term(term, 0 if slot is None else slot)
+        """Return a number of all lanes together; in a branch near borders with what is due far from them."""
+        slot, near = self.turns.slot, self.looking
+        if near is None and self.mask is not None and self.mask.shape[0] > 1:
+            near = self.mask
+        return self.claim.fold.term(term, 0 if slot is None else slot, near)
 
     def _truth(self, value: Any) -> Any:
         if isinstance(value, bool) or (isinstance(value, np.ndarray) and value.dtype == bool):
@@ -100,8 +107,6 @@ class Values(Walker):
 
     def _of_indices(self, what: str, a: Any, b: Any) -> Any:
         """Return what an operation makes of two integers, none beyond 32 bits."""
-        if isinstance(a, Tile) or isinstance(b, Tile):
-            return Tile.operated(what, a, b, self.tile_count, self.claim.fold.slots)
         if isinstance(a, Place) or isinstance(b, Place):
             if what not in COMPARES:
                 return Place.operated(self.lanes, what, a, b, self.mask)
@@ -113,28 +118,22 @@ class Values(Walker):
 
     def _of_terms(self, what: str, *terms: Term) -> Term:
         """Return what an operation makes of numbers."""
-        arithmetic = what in ("add", "subtract", "multiply")
-        if arithmetic and terms[0].kind != "float32":
+        if what in ("add", "subtract", "multiply") and terms[0].kind != "float32":
             a, b = terms
-            found = integers.operate(what, a, b, self.folded, self._wrong)
+            found = integers.operate(what, a, b, self._doubt)
             return self._defined(found) if found.kind == "int32" else found
         if any(each.kind == "word" for each in terms):
             raise Unread(f"{what} of words")
         terms = tuple(self.folded(each) for each in terms)
-        if arithmetic:
-            a, b = terms
-            found = operate(what, a, b, self.dual)
-            return self._found(found) if what == "add" and found.sums is not None else found
         if (
             what.endswith("shift")
             and not 0 <= (terms[1].literal if terms[1].literal is not None else -1) < 32
         ):
             raise Unread("a shift by anything but a constant below 32")
-        if what in COMPARES:
-            return compared(what, *terms)
         if what in ("divide", "remainder") and terms[0].kind != "float32":
             raise Unread(f"{what} of integers of an image, which may be by 0")
-        return Term(expression(what, *terms, commutes=what in COMMUTE), kind=terms[-1].kind)
+        made = applied(what, *terms, dual=self.dual)
+        return self._found(made) if what == "add" and made.sums is not None else made
 
     def _found(self, term: Term) -> Term:
         """Return a sum; one of the program as the number that it is, a part as another unknown."""
@@ -185,7 +184,7 @@ class Values(Walker):
             return a if where else b
         if isinstance(a, Term):
             return chosen(where, a, b)
-        if where.shape[0] > 1 or isinstance(a, Place | Tile) or isinstance(b, Place | Tile):
+        if where.shape[0] > 1 or isinstance(a, Place) or isinstance(b, Place):
             raise Unread("a choice of coordinates, or by them")
         return np.where(where, a, b)
 
@@ -226,10 +225,10 @@ class Values(Walker):
         if term.kind == kind:
             return term
         if kind == "float32" and term.kind in integers.LIMITS:
-            return integers.as_float(self.folded(term), self._found, self._wrong)
+            return integers.as_float(term, self._found, self._doubt)
         if kind not in integers.LIMITS or term.kind not in ("float32", *integers.LIMITS):
             raise Unread(f"a {term.kind} as {kind}")
-        found = integers.convert(term, kind, self.claim.ranges, self.folded)
+        found = integers.convert(self.folded(term), kind, self.claim.ranges)
         return self._defined(found) if term.kind == "float32" else found
 
     def _defined(self, term: Term) -> Term:
@@ -240,7 +239,7 @@ class Values(Walker):
             good = np.logical_or(good, np.reshape(made, term.known.shape))
             missing = self.claim.missing()
             why = missing and f": {missing} are never made"
-            self._wrong(~good, f"a number that is not the program's may be beyond {term.kind}{why or ''}")
+            self._doubt(~good, f"a number that is not the program's may be beyond {term.kind}{why or ''}")
         return term
 
     def _value_bits(self, value: Expr) -> Any:
@@ -249,10 +248,10 @@ class Values(Walker):
 
     def _value_pack4(self, value: Expr) -> Any:
         """Return the bytes of four floats as a word, the first one the lowest."""
-        four = [self._converted(self._term(self.value(each), "float32"), "int32") for each in value.args]
-        return integers.packed(four, self._wrong)
+        four = [self._term(self.value(each), "float32") for each in value.args]
+        return integers.packed(four, self.claim.ranges, self._doubt)
 
     def _value_dot4(self, value: Expr) -> Any:
         """Return products of the bytes of words, which have a sign, with four bytes or those of a word."""
         weights, four = (self.folded(self._term(self.value(each), "int32")) for each in value.args)
-        return integers.dots(weights, four, self._wrong)
+        return integers.dots(weights, four, self._doubt)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from wamnet.compiler.reading.cells import Cells, Device, Race, Tile, Turns
+from wamnet.compiler.reading.cells import Cells, Device, Race, Turns
 from wamnet.compiler.reading.lanes import Wrong, tile_lanes
+from wamnet.compiler.reading.places import NOTHING, TILE, Place
 from wamnet.compiler.reading.terms import Fold, Term
 
 
@@ -54,7 +55,7 @@ def put(cells, turns, place, *values, active=None):
 
 
 def get(cells, turns, place, active=None):
-    return cells.load(np.array([place]), 1, turns, active, lambda term: term).shape[0].tolist()
+    return cells.load(np.array([place]), 1, turns, active).shape[0].tolist()
 
 
 def test_turns_use_elements_of_their_own():
@@ -63,22 +64,29 @@ def test_turns_use_elements_of_their_own():
     assert get(cells, turns, [0, 1, 2]) == [10, 11, 12]
     put(cells, turns, [2, 1, 3], 20, 21, 22, active=np.array([False, True, True]))
     assert get(cells, turns, [0, 1, 3]) == [10, 21, 22]
-    with pytest.raises(Race, match="with each other"):
-        get(cells, turns, [1, 1, 2])
     with pytest.raises(Wrong, match="has no number 4"):
         get(cells, turns, [0, 1, 4])
     with pytest.raises(Wrong, match="before it is written"):
         get(Cells("x", 4, 1), turns, [0, 1, 2])
 
 
-def test_turns_that_write_what_others_read_race():
+def test_turns_that_read_what_others_write_race():
+    cells, turns = Cells("x", 4, 1), Turns(3)
+    put(cells, turns, [0, 1, 2], 10, 11, 12)
+    with pytest.raises(Race, match="with each other"):
+        get(cells, turns, [1, 1, 2])
+
+
+def test_turns_that_write_what_others_read_or_write_race():
     cells, turns = Cells("x", 4, 1), Turns(2)
     put(cells, Turns(1), [3], 7)
     assert get(cells, turns, [3, 3]) == [7, 7]
+    turns.end(Turns(1))
+    put(cells, turns, [0, 3], 1, 2)
     with pytest.raises(Race, match="with each other"):
-        put(cells, turns, [0, 3], 1, 2)
+        turns.end(Turns(1))
     with pytest.raises(Race, match="with each other"):
-        put(Cells("x", 4, 1), turns, [1, 1], 1, 2)
+        put(Cells("x", 4, 1), Turns(2), [1, 1], 1, 2)
 
 
 def test_the_last_turn_writes_last():
@@ -87,8 +95,7 @@ def test_the_last_turn_writes_last():
     put(cells, turns, [0, 1], 1, 2)
     with pytest.raises(Race, match="with each other"):
         put(cells, turns, [1, 0], 3, 4)
-    cells, turns = Cells("x", 2, 1), Turns(2)
-    turns.ordered = True
+    cells, turns = Cells("x", 2, 1), Turns(2, ordered=True)
     put(cells, turns, [0, 1], 1, 2)
     put(cells, turns, [1, 0], 3, 4)
     assert get(cells, Turns(1), [0]) + get(cells, Turns(1), [1]) == [4, 2]
@@ -109,9 +116,8 @@ def test_turns_inside_turns_have_used_what_these_use():
 
 
 def test_what_raced_is_undone():
-    cells, turns = Cells("x", 2, 1), Turns(2)
+    cells, turns = Cells("x", 2, 1), Turns(2, undoes=True)
     put(cells, Turns(1), [0], 7)
-    turns.undoes = True
     put(cells, turns, [0, 1], 1, 2)
     turns.restore()
     assert get(cells, Turns(1), [0]) == [7]
@@ -127,14 +133,29 @@ def test_arrays_of_turns_have_a_column_for_each():
 
 def test_nothing_is_compared_with_the_number_of_a_tile():
     """What is true of the tiles that are computed is true of all."""
-    count, tile = Tile(np.array([[4004]])), Tile(np.array([[17, 1018]]))
-    index = Tile.operated("add", Tile.operated("multiply", 3, count, 4004, 4), tile, 4004, 4)
+    lanes = tile_lanes((6, 4), 3, seed=1)
+    lanes.batch = 4004, 4
+    count, tile = (Place(np.array([n]), NOTHING, TILE) for n in ([4004], [17, 1018]))
+
+    def made(what, a, b):
+        return Place.operated(lanes, what, a, b, None)
+
+    index = made("add", made("multiply", 3, count), tile)
     assert index.values.tolist() == [[12029, 13030]]
-    assert Tile.operated("divide", count, 4, 4004, 4).values.item() == 1001
-    for what, a, b in (("less", tile, 3), ("remainder", tile, 4), ("divide", tile, 4), ("maximum", 0, tile)):
+    assert made("divide", count, 4).values.item() == 1001
+    for what, a, b in (
+        ("remainder", tile, 4),
+        ("divide", tile, 4),
+        ("divide", count, 2),
+        ("maximum", 0, tile),
+    ):
         with pytest.raises(Wrong, match="otherwise than in an index"):
-            Tile.operated(what, a, b, 4004, 4)
+            made(what, a, b)
+    with pytest.raises(Wrong, match="otherwise than in an index"):
+        Place.compared(lanes, "less", tile, 3, None)
+    with pytest.raises(Wrong, match="both axes"):
+        made("add", tile, Place.of(lanes, 0))
     device = Device("rows", 2, 5, np.array([17, 1018]), 4004)
     assert device.place(index, None).tolist() == [[12, 14]]
     with pytest.raises(Wrong, match="another tile"):
-        device.place(Tile.operated("add", index, 1, 4004, 4), None)
+        device.place(made("add", index, 1), None)

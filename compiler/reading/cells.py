@@ -106,16 +106,14 @@ class Turns:
 class Cells:
     """An array of `count` numbers in `columns`: shapes, sums and spans.
 
-    `lanes`: the index in `masks` of those lanes that have written a number. `due`: what lanes far from
-    borders have to write before it is read, or 0.
+    `region`: in which condition on lanes a number was written, or 0: nothing outside of it reads the number.
+    `due`: what lanes far from borders have to write before it is read, or 0.
     """
 
-    def __init__(
-        self, name: str, count: int, columns: int, kind: str = "float32", masks: Sequence[Any] = ()
-    ) -> None:
-        self.name, self.count, self.columns, self.kind, self.masks = name, count, columns, kind, masks
+    def __init__(self, name: str, count: int, columns: int, kind: str = "float32") -> None:
+        self.name, self.count, self.columns, self.kind = name, count, columns, kind
         size, whole = (count, columns), kind != "float32"
-        self.state, self.lanes = np.zeros(size, np.uint8), np.zeros(size, np.int32)
+        self.state, self.region = np.zeros(size, np.uint8), np.zeros(size, np.int32)
         self.shape, self.sums = np.zeros(size, np.uint64), np.zeros((2, *size), np.uint64)
         self.due = np.zeros(size, np.uint64)
         self.span = np.zeros((2, *(size if whole else (0, 0))), np.int64)
@@ -124,7 +122,7 @@ class Cells:
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """All that it holds."""
-        return self.state, self.lanes, self.shape, self.sums, self.due, self.span
+        return self.state, self.region, self.shape, self.sums, self.due, self.span
 
     def at(self, place: Any, width: int, turns: Turns, active: NDArray[np.bool_] | None) -> Any:
         """Return rows and columns (width, turns) of an access; place 0 if not active."""
@@ -141,14 +139,13 @@ class Cells:
             return rows, 0
         return rows, np.arange(turns.count) // (turns.count // self.columns)
 
-    def load(self, place: Any, width: int, turns: Turns, active: Any, lanes: int = 0) -> Term:
-        """Return numbers that have been written, for the lanes of a number."""
+    def load(self, place: Any, width: int, turns: Turns, active: Any, regions: Sequence[int] = ()) -> Term:
+        """Return numbers that have been written, in one of the conditions on lanes that hold."""
         at = self.at(place, width, turns, active)
         state = self.state[at]
-        bad = state == EMPTY
-        for number in {*np.unique(self.lanes[at]).tolist()} - {0, lanes} if len(self.masks) > 1 else ():
-            if not (self.masks[number] | ~self.masks[lanes]).all():
-                bad |= self.lanes[at] == number
+        bad, region = state == EMPTY, self.region[at]
+        if region.any():
+            bad |= ~np.isin(region, (0, *regions))
         if (bad if active is None else bad & active).any():
             raise Wrong(f"{self.name} is read before it is written")
         if self.has_due and self.due[at].any():
@@ -188,13 +185,13 @@ class Cells:
         value: Term,
         turns: Turns,
         active: Any,
-        lanes: int = 0,
+        region: int = 0,
         due: Words | None = None,
     ) -> None:
-        """Write numbers of active turns (turns,), in the lanes of a number."""
+        """Write numbers of active turns (turns,), in a condition on lanes."""
         at, own = self._written(place, width, turns, active)
         self.shape[at] = 0 if value.shape is None else own(value.shape, 0)
-        self.lanes[at], self.due[at] = lanes, 0 if due is None else own(due, 0)
+        self.region[at], self.due[at] = region, 0 if due is None else own(due, 0)
         self.has_due = self.has_due or due is not None
         self.state[at] = SHAPE if not value.begins else SUM if value.shape is None else BOTH
         if value.begins:

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import itertools
 import secrets
 from collections import Counter
 from collections.abc import Sequence
@@ -77,8 +78,7 @@ class Trial(Values):
         self.shared: list[Shared] = []
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
-        self.masks: list[NDArray[np.bool_]] = [np.ones(lanes.count, bool)]
-        self.number_of = {self.masks[0].tobytes(): 0}
+        self.regions, self.numbers_of_regions = (0,), itertools.count(1)
         self.ran: set[int] = set()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)
@@ -112,25 +112,19 @@ class Trial(Values):
 
     # ---- lanes and turns -----------------------------------------------------------------------------------
 
-    def _number(self) -> int:
-        """Return the number of the lanes that are active, the same in all turns."""
-        if self.mask is None or self.mask.shape[0] == 1:
-            return 0
-        lanes: NDArray[np.bool_] = np.asarray(self.mask.any(axis=1))
-        if (self.mask != (lanes[:, None] & self.mask.any(axis=0))).any():
-            raise Unread("numbers that some lanes write, or read, in some turns")
-        number = self.number_of.setdefault(lanes.tobytes(), len(self.masks))
-        if number == len(self.masks):
-            self.masks.append(lanes)
-        return number
+    def _narrow(self, mask: NDArray[np.bool_]) -> bool:
+        """Leave some of the lanes and turns active; return whether any are."""
+        self.mask = mask if self.mask is None else mask & self.mask
+        if mask.shape[0] > 1 and not mask.all():
+            self.regions = (*self.regions, next(self.numbers_of_regions))
+        return bool(self.mask.any())
 
     def _only(self, mask: NDArray[np.bool_], body: Body) -> None:
         """Run statements for some lanes and turns."""
-        outer = self.mask
-        self.mask = mask if outer is None else mask & outer
-        if self.mask.any():
+        outer = self.mask, self.regions
+        if self._narrow(mask):
             self.body(body)
-        self.mask = outer
+        self.mask, self.regions = outer
 
     # ---- statements ----------------------------------------------------------------------------------------
 
@@ -154,7 +148,7 @@ class Trial(Values):
         if statement.space == "group":
             self.memory[statement.name] = self._share(statement.name, count, kind, sizes)
             return
-        cells = Cells(statement.name, count, self.turns.count, kind.dtype, self.masks)
+        cells = Cells(statement.name, count, self.turns.count, kind.dtype)
         self.memory[statement.name] = Slice(cells, 0, kind, sizes)
         if statement.value is not None:
             self._put(statement.name, (), kind, self.value(statement.value))
@@ -200,13 +194,13 @@ class Trial(Values):
         value, at = self.folded(value), (self.turns, self.active)
         if value.known.shape[-2] == 1:
             self._alike(array)
-            cells.store(place, kind.lanes, value, *at, self._number())
+            cells.store(place, kind.lanes, value, *at, self.regions[-1])
             return
         parts = [value.known] if kind.dtype == "float32" else value.term
         due = hashed("due", *(part[..., 1:, :] for part in parts))
         if self.looking is None:
             cells.confirm(place, kind.lanes, due, *at)
-        elif self._number():
+        elif self.regions[-1]:
             raise Wrong(f"{array} is read before it is written, in some lanes")
         else:
             cells.store(place, kind.lanes, value, *at, due=due)
@@ -259,8 +253,6 @@ class Trial(Values):
     def _run_for(self, statement: For) -> None:
         """Run a loop: all turns at once, or one after another, each for the lanes that are in it."""
         start, count, step = map(self.value, (statement.start, statement.count, statement.step))
-        if type(step) is not int or step < 1:
-            raise Wrong(f"the loop over {statement.name} has a step that is not positive")
         if type(start) is type(count) is int and statement.until is None:
             turns = range(start, count, step)
             for last in turns[-1:]:
@@ -270,7 +262,7 @@ class Trial(Values):
             together = together and self.turns.count < TOGETHER and self.apart[key] < TRIES
             if together and self._at_once(statement, turns):
                 return
-        outer, turn = self.mask, start
+        outer, turn = (self.mask, self.regions), start
         for _ in range(LONGEST):
             self.names[statement.name] = turn
             if not self._goes_on(self._of_indices("less", turn, count)):
@@ -281,20 +273,17 @@ class Trial(Values):
             turn = self._of_indices("add", turn, step)
         else:
             raise Wrong(f"a loop runs more than {LONGEST} times")
-        self.mask = outer
+        self.mask, self.regions = outer
 
     def _goes_on(self, condition: Any) -> bool:
         """Leave those lanes and turns in a loop in which a condition holds; return whether there are any."""
         going = self._truth(condition)
-        if isinstance(going, bool):
-            return going
-        self.mask = going if self.mask is None else self.mask & going
-        return bool(self.mask.any())
+        return going if isinstance(going, bool) else self._narrow(going)
 
     def _at_once(self, loop: For, turns: range) -> bool:
         """Run all turns of a loop at once, if they have nothing to do with each other."""
         outer, names, memory, size = self.turns, self.names, self.memory, dict(self.size)
-        lanes = self.mask, self.looking
+        lanes, regions = (self.mask, self.looking), self.regions
         count, written = len(turns), self.written.copy() if _writes(loop) else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
         self.turns = Turns(outer.count * count, slot, undoes=True, ordered=outer.count == 1)
@@ -315,6 +304,7 @@ class Trial(Values):
             return False
         finally:
             self.turns, self.names, self.memory, (self.mask, self.looking) = outer, names, memory, lanes
+            self.regions = regions
 
     def _run_if(self, statement: If) -> None:
         """Run each branch for the turns that take it.
@@ -337,8 +327,6 @@ class Trial(Values):
 
     def _run_barrier(self, statement: Any) -> None:
         """Let all items of a group wait for each other."""
-        if self.lanes.inside is None:
-            raise Unread("a barrier without groups")
         if self.turns.count > 1:
             raise Race
         if self.mask is not None:
@@ -405,14 +393,12 @@ class Trial(Values):
     def _load(self, array: str, index: Sequence[Any], kind: Type) -> Any:
         if array in self.images:
             return self._pixel(array, index, kind)
-        if array == RESULT:
-            raise Wrong("the result is read")
         if array == WEIGHTS:
             return self._of_weights(index, kind)
         cells, place = self._place_of(array, index, kind)
         if isinstance(cells, Shared):
             return cells.load(place, self.mask)
-        return cells.load(place, kind.lanes, self.turns, self.active, self._number())
+        return cells.load(place, kind.lanes, self.turns, self.active, self.regions)
 
     def _of_weights(self, index: Sequence[Any], kind: Type) -> Term:
         """Return numbers of the file: of spectra no sums are made."""

@@ -167,9 +167,9 @@ def stacked(terms: Sequence[Term]) -> Term:
 def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
     """Return a sum, a difference or a product of floats; `dual`: a sum may be an expression as well."""
     sums: Words | None = None
+    nothing, given = _vanishing(a, b, name) | _vanishing(b, a, name), (a, b)
     if name == "multiply":
-        shapes = [each.shape for each in (a, b) if each.shape is not None]
-        if any(map(_is_zero, shapes)) or _vanishes(a, b) or _vanishes(b, a):
+        if any(each.shape is not None and _is_zero(each.shape) for each in (a, b)):
             raise Wrong("a product with 0, which is no number where the other factor is infinite")
         if a.draw is not None or b.draw is not None:
             sums = _product(a, b)
@@ -179,8 +179,6 @@ def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
         for one, other in ((a, b), (b, a)):
             if name == "add" and one.shape is not None and not one.begins and _is_zero(one.shape):
                 return other
-        if _vanishes(a) or _vanishes(b):
-            raise Wrong("a sum with a product with 0, which is no number where the other factor is infinite")
         a, b = (
             each if each.factors is None else Term(each.shape, _product(*each.factors)) for each in (a, b)
         )
@@ -188,6 +186,8 @@ def operate(name: str, a: Term, b: Term, dual: bool = False) -> Term:
             sums = aligned(np.add, a.term, b.term)
         else:  # magnitudes add up
             sums = aligned(lambda x, y: np.stack([x[0] + (P - y[0]), x[1] + y[1]]), a.term % P, b.term % P)
+    if sums is not None and nothing.any():
+        sums = np.where(nothing, drawn(expression("nothing", *given)), sums)
     dual = dual or any(each.shape is not None and each.sums is not None for each in (a, b))
     if sums is not None and not dual:
         return Term(None, sums)
@@ -202,16 +202,17 @@ def _is_zero(shape: Words) -> bool:
     return bool(shape.flat[0] == zero()) and bool((shape == zero()).all())
 
 
-def _vanishes(term: Term, other: Term | None = None) -> bool:
-    """Return whether a number of a sum is 0 in a turn: a weight that fills up a vector, or its product.
+def _vanishing(term: Term, other: Term, name: str) -> NDArray[np.bool_]:
+    """Return in which turns a number of a sum is 0: a weight that fills up a vector, or its product.
 
-    A vector is where all of its lanes are, or, as a factor of another one, any of them.
+    That is no number where the other factor is infinite, so what is made of it is unknown. A vector is 0
+    where all of its lanes are, or, as a factor of another one, any of them.
     """
     if not term.begins or term.kind != "float32":
-        return False
-    nothing = ~(term.term % P).any(axis=0)
-    alike = other is not None and other.known.ndim == 3
-    return bool((nothing if nothing.ndim < 3 or alike else nothing.all(axis=0)).any())
+        return np.zeros(1, bool)
+    found = np.asarray((term.term % P == 0).all(axis=0))
+    alike = name == "multiply" and other.known.ndim == 3
+    return found if found.ndim < 3 or alike else np.asarray(found.all(axis=0))
 
 
 def aligned(function: Any, a: Words, b: Words) -> Words:

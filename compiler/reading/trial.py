@@ -78,7 +78,8 @@ class Trial(Values):
         self.shared: list[Shared] = []
         self.size: dict[int, int] = {}
         self.apart: Counter[tuple[int, int]] = Counter()
-        self.regions, self.numbers_of_regions = (0,), itertools.count(1)
+        self.regions: tuple[int, ...] = (0,)
+        self.numbers_of_regions = itertools.count(1)
         self.ran: set[int] = set()
         self.pixels: dict[tuple[int, int, str], Any] = {}
         width, height = Place.of(lanes, 1), Place.of(lanes, 3)

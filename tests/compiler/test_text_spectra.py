@@ -119,7 +119,7 @@ def test_the_sums_that_are_required_are_those_of_the_window(channels, block):
 # ---- texts -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(but=("1-kwargs1-c", "2-kwargs0-opencl"))
+@pytest.mark.nightly(but=("1-kwargs1-c", "2-kwargs0-opencl", "2-kwargs2-c"))
 @pytest.mark.parametrize("target", ["opencl", "c"])
 @pytest.mark.parametrize(
     ("tiles", "kwargs"),

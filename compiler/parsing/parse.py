@@ -252,7 +252,8 @@ class Parser(Expressions):
             raise Unread(f"{text}, which is not in parentheses")
         self._read(text)
         value = self._expression()
-        self._end()
+        if self._now():
+            raise Unread(f"{self._now()!r} where nothing follows")
         self.scope.values[str(key)] = tree.INT
         return tree.Constant(str(key), value)
 

@@ -110,11 +110,6 @@ class Reader:
         self.at += len(texts) * there
         return there
 
-    def _end(self) -> None:
-        """Refuse further tokens."""
-        if self._now():
-            raise Unread(f"{self._now()!r} where nothing follows")
-
     def _word(self) -> str:
         """Take the name of a value: one of the closed list, or of a layer."""
         word = self._take()

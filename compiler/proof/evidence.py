@@ -46,6 +46,18 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     same("entry point", held["entry_point"], manifest["entry_point"])
     same("centre of the window", held["centre"], manifest["window"]["centre"])
     raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
+    arrays = parameters_of(held, raw)
+    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
+    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
+    same("digest of the program in the certificate", held["program_digest"], digest)
+    same("digest of the program in the manifest", manifest["program"], digest)
+    check_manifest(manifest, text, len(raw))
+    same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
+    return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
+
+
+def parameters_of(held: Any, raw: Any) -> dict[str, Any]:
+    """Return the parameters by name: from the certificate itself, or from the file's numbers."""
     arrays = {}
     for name, place in held["parameters"].items():
         if "base64" in place:
@@ -54,13 +66,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
             at = places(name, place, len(raw))
             array = raw[at if at.min() >= 0 else len(raw)]
         arrays[name] = array.reshape(place["shape"])
-    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
-    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
-    same("digest of the program in the certificate", held["program_digest"], digest)
-    same("digest of the program in the manifest", manifest["program"], digest)
-    check_manifest(manifest, text, len(raw))
-    same("weights: all are finite", all(np.isfinite(array).all() for array in arrays.values()), True)
-    return held, manifest, text, {name: a.astype(np.float64) for name, a in arrays.items()}, raw
+    return arrays
 
 
 def check_manifest(manifest: Any, text: str, count: int) -> None:

@@ -119,7 +119,9 @@ def output_error(program: Program, found: Sequence[Enclosure], output: int) -> A
     own = [own_error(found, layer) for layer in layers]
     if not all(np.isfinite(part).all() for part in own):
         return None
-    matrices = [layer.scale * weight_of(program, layer) for layer in layers[1:]]
+    weights = [str(program.nodes[layer.affine]["weight"]) for layer in layers[1:]]
+    parameters = [program.parameters[name].astype(np.float64) for name in weights]
+    matrices = [layer.scale * each for layer, each in zip(layers[1:], parameters, strict=True)]
     if not decomposable(matrices):
         return None
     errors = np.zeros(len(own[-1]))
@@ -154,11 +156,6 @@ def own_error(found: Sequence[Enclosure], layer: Layer) -> Array:
     if layer.activation is not None:
         total = total + found[layer.activation].own
     return total
-
-
-def weight_of(program: Program, layer: Layer) -> Array:
-    """Return the matrix (m, n) in float64."""
-    return program.parameters[str(program.nodes[layer.affine]["weight"])].astype(np.float64)
 
 
 def amplified(matrices: Sequence[Array], own: Sequence[Array], scales: Sequence[Array]) -> Array:

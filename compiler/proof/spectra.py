@@ -69,11 +69,6 @@ def blocks_of(channels: int, block: int) -> list[list[int]]:
     return [[c for pair in pairs[at : at + block] for c in pair] for at in range(0, half, block)]
 
 
-def pair_of(channels: int) -> NDArray[np.intp]:
-    """Return the complex image (C,) that holds each channel."""
-    return np.arange(channels) % -(-channels // 2)
-
-
 def alone(of: Spectra, weight: Array, channels: int) -> Array:
     """Return the error (D_out,) of each neuron's sum by itself, for a tile whose centred norm is 1."""
     n, half = of.points, -(-channels // 2)

@@ -64,7 +64,9 @@ class _First:
     """The first layer's factor of the product, and its derivatives."""
 
     def __init__(self, weight: Array, radius: Array, size: int, both: Any, ways: tuple[float, float]) -> None:
-        self.image, self.both, self.ways = spectra.pair_of(len(radius)), both, ways
+        # The complex image that holds each channel.
+        self.image = np.arange(len(radius)) % -(-len(radius) // 2)
+        self.both, self.ways = both, ways
         found = spectra.spectrum(weight, size, size)[:, : size // 2 + 1]
         # Frequencies that have a mirror image stand for it too.
         weights = np.where(np.arange(size // 2 + 1) * 2 % size == 0, 1.0, 2.0)

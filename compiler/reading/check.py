@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-import secrets
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -92,19 +91,18 @@ def run_text(source: str, held: Any, manifest: Any, weights: Any) -> dict[str, i
     schedule = manifest["schedule"]
     pixels, rows, group = int(schedule.get("pixels", 1)), int(schedule.get("rows", 1)), schedule.get("group")
     window, centre = int(manifest["window"]["size"]), int(manifest["window"]["centre"])
-    seed = secrets.randbits(31)
     try:
         check_items(manifest, "spectra" in held)
         passes = passes_of(schedule)
         slots = max(of for of, _ in passes[0]) if passes else 1
         tiles = Tiles(held["spectra"], pixels, rows, window, bool(passes)) if "spectra" in held else None
         if tiles:
-            lanes = tile_lanes((pixels, rows), window, seed, beyond=bool(passes))
+            lanes = tile_lanes((pixels, rows), window, beyond=bool(passes))
         elif group:
-            lanes = group_lanes((group[0], group[1]), pixels, window, seed)
+            lanes = group_lanes((group[0], group[1]), pixels, window)
         else:
             reach = max(centre, window - centre)
-            lanes = lanes_for((reach + pixels - 1, reach), pixels, seed)
+            lanes = lanes_for((reach + pixels - 1, reach), pixels)
         claim = Claim(held, manifest, weights, lanes, pixels, group[0] if group else 1, tiles, slots)
         lanes.channels = max(int(manifest["output"]["channels"]), *(n for _, n in claim.images))
         kernel = parsed(source, manifest)

@@ -8,7 +8,6 @@ from there on [`Trial`]; all other operations must be those of the program, in i
 
 from __future__ import annotations
 
-import base64
 import re
 from functools import partial
 from typing import Any
@@ -16,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..proof.evidence import INTEGERS, NODE, inputs_of, places
+from ..proof.evidence import INTEGERS, NODE, inputs_of, parameters_of, places
 from ..proof.sine_checker import sine
 from .field import P, Words, drawn, hashed, literal
-from .integers import Ranges, Stored, filled, stated
+from .integers import Ranges, Stored, filled
 from .lanes import Lanes, Unread
 from .spectra import Tiles, patches
 from .terms import COMMUTE, Fold, Term, applied, constant, expression, known_floats, known_integers, select
@@ -63,10 +62,14 @@ class Claim:
         self.text, self.lanes, self.pixels, self.stride = str(held["program"]), lanes, pixels, stride
         self.parameters, self.tiles, self.rows = held["parameters"], tiles, tiles.rows if tiles else 1
         self.exact, self.count = held["schema"] == INTEGERS, len(raw)
-        self.sine = self._sine(held)
-        self.stated = stated(held)
-        arrays = self.stated or (self._arrays(raw) if self.exact else {})
-        self.ranges = Ranges(held, arrays, bool(self.stated))
+        promise = (held.get("sine") or {}).get("text", "")
+        degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)", promise)
+        self.sine = partial(sine, degree=int(degree[1])) if degree else None
+        self.arrays, inside = parameters_of(held, raw), ["base64" in p for p in self.parameters.values()]
+        self.stated = self.exact and all(inside)
+        if any(inside) and not (tiles or self.stated):
+            raise Unread("weights that the file does not hold")
+        self.ranges = Ranges(held, self.arrays if self.exact else {}, self.stated)
         self.spectra = tiles.range if tiles else range(0)
         self.weights: Any = Stored(raw) if self.stated else self._weights(raw)
         self.tables: list[tuple[str, str]] = []
@@ -82,20 +85,7 @@ class Claim:
         outputs = self._outputs().known.reshape(slots, pixels * self.rows, -1)
         self.expected = outputs[..., :-1] if self.exact else outputs
 
-    def _sine(self, held: Any) -> Any:
-        """Return the sine that the certificate promises, as the spec defines it."""
-        promise = (held.get("sine") or {}).get("text", "")
-        degree = re.fullmatch(r"emitted, odd polynomial of degree (\d+)", promise)
-        return partial(sine, degree=int(degree[1])) if degree else None
-
     # ---- inputs --------------------------------------------------------------------------------------------
-
-    def _arrays(self, raw: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
-        """Return the parameters' numbers, all of which the file holds."""
-        return {
-            name: raw[places(name, place, self.count)].reshape(place["shape"])
-            for name, place in self.parameters.items()
-        }
 
     def _weights(self, raw: NDArray[np.float32]) -> Term:
         """Return all weights (1, n + 1) of the file, and 0: the program's as unknowns, others as they are."""
@@ -104,11 +94,8 @@ class Claim:
         value = drawn(shape)
         owned = np.zeros(len(raw), dtype=bool)
         for name, place in self.parameters.items():
-            if "base64" in place:
-                if self.tiles is None:
-                    raise Unread("weights that the file does not hold")
-                continue
-            owned[places(name, place, self.count).ravel()] = True
+            if "base64" not in place:
+                owned[places(name, place, self.count).ravel()] = True
         if self.tiles:
             owned[self.tiles.owned.ravel()] = True
             owned[self.tiles.bias if self.tiles.bias is not None else []] = True
@@ -124,14 +111,12 @@ class Claim:
     def parameter(self, name: str) -> Term:
         """Return a parameter's numbers, (1, outputs * inputs) or (1, outputs); of integers `filled`."""
         if self.stated:
-            array = filled(self.text, name, self.stated[name])
+            array = filled(self.text, name, self.arrays[name])
             flat = array.ravel()[None]
             return known_integers(flat, "float32") if array.ndim > 1 else known_floats(flat)
         place = self.parameters[name]
         if "base64" in place:
-            if self.tiles is None:
-                raise Unread("weights that the file does not hold")
-            return known_floats(np.frombuffer(base64.b64decode(place["base64"]), "<f4")[None])
+            return known_floats(self.arrays[name].reshape(1, -1))
         at = places(name, place, self.count)
         if self.exact:
             at = filled(self.text, name, at.reshape(place["shape"]), self.count)
@@ -163,7 +148,9 @@ class Claim:
             elif op == "constant":
                 values[number] = constant(float(named["value"]), kind)
             elif op == "parameter":
-                values[number] = self._each(self.parameter(named["name"]))
+                values[number] = self.parameter(named["name"]).each(
+                    *[lambda a: np.tile(a, self.together)] * 2
+                )
             elif op == "convert":
                 same = given[0].kind == kind
                 values[number] = given[0] if same else Term(expression("convert", given[0]), kind=kind)
@@ -198,10 +185,6 @@ class Claim:
         if "bias" in named:
             whole = (whole + self.parameter(named["bias"]).term) % P
         return self._summed(node, whole)
-
-    def _each(self, number: Term) -> Term:
-        """Return a number of every pixel (1, n) as those of all that are computed at once."""
-        return number.each(lambda a: np.tile(a, self.together), lambda a: np.tile(a, self.together))
 
     def _from_spectra(self, node: str, biased: bool) -> Term:
         """Return the sums of the window with their bias, all pixels': those before it are known by shape."""

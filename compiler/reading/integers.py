@@ -13,7 +13,6 @@ checker of the certificate finds them again.
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -22,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..proof.evidence import INTEGERS, inputs_of
+from ..proof.evidence import inputs_of
 from ..proof.integer_checker import check_integers, ranges
 from .field import P, drawn, hashed
 from .lanes import Unread, Wrong
@@ -172,20 +171,6 @@ def filled(text: str, name: str, array: NDArray[Any], value: Any = 0) -> NDArray
     window = re.search(rf"= affine %0 \{{.*weight={name}\b", text) is not None
     pads = [(0, 1), (0, not window)][: array.ndim]
     return np.pad(array, pads, constant_values=value)
-
-
-def stated(held: Any) -> dict[str, NDArray[np.float32]]:
-    """Return the parameters that a certificate of integers has itself; none where weights.bin has them."""
-    places = held["parameters"].items()
-    inside = [name for name, place in places if "base64" in place]
-    if not inside or held["schema"] != INTEGERS:
-        return {}
-    if len(inside) < len(places):
-        raise Unread("weights that the file does not hold")
-    return {
-        name: np.frombuffer(base64.b64decode(place["base64"], validate=True), "<f4").reshape(place["shape"])
-        for name, place in places
-    }
 
 
 class Ranges:

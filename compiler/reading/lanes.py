@@ -16,6 +16,7 @@ Zippel, as in field.py]. All integers are of 32 bits, and no larger than an inde
 from __future__ import annotations
 
 import itertools
+import secrets
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -92,32 +93,32 @@ class Lanes:
         return np.asarray(self.known[2] if self.inside is None else self.known[2] + self.inside[1])
 
 
-def lanes_for(caps: tuple[int, int], step: int, seed: int) -> Lanes:
+def lanes_for(caps: tuple[int, int], step: int) -> Lanes:
     """Return lanes of all cases: x a multiple of `step`, constants up to `caps`."""
     firsts = [range(0, cap + 1, each) for cap, each in zip(caps, (step, 1), strict=True)]
-    return Lanes(_cases(caps, (step, 1), firsts, seed), caps)
+    return Lanes(_cases(caps, (step, 1), firsts), caps)
 
 
-def group_lanes(group: tuple[int, int], pixels: int, window: int, seed: int) -> Lanes:
+def group_lanes(group: tuple[int, int], pixels: int, window: int) -> Lanes:
     """Return the items of groups of all cases, `pixels` of a row to an item.
 
     A group's first column is 0 or far: the next, one group on, is as far as any from constants smaller than a
     group [`Place.compared`]. Its distance from the right border is each that the group and the window reach,
     or far. So for rows.
     """
-    lanes = tile_lanes((group[0] * pixels, group[1]), window, seed)
+    lanes = tile_lanes((group[0] * pixels, group[1]), window)
     y, x = np.divmod(np.arange(group[0] * group[1]), group[0])
     inside = np.tile([x, y], lanes.count)
     return Lanes(np.repeat(lanes.known, len(x), axis=1), lanes.caps, inside, lanes.steps)
 
 
-def tile_lanes(steps: tuple[int, int], window: int, seed: int, beyond: bool = False) -> Lanes:
+def tile_lanes(steps: tuple[int, int], window: int, beyond: bool = False) -> Lanes:
     """Return work items of all cases, of so many columns and rows of pixels, as `group_lanes` has groups.
 
     `beyond`: and tiles below the picture, at each distance from it, or far.
     """
     caps = steps[0] + window, steps[1] + window
-    known = _cases(caps, steps, [(0,), (0,)], seed)
+    known = _cases(caps, steps, [(0,), (0,)])
     if beyond:
         near, far = np.arange(caps[1] + 2), 2 * FAR // steps[1] * steps[1]
         y = np.concatenate([(near // steps[1] + 1) * steps[1], np.full(len(near), far)])
@@ -129,17 +130,16 @@ def tile_lanes(steps: tuple[int, int], window: int, seed: int, beyond: bool = Fa
 
 
 def _cases(
-    caps: tuple[int, int], steps: tuple[int, int], firsts: Sequence[Iterable[int]], seed: int
+    caps: tuple[int, int], steps: tuple[int, int], firsts: Sequence[Iterable[int]]
 ) -> NDArray[np.int64]:
     """Return x, width, y and height (4, cases): of an axis first columns or rows, each with each distance.
 
     The other axis is far from its borders.
     """
-    far = np.random.default_rng(seed).integers
 
     def drawn(before: int | None, behind: int | None, step: int) -> tuple[int, int]:
-        at = int(far(FAR, 2 * FAR)) // step * step if before is None else before
-        return at, at + (int(far(FAR, 2 * FAR)) if behind is None else behind)
+        at = (FAR + secrets.randbelow(FAR)) // step * step if before is None else before
+        return at, at + (FAR + secrets.randbelow(FAR) if behind is None else behind)
 
     across, down = (
         [*itertools.product((None, *first), (None, *range(1, cap + 2)))]

@@ -285,7 +285,8 @@ class Trial(Values):
         """Run all turns of a loop at once, if they have nothing to do with each other."""
         outer, names, memory, size = self.turns, self.names, self.memory, dict(self.size)
         lanes, regions = (self.mask, self.looking), self.regions
-        count, written = len(turns), self.written.copy() if _writes(loop) else None
+        writes = any(isinstance(each, Store) and each.array == RESULT for each in walk(loop.body))
+        count, written = len(turns), self.written.copy() if writes else None
         slot = None if outer.slot is None else np.repeat(outer.slot, count)
         self.turns = Turns(outer.count * count, slot, undoes=True, ordered=outer.count == 1)
         self.names = {key: _repeated(value, count) for key, value in names.items()}
@@ -507,8 +508,3 @@ def _repeated(value: Any, count: int) -> Any:
     if isinstance(value, Term | Place | Slice):
         return value.each(lambda a: _repeated(a, count), lambda a: _repeated(a, count))
     return value
-
-
-def _writes(loop: For) -> bool:
-    """Return whether a loop writes the result."""
-    return any(isinstance(each, Store) and each.array == RESULT for each in walk(loop.body))

@@ -11,7 +11,7 @@ from wamnet.compiler.reading.terms import Fold, Term
 
 def test_tiles_have_every_case_of_a_row():
     """TXT-10."""
-    lanes = tile_lanes((6, 4), 3, seed=1, beyond=False)
+    lanes = tile_lanes((6, 4), 3, beyond=False)
     x, width, y, height = lanes.known
     far = (y > 5) & (height - y > 8)
     cases = {(a > 0, min(b, 11)) for a, b in zip(x[far], (width - x)[far], strict=True) if b > 0}
@@ -23,7 +23,7 @@ def test_tiles_have_every_case_of_a_row():
 
 def test_tiles_of_launches_are_below_the_picture_too():
     """TXT-12: at each distance from its last row, and far."""
-    lanes = tile_lanes((6, 4), 3, seed=1, beyond=True)
+    lanes = tile_lanes((6, 4), 3, beyond=True)
     _, _, y, height = lanes.known
     assert {*range(8)} <= {*(y - height)[y >= height].tolist()}
     assert (y - height).max() > 1000
@@ -133,7 +133,7 @@ def test_arrays_of_turns_have_a_column_for_each():
 
 def test_nothing_is_compared_with_the_number_of_a_tile():
     """What is true of the tiles that are computed is true of all."""
-    lanes = tile_lanes((6, 4), 3, seed=1)
+    lanes = tile_lanes((6, 4), 3)
     lanes.batch = 4004, 4
     count, tile = (Place(np.array([n]), NOTHING, TILE) for n in ([4004], [17, 1018]))
 

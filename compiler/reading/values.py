@@ -24,12 +24,6 @@ from .lanes import Unread, Wrong
 from .places import COMPARES, Place, indices
 from .terms import Term, applied, chosen, constant, select, stacked
 
-EVALUATED = (
-    "const", "name", "load", "component", "splat", "stack", "clamp", "select", "call", "logical_and",
-    "convert", "bits", "pack4", "dot4",
-)  # fmt: skip
-"""Expressions that are not operations on their operands' values."""
-
 
 class Values(Walker):
     """Values of one run of a kernel for a claim, for the lanes and turns that are active (`mask`)."""
@@ -43,7 +37,8 @@ class Values(Walker):
         self.kernel, self.claim, self.lanes = kernel, claim, claim.lanes
         self.dual, self.turns, self.mask, self.looking = bool(kernel.launches), Turns(1), None, None
         self.numbers: dict[Any, Any] = {}
-        self.evaluators = {key: getattr(self, f"_value_{key}") for key in EVALUATED}
+        methods = (key for key in dir(self) if key.startswith("_value_"))
+        self.evaluators = {key.removeprefix("_value_"): getattr(self, key) for key in methods}
         self.keys = np.array(sorted(claim.first), dtype=np.uint64)
         self.ids = np.array([claim.first[key] for key in self.keys.tolist()], dtype=np.int64)
         parts = np.array([kind == "part" for kind, _ in claim.tables], bool)

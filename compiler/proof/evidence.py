@@ -37,8 +37,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
         stated = stated_bytes(manifest, name, "manifest", "restore it")
         place = path.parent / (folder if name == "weights.bin" else "") / name
         files[name] = read_file(place, "file", "restore it", stated=stated)
-    for name, data in files.items():
-        same(f"digest of {name}", held["files"].get(name), hashlib.sha256(data).hexdigest())
+        same(f"digest of {name}", held["files"].get(name), hashlib.sha256(files[name]).hexdigest())
     kernel = [manifest["digest"], manifest["profile"]["name"]]
     same("digest of the kernel, and profile", [held["manifest_digest"], held["profile"]], kernel)
     if "entry_point" not in held:
@@ -47,8 +46,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Any], str, dict[str, Any
     same("centre of the window", held["centre"], manifest["window"]["centre"])
     raw, text = np.frombuffer(files["weights.bin"], "<f4"), str(held["program"])
     arrays = parameters_of(held, raw)
-    pieces = b"".join(arrays[name].tobytes() for name in sorted(arrays))
-    digest = hashlib.sha256(text.encode() + pieces).hexdigest()
+    digest = hashlib.sha256(text.encode() + b"".join(arrays[n].tobytes() for n in sorted(arrays))).hexdigest()
     same("digest of the program in the certificate", held["program_digest"], digest)
     same("digest of the program in the manifest", manifest["program"], digest)
     check_manifest(manifest, text, len(raw))
@@ -77,8 +75,7 @@ def check_manifest(manifest: Any, text: str, count: int) -> None:
     """
     same("program: at most 65,536 lines", text.count("\n") <= 2**16, True)
     same("manifest: schema", manifest["schema"], "wamnet-artifact-1")
-    window, output, schedule = (manifest[key] for key in ("window", "output", "schedule"))
-    given = manifest["images"]
+    window, output, schedule, given = (manifest[key] for key in ("window", "output", "schedule", "images"))
     counted = [window["size"], window["centre"], output["channels"], *(image["channels"] for image in given)]
     counted += [manifest["weights"]["count"], *schedule.get("group", ())]
     counted += [schedule.get(key, 1) for key in ("pixels", "rows")]

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ DTYPES = ("float32", "int32", "uint32", "bool")
 """Kinds of numbers that every target has; arithmetic on uint32 is modulo 2**32."""
 
 
-@dataclass(frozen=True)
-class Type:
+class Type(NamedTuple):
     """The type of a value in one lane: a number (shape ()) or a vector (shape (n,))."""
 
     dtype: str = "float32"
@@ -62,6 +61,10 @@ class Node:
     type: Type
     attributes: tuple[tuple[str, Attribute], ...] = ()
     places: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    def on(self, args: tuple[int, ...], kind: Type | None = None) -> Node:
+        """Return the operation on other operands."""
+        return Node(self.op, args, kind or self.type, self.attributes, self.places)
 
     def __getitem__(self, name: str) -> Attribute:
         return dict(self.attributes)[name]
@@ -183,7 +186,7 @@ class Builder:
         if key not in self._numbers:
             self._numbers[key] = len(self.nodes)
             if not node.places and (places := self.where()):
-                node = replace(node, places=places)
+                node = Node(node.op, node.args, node.type, node.attributes, places)
             self.nodes.append(node)
         return self._numbers[key]
 

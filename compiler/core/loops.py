@@ -62,6 +62,8 @@ def bodies(program: Program) -> Sequence[frozenset[int]]:
     """Return, for each node, the loops in whose bodies it is: none or one in a verified program."""
     nowhere = frozenset[int]()
     inside: list[frozenset[int]] = []
+    if not any(node.op in ("carried", "row", "branch") for node in program.nodes):
+        return [nowhere] * len(program.nodes)
     for node in program.nodes:
         # Few nodes are in a loop, and a union of empty sets takes as long as any.
         found = nowhere.union(*(loops for arg in node.args if (loops := inside[arg])))

@@ -14,7 +14,6 @@ import numpy as np
 from ..core.ir import Program, Type
 from ..core.passes import pipeline
 from ..core.trace import trace
-from ..core.verify import verify
 
 XYZ, RGB, NUMBER = ("_x", "_y", "_z"), ("_r", "_g", "_b"), ("",)
 """Endings of the names of a vector's, a colour's and a number's components."""
@@ -80,4 +79,4 @@ def lowered(
         return apart(outputs, function(joined(inputs, given)))
 
     program = trace(call, {name: Type(kind) for name, kind in components.items()}, **options)
-    return pipeline.run(verify(program, f"traced {what}"), passes)
+    return pipeline.run(program, passes, f"traced {what}")

@@ -31,9 +31,9 @@ COMMON = ("fold", "fuse_bias", "eliminate_dead")
 """What every program goes through; error bounds speak about the result, where a sine is one node."""
 
 
-def run(program: Program, names: Sequence[str]) -> Program:
+def run(program: Program, names: Sequence[str], when: str = "before the passes") -> Program:
     """Return the program after the named passes, verified at every step."""
-    verify(program, "before the passes")
+    verify(program, when)
     for name in names:
         if name not in PASSES:
             raise CompileError(f"pass {name!r}: unknown ({choice(name, PASSES)})")

@@ -39,8 +39,7 @@ def rewrite(program: Program, rule: Rule) -> Program:
         args = tuple(moved[arg] for arg in node.args)
         builder.places = node.places
         index = rule(builder, node, args)
-        kept = node if args == node.args else replace(node, args=args)
-        moved.append(builder.add(kept) if index is None else index)
+        moved.append(builder.add(node.on(args)) if index is None else index)
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     return replace(program, nodes=tuple(builder.nodes), outputs=outputs)
 
@@ -130,15 +129,12 @@ def _numbers(
     if OPS[node.op].elementwise or not node.type.shape:
         parts = range(node.type.shape[0] if node.type.shape else 1)
         spread = [operand * len(parts) if len(operand) == 1 else operand for operand in operands]
-        return tuple(
-            builder.add(replace(node, type=number, args=tuple(operand[i] for operand in spread)))
-            for i in parts
-        )
+        return tuple(builder.add(node.on(tuple(operand[i] for operand in spread), number)) for i in parts)
     args = tuple(
         _joined(builder, operand, program.nodes[arg].type)
         for operand, arg in zip(operands, node.args, strict=True)
     )
-    vector = builder.add(replace(node, args=args))
+    vector = builder.add(node.on(args))
     return tuple(
         builder.add(Node("component", (vector,), number, attributes(index=i)))
         for i in range(node.type.shape[0])
@@ -158,9 +154,7 @@ def eliminate_dead(program: Program) -> Program:
             live.update(program.nodes[index].args)
     kept = [i for i, node in enumerate(program.nodes) if i in live or node.op == "input"]
     moved = {old: new for new, old in enumerate(kept)}
-    nodes = tuple(
-        replace(program.nodes[i], args=tuple(moved[arg] for arg in program.nodes[i].args)) for i in kept
-    )
+    nodes = tuple(program.nodes[i].on(tuple(moved[arg] for arg in program.nodes[i].args)) for i in kept)
     outputs = tuple((name, moved[index]) for name, index in program.outputs)
     used = {str(name) for node in nodes for key, name in node.attributes if key in OPS[node.op].parameters}
     parameters = {name: array for name, array in program.parameters.items() if name in used}

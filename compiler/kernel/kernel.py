@@ -407,8 +407,8 @@ def values(statement: Statement) -> list[Expr]:
             for each in part if isinstance(part, tuple) else (part.index, part.step):
                 note(each)
 
-    for each in fields(statement):
-        note(getattr(statement, each.name))
+    for each in vars(statement).values():
+        note(each)
     return found
 
 

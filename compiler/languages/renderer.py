@@ -99,7 +99,8 @@ class Renderer:
                 a.name: tree.Array(a.name, tree.Type(a.dtype, a.lanes), (1,), "device") for a in bound.arrays
             }
         widths = {name: array.type.lanes for name, array in self.arrays.items()}
-        self.mixed = {a for a, kind in tree.accesses(everything) if kind.lanes < widths.get(a, 0)}
+        read = tree.accesses(everything) if max(widths.values(), default=1) > 1 else ()
+        self.mixed = {a for a, kind in read if kind.lanes < widths.get(a, 0)}
 
     def source(self, header: Sequence[str]) -> str:
         """Return the whole source, under the lines of a comment."""

@@ -60,11 +60,8 @@ def _folded(program: Program, kind: np.dtype[Any]) -> Program:
         number = not node.type.shape and (OPS[node.op].elementwise or node.op == "take")
         if args and number and all(value is not None for value in constants):
             return _computed(builder, node, args, kind)
-        for simplify in (_neutral, _decided, _selected, _looked_up, _negated):
-            index = simplify(builder, node, args, constants)
-            if index is not None:
-                return index
-        return None
+        found = (simplify(builder, node, args, constants) for simplify in _SIMPLER.get(node.op, ()))
+        return next((index for index in found if index is not None), None)
 
     return rewrite(program, rule)
 
@@ -75,10 +72,8 @@ Known = list[bool | int | float | None]
 
 def _computed(builder: Builder, node: Node, args: tuple[int, ...], kind: np.dtype[Any]) -> int | None:
     """Return the constant that the operation gives, or None when it is not finite in float32."""
-    operands = []
-    for arg in args:
-        constant = builder.nodes[arg]
-        operands.append(element(constant.type.dtype, kind).type(constant["value"]))
+    constants = [builder.nodes[arg] for arg in args]
+    operands = [element(each.type.dtype, kind).type(each["value"]) for each in constants]
     with np.errstate(all="ignore"):
         value = apply(node, operands, builder.parameters, kind)
     if node.type.dtype == "float32" and not abs(float(value)) <= float(np.finfo(np.float32).max):
@@ -88,8 +83,6 @@ def _computed(builder: Builder, node: Node, args: tuple[int, ...], kind: np.dtyp
 
 def _neutral(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the operand that the operation leaves unchanged."""
-    if node.op not in NEUTRAL:
-        return None
     value, commutes = NEUTRAL[node.op]
     for keep, other in ((0, 1), (1, 0)) if commutes else ((0, 1),):
         if _same(constants[other], value) and builder.nodes[args[keep]].type == node.type:
@@ -99,15 +92,13 @@ def _neutral(builder: Builder, node: Node, args: tuple[int, ...], constants: Kno
 
 def _decided(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the constant of `and` with False, and of `or` with True."""
-    if node.op not in DECISIVE or node.type.shape or DECISIVE[node.op] not in constants:
+    if node.type.shape or DECISIVE[node.op] not in constants:
         return None
     return constant_of(builder, DECISIVE[node.op], "bool")
 
 
 def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the value that is always chosen; between booleans, what the choice amounts to."""
-    if node.op != "select":
-        return None
     condition, a, b = args
     chosen = a if constants[0] or a == b else b if constants[0] is False else None
     if chosen is not None:
@@ -123,8 +114,6 @@ def _selected(builder: Builder, node: Node, args: tuple[int, ...], constants: Kn
 
 def _looked_up(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return the constant of a table whose entries are all the same bits."""
-    if node.op not in ("take", "row", "branch"):
-        return None
     table = builder.parameters[str(node["table"])]
     same = len({entry.tobytes() for entry in table}) == 1
     return constant_of(builder, table[0], node.type.dtype) if same else None
@@ -132,9 +121,17 @@ def _looked_up(builder: Builder, node: Node, args: tuple[int, ...], constants: K
 
 def _negated(builder: Builder, node: Node, args: tuple[int, ...], constants: Known) -> int | None:
     """Return x of `not not x` and of -(-x)."""
-    if node.op not in ("logical_not", "negative") or builder.nodes[args[0]].op != node.op:
-        return None
-    return builder.nodes[args[0]].args[0]
+    inner = builder.nodes[args[0]]
+    return inner.args[0] if inner.op == node.op else None
+
+
+_SIMPLER = {
+    **dict.fromkeys(NEUTRAL, (_neutral,)),
+    **dict.fromkeys(DECISIVE, (_neutral, _decided)),
+    **dict.fromkeys(("take", "row", "branch"), (_looked_up,)),
+    **dict.fromkeys(("logical_not", "negative"), (_negated,)),
+    "select": (_selected,),
+}
 
 
 def _same(found: bool | int | float | None, wanted: float) -> bool:

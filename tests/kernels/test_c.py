@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kit import pictures
 
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
@@ -44,8 +45,7 @@ int main(void)
 def case(kit):
     """A denoiser with two images, a picture narrower than its window, and what the reference computes."""
     program = kit.denoiser(kit.network([100, 7, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 5, "zero")
-    random = np.random.default_rng(1)
-    images = {name: random.uniform(-2, 2, (6, 3, n)).astype(np.float32) for name, n in (("a", 3), ("b", 1))}
+    images = pictures({"a": 3, "b": 1}, (6, 3))
     (expected,) = interpret(program, {"window": kit.windows(program, images)}, np.float64).values()
     return program, images, expected
 
@@ -99,8 +99,7 @@ def bordered(request, kit):
     """A denoiser as above whose layers fill no vector, and pictures that fill no tile; the reference's."""
     border, size = request.param
     program = kit.denoiser(kit.network([100, 37, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 5, border)
-    random = np.random.default_rng(3)
-    images = {name: random.uniform(-2, 2, (*size, n)).astype(np.float32) for name, n in (("a", 3), ("b", 1))}
+    images = pictures({"a": 3, "b": 1}, size, 3)
     (expected,) = interpret(program, {"window": kit.windows(program, images)}, np.float64).values()
     return program, images, expected
 
@@ -220,18 +219,14 @@ def test_no_compiler(monkeypatch, command, says):
         kernels.open_executor("c")
 
 
-@pytest.mark.parametrize(
-    "relaxed",
-    [
-        "-ffast-math",
-        "-funsafe-math-optimizations",
-        "-Ofast",
-        "-fassociative-math -fno-signed-zeros -fno-trapping-math",
-        "-freciprocal-math",
-        "-ffp-contract=fast -mfma",
-        "-ffinite-math-only",
-    ],
+RELAXED = (
+    "-ffast-math -funsafe-math-optimizations -Ofast -fassociative-math -fno-signed-zeros -fno-trapping-math "
+    "-freciprocal-math -ffinite-math-only",
+    "-ffp-contract=fast -mfma",
 )
+
+
+@pytest.mark.parametrize("relaxed", RELAXED)
 def test_options_that_relax_arithmetic_are_taken_back(executor_named, case, monkeypatch, relaxed):
     """The bits of the plain kernel, and denormal numbers of this process, survive what CC names."""
     program, images, _ = case
@@ -260,9 +255,10 @@ def test_arrays_too_large_for_a_stack(executor_named, kit):
         executor_named("c").build(compile_program(program, "c", "native"))
 
 
-def test_a_pipeline_is_the_composition_of_its_kernels(executor_named, kit):
-    """PPL-7: paths, encoding and denoiser of one header each, to the bit."""
-    kit.check_composed(executor_named("c"))
+@pytest.mark.parametrize("name", ["c", "numpy"])
+def test_a_pipeline_is_the_composition_of_its_kernels(executor_named, kit, name):
+    """PPL-7: paths, encoding and denoiser, in C of one header each, to the bit."""
+    kit.check_composed(executor_named(name))
 
 
 # ---- integers ----------------------------------------------------------------------------------------------

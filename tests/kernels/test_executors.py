@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import LONG, trained_sizes
+from kit import networks, pictures
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
@@ -33,36 +33,19 @@ EXAMPLES = settings.default.max_examples // 10
 
 @st.composite
 def cases(draw):
-    """Draw a network, how its images look, and images; in long runs half of the networks are wide."""
-    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
-    size = draw(st.integers(1, 12))
-    hidden = draw(st.lists(st.integers(1, 9), min_size=0, max_size=4))
-    if LONG and draw(st.booleans()):
-        channels, size, hidden = draw(trained_sizes())
-    outputs = draw(st.integers(1, 4))
-    shape = draw(st.tuples(st.integers(1, 14), st.integers(1, 14)))
+    """Draw a network, how its images look, and images."""
+    case = draw(networks(12, 9, 4, wide=True))
+    images = pictures(case["channels"], tuple(min(n, 14) for n in case["shape"]), case["seed"])
     kind = draw(st.sampled_from(["random", "constant", "extreme"]))
-    seed = draw(st.integers(0, 2**32 - 1))
-    random = np.random.default_rng(seed)
-    images = {}
-    for name, n in channels.items():
-        values = random.uniform(-2, 2, (*shape, n))
-        values = {
-            "random": values,
-            "constant": np.full_like(values, values.flat[0]),
-            "extreme": 2 * np.sign(values),
-        }
-        images[name] = values[kind].astype(np.float32)
+    if kind != "random":
+        change = np.sign if kind == "extreme" else lambda x: np.full_like(x, x.flat[0] / 2)
+        images = {name: 2 * change(values) for name, values in images.items()}
     return {
-        "widths": [size * size * sum(channels.values()), *hidden, outputs],
+        **case,
+        "images": images,
         "omegas": draw(st.tuples(st.floats(1, 30), st.floats(1, 30))),
-        "seed": seed,
         "scale": draw(st.sampled_from([0.25, 1.0, 3.0])),
         "activation": draw(st.sampled_from(sorted(ACTIVATIONS))),
-        "channels": channels,
-        "size": size,
-        "border": draw(st.sampled_from(["clamp", "zero"])),
-        "images": images,
     }
 
 

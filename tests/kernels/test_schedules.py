@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import LONG, trained_sizes
+from kit import networks, pictures, ways
 
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
@@ -25,9 +25,8 @@ from wamnet.refimpl.network.train import PRESETS
 EXAMPLES = max(settings.default.max_examples // 33, 1)
 """Each example compiles a kernel, up to a second; NumPy runs many more of each schedule."""
 
-LADDER = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules[1:] if not s.bytewise]
+LADDER = ways(lambda schedule: schedule.name != "plain" and not schedule.bytewise)
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
-
 
 SPECTRA = ("fft:16", "fft:8", "fft:4")
 """The schedules of transforms."""
@@ -36,10 +35,10 @@ SHADERS = tuple(("opengl", f"group:{pixels}") for pixels in (1, 2, 4))
 """The schedules of compute shaders."""
 
 LARGEST = {
-    **{way: (3, 10) for way in LADDER if way[1] == "inlined"},
+    ("opengl", "inlined"): (3, 10),
     **dict.fromkeys(SHADERS, (6, 10)),
     ("opengl", "fftpasses:32"): (20, 20),
-    **{way: (20, 32) for way in LADDER if way[1] in SPECTRA},
+    **{(target, schedule): (20, 32) for target in ("opencl", "c") for schedule in SPECTRA},
 }
 """Largest window and layer by target and schedule: Mesa compiles two thousand weights a second, and layers in
 straight code in a time that grows with the square; a tile's sums must fit the stack. The other schedules'
@@ -55,32 +54,6 @@ GROUPED = {(t.name, s.name): s for t in DENOISERS.values() for s in t.schedules 
 """The schedules whose groups share a tile."""
 
 
-@st.composite
-def cases(draw, largest):
-    """Draw (widths, channels, window size, border, image shape, seed); in long runs some are wide."""
-    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
-    size = draw(st.integers(1, largest[0]))
-    hidden = draw(st.lists(st.integers(1, largest[1]), min_size=0, max_size=3))
-    if LONG and largest == UNLIMITED and draw(st.booleans()):
-        channels, size, hidden = draw(trained_sizes())
-    return {
-        "widths": [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))],
-        "channels": channels,
-        "size": size,
-        "border": draw(st.sampled_from(["clamp", "zero"])),
-        "shape": draw(st.tuples(st.integers(1, 17), st.integers(1, 45))),
-        "seed": draw(st.integers(0, 2**32 - 1)),
-    }
-
-
-def images_of(case):
-    random = np.random.default_rng(case["seed"])
-    return {
-        name: random.uniform(-2, 2, (*case["shape"], n)).astype(np.float32)
-        for name, n in case["channels"].items()
-    }
-
-
 @pytest.fixture(autouse=True)
 def _spectra_of_small_windows(monkeypatch):
     """Let the Fourier schedule hold what is faster without it."""
@@ -91,26 +64,12 @@ def executor_of(executor_named, target):
     return executor_named({"opengl": "opengl-egl"}.get(target, target))
 
 
-@pytest.mark.nightly(
-    "c-fft:4",
-    "c-fft:8",
-    "c-tile:4",
-    "c-tile:8",
-    "opengl-group:1",
-    "opengl-group:2",
-    "opencl-fft:8",
-    "opencl-fft:4",
-    "opencl-group:1",
-    "opencl-group:2",
-    "opencl-tile:4",
-    "opencl-tile:8",
-    "opencl-vector:16",
-)
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
 @settings(max_examples=EXAMPLES)
 @given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
 def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
-    case = data.draw(cases({**LARGEST, **LARGEST_LAYERS}.get((target, schedule), UNLIMITED)))
+    largest = {**LARGEST, **LARGEST_LAYERS}.get((target, schedule), UNLIMITED)
+    case = data.draw(networks(*largest, wide=largest == UNLIMITED))
     executor = executor_of(executor_named, target)
     network = kit.network(case["widths"], (9.0, 3.0), case["seed"])
     program = kit.denoiser(network, case["channels"], case["size"], case["border"])
@@ -122,7 +81,8 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
         artifact = compile_program(program, target, "ieee", schedule)
         assert artifact.manifest["schedule"]["name"] == schedule
         executor._built.clear()
-        assert kit.excess(executor, program, images_of(case), artifact) <= 1
+        images = pictures(case["channels"], case["shape"], case["seed"])
+        assert kit.excess(executor, program, images, artifact) <= 1
     executor._built.clear()
 
 
@@ -147,24 +107,6 @@ def test_every_operation_on_vectors(executor_named, kit, target, schedule):
     assert artifact.manifest["schedule"]["name"] == schedule
     images = {"a": np.random.default_rng(3).uniform(-2, 2, (5, 19, 3)).astype(np.float32)}
     assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
-
-
-def test_no_barrier_is_a_race_that_groups_do_not_have(kit):
-    """The tile is read only between two barriers: after it was filled, and before it is filled again."""
-    program = compile_program(paper(kit), "opencl", "ieee", "group:4")
-    statements = [line.strip() for line in program.source.splitlines()]
-    steps = [s for s in statements if s.startswith(("barrier(", "tile[")) or "= tile[" in s]
-    kinds = [
-        "wait" if s.startswith("barrier(") else "write" if s.startswith("tile[") else "read" for s in steps
-    ]
-    order = [kind for number, kind in enumerate(kinds) if number == 0 or kinds[number - 1] != kind]
-    assert order == ["write", "wait", "read", "wait", "write", "wait", "read"]
-
-
-def paper(kit):
-    """Return the paper's network."""
-    network = kit.network([864, 32, 32, 32, 32, 3], (3.0, 3.0))
-    return kit.denoiser(network, {"color": 3, "normal": 3}, 12, "clamp")
 
 
 def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
@@ -258,18 +200,3 @@ def test_pictures_of_a_size_share_what_launches_hand_on(executor_named, kit):
         held.append(list(executor._between_passes))
     assert held[0] == held[1]
     assert not set(held[1]) & set(held[2])
-
-
-@pytest.mark.product
-@pytest.mark.parametrize("border", dataset.BORDERS)
-@pytest.mark.parametrize("shape", [(1, 1), (2, 64), (43, 22)])
-@pytest.mark.parametrize("target", ["opencl", "c"])
-@pytest.mark.parametrize("schedule", SPECTRA)
-def test_pictures_smaller_than_a_tile_and_beyond_one(executor_named, kit, target, schedule, border, shape):
-    """Tiles of 21 x 21 pixels, two side by side; 12 channels, of which one image has an odd number."""
-    program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, border)
-    random = np.random.default_rng(2)
-    images = {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in (("a", 5), ("b", 7))}
-    artifact = compile_program(program, target, "ieee", schedule)
-    assert artifact.manifest["schedule"]["name"] == schedule
-    assert kit.excess(executor_named(target), program, images, artifact) <= 1

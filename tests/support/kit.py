@@ -6,12 +6,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import Artifact
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Program, Type, sha256
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.schedules.names import parse
+from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
@@ -34,6 +37,43 @@ def trained_sizes(draw: st.DrawFn) -> tuple[dict[str, int], int, list[int]]:
     )
     hidden = draw(st.lists(st.sampled_from([32, 64]), min_size=4, max_size=4))
     return channels, draw(st.integers(8, 12)), hidden
+
+
+@st.composite
+def networks(
+    draw: st.DrawFn, size: int = 12, neurons: int = 40, layers: int = 3, wide: bool = False
+) -> dict[str, Any]:
+    """Draw a denoiser, its border, and an image's shape; `wide`: in long runs half are as trained ones."""
+    channels = draw(st.sampled_from([{"a": 3}, {"a": 3, "b": 1}, {"a": 1, "b": 4, "c": 2}]))
+    size, hidden = draw(st.integers(1, size)), draw(st.lists(st.integers(1, neurons), max_size=layers))
+    if LONG and wide and draw(st.booleans()):
+        channels, size, hidden = draw(trained_sizes())
+    return {
+        "widths": [size * size * sum(channels.values()), *hidden, draw(st.integers(1, 4))],
+        "channels": channels,
+        "size": size,
+        "border": draw(st.sampled_from(["clamp", "zero"])),
+        "shape": draw(st.tuples(st.integers(1, 17), st.integers(1, 45))),
+        "seed": draw(st.integers(0, 2**32 - 1)),
+    }
+
+
+def pictures(channels: Mapping[str, int], shape: tuple[int, int], seed: int = 1) -> dict[str, Any]:
+    """Return an image of each name, with values in [-2, 2]."""
+    random = np.random.default_rng(seed)
+    return {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in channels.items()}
+
+
+def ways(fits: Callable[[Any], bool] = lambda schedule: True) -> list[Any]:
+    """Return targets with their schedules, as parameters of a test: the largest of each family, nightly all.
+
+    The others are the same statements with other numbers, of which each is tested in NumPy.
+    """
+    found = [(t.name, s.name) for t in DENOISERS.values() for s in t.schedules if fits(s)]
+    sizes = {way: parse(way[1])[1] or 0 for way in found}
+    largest = {(way[0], parse(way[1])[0]): way for way in sorted(found, key=sizes.__getitem__)}
+    marks = {way: () if way in largest.values() else pytest.mark.nightly for way in found}
+    return [pytest.param(*way, marks=marks[way]) for way in found]
 
 
 def encoded(executor: Any, kernel: Any, sums: Any, samples: int) -> dict[str, Any]:

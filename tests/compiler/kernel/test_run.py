@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kit import pictures
 
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.ir import Gather, Image
@@ -93,12 +94,6 @@ def scheduled(program, shape=None):
     return schedule.build(program), schedule.pack(program)
 
 
-def pictures(channels, size, seed=1):
-    """Return an image of each name, with values in [-2, 2]."""
-    random = np.random.default_rng(seed)
-    return {key: random.uniform(-2, 2, (*size, n)).astype(np.float32) for key, n in channels.items()}
-
-
 def small(*body, images=1, **more):
     """Return a kernel with one image and one channel of a result."""
     interface = denoiser([Image("a", images, -2.0, 2.0)], 1)
@@ -151,8 +146,9 @@ SCHEDULES = {
 @pytest.mark.parametrize("border", ["clamp", "zero"])
 @pytest.mark.parametrize("schedule", SCHEDULES)
 def test_other_schedules_are_near_the_reference(kit, schedule, border):
-    program = kit.denoiser(kit.network([36, 5, 3], (3.0, 5.0)), {"a": 3, "b": 1}, 3, border)
-    plan, images = plan_program(program, "opencl"), pictures({"a": 3, "b": 1}, (3, 5))
+    channels = {"a": 3, "b": 1, "c": 2}
+    program = kit.denoiser(kit.network([54, 5, 3], (3.0, 5.0)), channels, 3, border)
+    plan, images = plan_program(program, "opencl"), pictures(channels, (3, 5))
     expected, kernel = plan.expected(images), SCHEDULES[schedule].build(plan.emitted)
     weights = SCHEDULES[schedule].pack(plan.emitted)
     far = 4 if schedule.startswith("fft") else 1  # another order of sums, whose own bound is larger

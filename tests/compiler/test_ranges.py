@@ -428,7 +428,7 @@ def fused(program, node, values, random):
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_every_executor_that_keeps_the_promises_is_in_range(seed):
-    """Random programs, ten random executors each; where all is sure or guided, the decisions agree."""
+    """Random programs, four random executors each; where all is sure or guided, the decisions agree."""
     random = np.random.default_rng(seed)
     program = drawn_program(random)
     inputs = {name: np.float32(random.choice([random.normal(), random.integers(-2, 3)])) for name in "xyz"}
@@ -440,7 +440,7 @@ def test_every_executor_that_keeps_the_promises_is_in_range(seed):
         assert np.array_equal(one.plain, expected[name])
         assert one.holds(one.plain)
         assert evaluate(program, inputs, guided=True)[name].holds(one.plain)
-        for _ in range(10):
+        for _ in range(4):
             assert one.holds(execute(program, inputs, random)[name])
 
 

@@ -140,7 +140,7 @@ def test_constants_as_large_as_a_group_are_refused(four):
             run_text(*changed(four, old, f"tile[i] = inside && {case} ?"))
 
 
-@pytest.mark.parametrize(("a", "b"), [(23, 7), (31, 4), (5, 9), (12, 10)])
+@pytest.mark.parametrize(("a", "b"), [(23, 7), (5, 9)])
 def test_conditions_near_borders_of_both_axes_are_refused(four, a, b):
     """TXT-5: no lane is near both. A reader that drew pairs of distances accepted nearly all of these."""
     old, both = "tile[i] = inside", f"left == width - {a} && top == height - {b}"

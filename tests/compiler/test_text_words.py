@@ -32,7 +32,6 @@ def grouped(request, tmp_path_factory):
 
 
 @pytest.mark.product
-@pytest.mark.product
 @pytest.mark.parametrize(
     ("target", "schedule"),
     [

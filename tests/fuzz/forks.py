@@ -9,6 +9,7 @@
 import importlib
 import json
 import os
+import pkgutil
 import resource
 import signal
 import subprocess
@@ -20,27 +21,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
+from wamnet.cli import commands
+
 ENDING_S = 15.0
 """Seconds that it may take to end then; a kernel that is being compiled ends first."""
 
 CRASHED = 99
 """Status of a child that an exception has ended."""
-
-IMPORTED = (
-    "wamnet.cli.main",
-    *(f"wamnet.cli.{name}" for name in ("bench", "exr", "images", "machine", "movie", "webpage")),
-    *(f"wamnet.compiler.{name}" for name in ("compile", "checker", "path_kernel", "variants")),
-    *(f"wamnet.kernels.{name}" for name in ("pipeline", "reduce", "curve")),
-    *(f"wamnet.kernels.{name}" for name in ("export.package", "conformance.run", "bench.contenders")),
-    *(
-        "wamnet.refimpl.network.train",
-        "wamnet.refimpl.light.scenes",
-        "scipy.fft",
-        "skimage.metrics",
-        "matplotlib.figure",
-    ),
-)
-"""Modules that lines use."""
 
 SAID = ".said"
 """File in a line's folder with all that it said."""
@@ -105,9 +92,9 @@ def _pipe(pipe: IO[str] | None) -> IO[str]:
 def serve() -> None:
     """Answer lines of JSON until there are no more."""
     # Children have from here what takes long to import; none of it opens a device.
-    for module in IMPORTED:
+    for module in pkgutil.iter_modules(commands.__path__, f"{commands.__name__}."):
         with suppress(ImportError):
-            importlib.import_module(module)
+            importlib.import_module(module.name)
     for line in sys.stdin:
         asked = json.loads(line)
         try:

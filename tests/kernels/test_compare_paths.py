@@ -77,10 +77,10 @@ def test_paths_are_those_of_the_reference(executor, name):
 
     At most 1 path in 100 at a depth is undecided: 0.5 % are seen, most of them grazing a light's plane.
     """
-    report = compare_paths.compare_paths(executor, SCENES[name], Settings(max_depth=3), VIEW)
+    report = compare_paths.compare_paths(executor, SCENES[name], Settings(max_depth=2), VIEW)
     assert report.passed, [str(example) for example in report.examples]
     assert report.examples == ()
-    assert [depth.depth for depth in report.depths] == [0, 1, 2, 3]
+    assert [depth.depth for depth in report.depths] == [0, 1, 2]
     assert report.depths[0].paths == 48 * 32
     for depth in report.depths:
         assert depth.unexplained == 0
@@ -287,7 +287,7 @@ def test_views_outside_their_rules_are_refused():
 # ---- pictures ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.nightly(but=("lone_light-128", "daylight-128"))
+@pytest.mark.nightly(but="lone_light-128")
 @pytest.mark.parametrize(
     ("name", "spp"),
     [

@@ -130,42 +130,13 @@ def test_the_pipeline_is_the_separate_way(executor, model_of, case, sums):
     assert bound.max() <= 1e-3  # a bound this small tells colours apart; 2^-8 would be one level of a PNG
 
 
-@pytest.mark.nightly(
-    but=(
-        "numpy-minicubes, all features",
-        "opengl-osmesa-cornell, colour and normal",
-        "opencl-cornell, colour and normal",
-    )
-)
-@pytest.mark.parametrize("case", ["minicubes, all features", "cornell, colour and normal"])
-def test_the_whole_separate_way(executor, model_of, case):
-    """With the path kernel that writes all planes: where all pixels of a window are the same paths."""
-    name, features, size, border, shape, samples = CASES[case]
-    model, rays = model_of(features, size, border), int("direct" in features)
-    job = Job(*shape[::-1], samples, 3, SETTINGS, shadow_rays=rays)
-    with Pipeline(executor, scene(name), model, shape, settings=SETTINGS) as pipeline:
-        found = pipeline.run(seed=3, spp=samples)
-    sums, encode = traced(executor, model, name, (shape, samples), 3)
-    errors = error_at(encode, sums, samples)
-    frame = render_on(executor, scene(name), job).frame
-    separate = denoise_on(executor, model, frame).image.astype(np.float64)
-    wanted = {n: dataset.feature_image(frame, (n,), SCALES) for n in features}
-    own = frame_of(sums, samples, features)
-    # Compilers may contract two kernels differently; pixels whose numbers differ are left out.
-    other = np.any([np.any(own[n] != frame[n], axis=-1) for n in layers_of(features)], axis=0)
-    whole = ~dataset.all_windows(dataset.pad(other[..., None], model.window), model.window).any(axis=-1)
-    assert whole.mean() >= 0.9  # on processors all are the same
-    errors = {n: 2 * errors[n] + 2.0**-24 * np.abs(wanted[n]) for n in features}
-    assert np.all((np.abs(found - separate) <= difference_bound(model, executor, wanted, errors))[whole])
-
-
 @pytest.mark.product
 @pytest.mark.parametrize("lanes", [1, 4, 16])
 @pytest.mark.parametrize("size", [(1, 1), (4, 16), (9, 33)])
 def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, lanes, size):
     """PPL-13: within what both are off; C, whose functions are the same in both kernels, to the bit."""
     part, features = Part(size[1], size[0], 0, size[0], 0, 2, 7), ("depth", "color", "normal")
-    programs = lower_scene(scene("minicubes"), SETTINGS)
+    programs = lower_scene(scene("lone_light"), SETTINGS)
     for name in ("opencl", "c")[: 2 if lanes == 1 else 1]:
         executor = executor_named(name)
         sums_kernel = compile_path(programs, name, lanes=lanes, groups=layers_of(features))
@@ -401,15 +372,6 @@ def test_a_pipeline_of_integers_shows_what_they_stand_for(executor, model_of):
         for name, image in shown.items():
             # Half a step, and the rounding of 127 x + 1/2 in float32.
             assert np.abs(image - pipeline.image(name)).max() <= 0.5 / 127 + 2.0**-16
-
-
-def test_the_definition_is_the_composition(executor_named, model_of):
-    """PPL-7: on the interpreter the picture is what its kernels give one after another, to the bit."""
-    executor, model, size = executor_named("numpy"), model_of(ALL, 4, "clamp"), (11, 23)
-    with Pipeline(executor, scene("cornell"), model, size, settings=SETTINGS) as pipeline:
-        found = pipeline.run(5, 2)
-        images = {name: pipeline.image(name) for name in model.features}
-        assert np.array_equal(found, executor.run(pipeline.denoise, images))
 
 
 @pytest.mark.nightly(but=("numpy",))

@@ -46,16 +46,6 @@ def test_a_frame_says_where_the_sun_is(executor_named, name) -> None:
 
 
 @pytest.mark.parametrize("name", ["opencl", "opengl"])
-def test_a_kernel_renders_the_scene(executor_named, name) -> None:
-    """The first hits of one path a pixel are those of the reference; 1e-5 is derived in test_paths.py."""
-    executor_named(REQUIRED[name])
-    job = Job(7, 5, 1, 3)
-    want, got = (render_frame(renderer, SCENE, job).frame for renderer in ("numpy", name))
-    near = np.abs(got["position"] - want["position"]) <= 1e-5 * (1 + np.abs(want["position"]))
-    assert near.all(axis=-1).mean() >= 0.97  # one path of 35 may pass an edge by less than rounding
-
-
-@pytest.mark.parametrize("name", ["opencl", "opengl"])
 def test_kernels_take_more_rays_for_features(executor_named, name) -> None:
     """The colour's bits are those of a job without; the features are those of as many samples."""
     executor_named(REQUIRED[name])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import sine
@@ -57,19 +55,6 @@ def test_hard_arguments_on_executor(executor, kind, degree):
     off = np.abs(found - function(x.astype(np.float64)))
     assert np.max(off) + NUMPY <= getattr(sine.POLYNOMIALS[degree], name)
     assert np.max(np.abs(found)) <= 1
-
-
-@given(data=st.data())
-def test_any_argument_on_executor(executor, data):
-    """Sixteen numbers of all sizes at a time; NumPy's own values of the same function are as near."""
-    kind, degree = data.draw(st.sampled_from(sorted(KINDS))), data.draw(st.sampled_from(DEGREES))
-    function, domain, name = KINDS[kind]
-    x = np.array(
-        data.draw(st.lists(st.floats(-domain, domain, width=32), min_size=16, max_size=16)), np.float32
-    )
-    found = values(executor, kind, degree, x)
-    off = np.abs(found - function(x.astype(np.float64)))
-    assert np.max(off) + NUMPY <= getattr(sine.POLYNOMIALS[degree], name)
 
 
 @pytest.mark.parametrize("degree", DEGREES)

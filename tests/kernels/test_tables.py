@@ -75,9 +75,7 @@ def crowd(*counts, lights=(LIGHT,), **parts):
 
 
 EVERY_KIND = crowd(*((kind, 6) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9))))
-SINGLES = {kind: crowd((kind, 5)) for kind in MAKERS}
 SCENES = {
-    **SINGLES,
     "mixture": EVERY_KIND,
     "one of each kind": crowd(*((kind, 1) for kind in MAKERS)),
     "no light, no room": replace(EVERY_KIND, lights=(), room=None, background=(0.4, 0.5, 0.6)),
@@ -150,7 +148,6 @@ TREE = re.compile(r"for \(int visit = 0; visit < (\d+); \+\+visit\) {")
 """A walk along a tree."""
 
 GROWN = {
-    **{kind: crowd((kind, 40)) for kind in MAKERS},
     "mixture": crowd(
         *((kind, 24) for kind in MAKERS), lights=(LIGHT, replace(LIGHT, corner=(-0.9, 0.9, -0.9)))
     ),
@@ -173,7 +170,7 @@ def test_a_tree_computes_what_the_list_computes(denoiser, name, monkeypatch):
     assert np.array_equal(found, expected)
 
 
-@pytest.mark.nightly("8")
+@pytest.mark.nightly(but="4")
 @pytest.mark.parametrize("lanes", [1, 4, 8])
 def test_a_tree_is_the_same_for_any_number_of_lanes(executor_named, lanes, monkeypatch):
     monkeypatch.setattr(hierarchy, "VISIT", 5.0)

@@ -129,6 +129,7 @@ def test_certified_bounds_are_below_a_step_of_a_display(name, target):
 # ---- frames and faults ---------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(but=("glossy", "cornell", "minicubes"))
 @pytest.mark.parametrize("name", MODELS)
 def test_frames_show_what_the_model_is_for_and_has_not_seen(name):
     case = trained(name)

@@ -28,6 +28,7 @@ def pytest_configure() -> None:
 def pytest_collection_finish() -> None:
     gc.enable()
     gc.freeze()
+    gc.set_threshold(20_000, 20)  # compilers make many small things that live
 
 
 GROWTH_MB = 100

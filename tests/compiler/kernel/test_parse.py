@@ -258,21 +258,24 @@ ATTRIBUTES = ("PRECISE", "WAMNET_UNROLL", "pragma", "unroll")
 """What says how a kernel is compiled, and not what it computes."""
 
 
+def every_token_counts(source, known, reads, count):
+    """Insist that a source in which one token is another, or is missing, is refused or another kernel."""
+    source = re.sub(r"/\*.*?\*/", "", source, flags=re.S)
+    original = reads(source)
+    assert original == canonical(known)
+    drawn = random.Random(source)
+    tokens = [token for token in re.finditer(r"\w+|[^\w\s]+", source) if token[0] not in ATTRIBUTES]
+    for token in drawn.sample(tokens, count):
+        changed = source[: token.start()] + drawn.choice(["", *SIGNS]) + source[token.end() :]
+        with suppress(Unread):
+            place = changed[token.start() - 60 : token.end() + 60]
+            assert changed.split() == source.split() or reads(changed) != original, place
+
+
 @pytest.mark.parametrize(("target", "schedule"), KINDS)
 def test_every_token_counts(tiny, target, schedule):
-    """A source in which one token is another, or is missing, is refused or another kernel."""
     kernel, weights = (plain(tiny), pack(tiny)) if schedule == "plain" else tiled(tiny, target)
-    source = re.sub(r"/\*.*?\*/", "", rendered(kernel, target, weights), flags=re.S)
-    original = read(source, target, kernel)
-    drawn = random.Random(f"{target} {schedule}")
-    tokens = [token for token in re.finditer(r"\w+|[^\w\s]+", source) if token[0] not in ATTRIBUTES]
-    for _ in range(20):
-        token, other = drawn.choice(tokens), drawn.choice(["", *SIGNS])
-        changed = source[: token.start()] + other + source[token.end() :]
-        if other == token[0]:
-            continue
-        with suppress(Unread):
-            assert read(changed, target, kernel) != original, changed[token.start() - 60 : token.end() + 60]
+    every_token_counts(rendered(kernel, target, weights), kernel, lambda text: read(text, target, kernel), 20)
 
 
 @pytest.mark.nightly(but=USUAL)
@@ -280,15 +283,7 @@ def test_every_token_counts(tiny, target, schedule):
 def test_every_schedule_reads_back(target, schedule):
     """KER-26: a source is the kernel that its schedule has built; with another token it is not."""
     kernel, source, passes = emitted(target, schedule, "zero" if len(schedule) % 2 else "clamp")
-    source = re.sub(r"/\*.*?\*/", "", source, flags=re.S)
-    original = read_back(source, target, kernel, passes)
-    assert original == canonical(kernel)
-    drawn = random.Random(f"{target} {schedule}")
-    tokens = [token for token in re.finditer(r"\w+|[^\w\s]+", source) if token[0] not in ATTRIBUTES]
-    for token in drawn.sample(tokens, 2):
-        changed = source[: token.start()] + drawn.choice(SIGNS) + source[token.end() :]
-        with suppress(Unread):
-            assert changed.split() == source.split() or read_back(changed, target, kernel, passes) != original
+    every_token_counts(source, kernel, lambda text: read_back(text, target, kernel, passes), 2)
 
 
 REFUSED = {

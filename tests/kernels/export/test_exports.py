@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -46,10 +47,11 @@ SCENE = canonical("lone_light")
 """A small scene: test_runners.py has a large one."""
 
 
-def made(target, **options):
+@cache
+def made(target):
     """Return an export, with a scene where the target has paths."""
     scene = None if target == "onnx" else SCENE
-    return export(Request(model(), target, scene, settings=Settings(max_depth=1), **options))
+    return export(Request(model(), target, scene, settings=Settings(max_depth=1)))
 
 
 @pytest.fixture(scope="module", params=targets.NAMES)
@@ -227,7 +229,7 @@ def test_the_pair_s_files_are_as_they_say(exported):
 
 @pytest.mark.parametrize("target", ["c", "shadertoy", "onnx"])
 def test_an_export_is_the_same_to_the_byte(target):
-    assert made(target).contents() == made(target).contents()
+    assert made(target).contents() == made.__wrapped__(target).contents()
 
 
 @pytest.mark.parametrize("target", ["wgsl", "c", "glsl-es"])
@@ -399,9 +401,6 @@ def test_a_kernel_that_a_tool_refuses(tmp_path):
         tools.spirv("#version 450\nvoid main() { flaot x; }")
 
 
-# ---- conformance -------------------------------------------------------------------------------------------
-
-
 def test_halves_are_beside_the_weights_where_they_are_the_same_numbers():
     """EXP-17: widened, 16 bits hold what the kernel reads; an export of the full network has no such file."""
     whole, full = (export(Request(random_model(), "c", variant=name)) for name in ("half16", "full"))
@@ -437,7 +436,3 @@ def test_the_rays_of_features_are_stated_without_a_scene():
     told = "The model was trained on features averaged over 16 camera rays per pixel: give it such images"
     assert told in made.files["README.md"].decode()
     assert "camera rays" not in export(Request(model(), "glsl")).files["README.md"].decode()
-
-
-KINDS = {"sine", "random.block", "sampling.cosine_hemisphere", "picture.denoised"}
-"""Kinds that runners are asked here; `wamnet conformance --executor wgsl` asks all."""

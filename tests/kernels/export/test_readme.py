@@ -74,7 +74,6 @@ def agrees(made, folder):
 
 @pytest.mark.needs("programs")
 @pytest.mark.product
-@pytest.mark.product
 @pytest.mark.parametrize("variant", ["full", "whole8"])
 @pytest.mark.parametrize(("target", "where", "schedule"), WAYS)
 def test_it_says_what_certify_does(target, where, schedule, variant, tmp_path):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from triangles import U32, U64, ReadFile, ReadSurface, areas, differences, volume
 
-from wamnet.refimpl.light.materials import Dielectric, Mirror
-from wamnet.refimpl.light.scene import Quad, Scene, Sphere
+from wamnet.refimpl.light.materials import Dielectric
+from wamnet.refimpl.light.scene import Scene, Sphere
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify.cases import Shot, questions
 from wamnet_verify.parts import NotExpressed, written
@@ -283,12 +283,6 @@ def refused(**parts):
         (
             refused(spheres=(Sphere((0.0, 0.0, 0.0), 1.0, (0.5, 1.0, 1.0), material=Dielectric(1.5)),)),
             "tinted glass",
-        ),
-        (
-            refused(
-                quads=(Quad((0.0,) * 3, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0,) * 3, (1.0,) * 3, Mirror()),)
-            ),
-            "mirror that emits",
         ),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 from triangles import ReadSurface, shape_differences, volume, wanted
 
 from wamnet.refimpl.light.materials import Conductor, Lambertian, Mirror
-from wamnet.refimpl.light.scene import Quad, Room, Scene, Sphere
+from wamnet.refimpl.light.scene import Room, Sphere
 from wamnet.refimpl.light.scenes import empty
 from wamnet_verify.cases import questions
 from wamnet_verify.parts import MATTE, METAL, MIRROR, NotExpressed, meshes_of, parts_of, sky_of
@@ -60,9 +60,3 @@ def test_a_sky_surrounds_all():
     assert abs(sum(map(volume, sky)) / 160.0**3 + 1.0) <= 64 * 2.0**-53
     assert {(side.color, side.emission, side.front) for side in sky} == {((0.0,) * 3, (1.0,) * 3, True)}
     assert sky_of(SHOTS["lamp-below"].scene, []) == []
-
-
-def test_what_emits_and_is_no_matte_surface_is_refused():
-    quad = Quad((0.0,) * 3, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.5,) * 3, (1.0,) * 3, Mirror())
-    with pytest.raises(NotExpressed, match="mirror that emits"):
-        meshes_of(parts_of(Scene("odd", empty().camera, quads=(quad,))))

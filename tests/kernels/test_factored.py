@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import networks, pictures, ways
+from kit import COMPILED, networks, pictures, ways
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
@@ -25,9 +25,6 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, factored
 from wamnet.refimpl.network.denoise import Model
-
-EXAMPLES = max(settings.default.max_examples // 50, 1)
-"""Each example compiles two kernels, up to a second."""
 
 WAYS = ways(lambda schedule: not isinstance(schedule, Transformed | Dot | GroupDot))
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes,
@@ -54,7 +51,7 @@ def excess(kit, executor, artifact, program, images, of_cut):
 
 @pytest.mark.product
 @pytest.mark.parametrize(("target", "schedule"), WAYS)
-@settings(max_examples=EXAMPLES)
+@settings(max_examples=COMPILED)
 @given(case=networks(), share=st.floats(0, 1), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
 def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case, share, group):
     """Against the network of the factors' product, up to rounding; against the whole one, with the cut."""

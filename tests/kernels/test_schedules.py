@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import networks, pictures, ways
+from kit import COMPILED, networks, pictures, ways
 
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.lower import lower
@@ -21,9 +21,6 @@ from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren
 from wamnet.refimpl.network.train import PRESETS
-
-EXAMPLES = max(settings.default.max_examples // 33, 1)
-"""Each example compiles a kernel, up to a second; NumPy runs many more of each schedule."""
 
 LADDER = ways(lambda schedule: schedule.name != "plain" and not schedule.bytewise)
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
@@ -65,7 +62,7 @@ def executor_of(executor_named, target):
 
 
 @pytest.mark.parametrize(("target", "schedule"), LADDER)
-@settings(max_examples=EXAMPLES)
+@settings(max_examples=COMPILED)
 @given(data=st.data(), group=st.tuples(st.integers(1, 5), st.integers(1, 4)))
 def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, group):
     largest = {**LARGEST, **LARGEST_LAYERS}.get((target, schedule), UNLIMITED)

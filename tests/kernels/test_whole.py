@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kit import networks, ways
+from kit import COMPILED, networks, ways
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
@@ -19,9 +19,6 @@ from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import SINES, forward_whole, rounded
-
-EXAMPLES = max(settings.default.max_examples // 50, 1)
-"""Each example compiles a kernel, up to a second."""
 
 SLOW = {"inlined", "group:1", "group:2", "group:4", "groupdot:4"}
 """Schedules in straight code, which compilers take long for."""
@@ -62,7 +59,7 @@ def reference(case, images):
 
 
 @pytest.mark.parametrize(("target", "schedule"), ways(lambda schedule: not isinstance(schedule, Fourier)))
-@settings(max_examples=EXAMPLES)
+@settings(max_examples=COMPILED)
 @given(data=st.data(), profile=st.sampled_from(["ieee", "native"]))
 def test_every_schedule_gives_the_bits_of_the_reference(
     executor_named, target, schedule, data, profile

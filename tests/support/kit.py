@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from wamnet.compiler.artifact import Artifact
@@ -25,6 +26,9 @@ from wamnet.refimpl.network.denoise import Model, denoise_pixel
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 """Whether this run draws other cases each time, and wide networks among them."""
+
+COMPILED = max(settings.default.max_examples // 50, 1)
+"""Examples of a test that compiles a kernel for each, up to a second; NumPy runs many more."""
 
 
 @st.composite
@@ -64,7 +68,7 @@ def pictures(channels: Mapping[str, int], shape: tuple[int, int], seed: int = 1)
     return {name: random.uniform(-2, 2, (*shape, n)).astype(np.float32) for name, n in channels.items()}
 
 
-def ways(fits: Callable[[Any], bool] = lambda schedule: True) -> list[Any]:
+def ways(fits: Callable[[Any], bool]) -> list[Any]:
     """Return targets with their schedules, as parameters of a test: the largest of each family, nightly all.
 
     The others are the same statements with other numbers, of which each is tested in NumPy.

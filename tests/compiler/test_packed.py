@@ -1,4 +1,4 @@
-"""The packed schedule (WEB-5): where weights are. Kernels keep their bound in test_es.py."""
+"""The packed schedule (WEB-5): where weights are. Kernels keep their bound in test_exports.py."""
 
 from __future__ import annotations
 

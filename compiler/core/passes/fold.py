@@ -132,6 +132,7 @@ _SIMPLER = {
     **dict.fromkeys(("logical_not", "negative"), (_negated,)),
     "select": (_selected,),
 }
+"""What may be simpler of an operation, in the order in which it is tried."""
 
 
 def _same(found: bool | int | float | None, wanted: float) -> bool:

@@ -30,7 +30,7 @@ from wamnet.models.data.frame_plan import version
 from wamnet.refimpl.frame import FIRST_HIT, SUN, Floats, Frame
 from wamnet.refimpl.light.environment import sun_of
 from wamnet.refimpl.light.render import Job, feature_job, render_info
-from wamnet.refimpl.light.scene import Scene, scene_digest
+from wamnet.refimpl.light.scene import BLACK, Scene, scene_digest
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import AT_REST, Variation, varied
@@ -51,7 +51,7 @@ class Shot:
 
     Its features are means over `feature_spp` camera rays at random; 0: over the colour's. `seen`: features
     are also of what is seen past mirrors and glass. With `shadow_rays` of each camera ray the frame has the
-    layer `direct` too, and these camera rays are spread evenly, as with `spread`.
+    layer `direct` too, and these camera rays are spread evenly, as with `spread`. `sun`: of a sky only that.
     """
 
     scene: str = "minicubes"
@@ -65,6 +65,7 @@ class Shot:
     shadow_rays: int = 0
     settings: Settings = field(default_factory=Settings)
     spread: bool = False
+    sun: bool = False
 
     @property
     def job(self) -> Job:
@@ -77,6 +78,8 @@ class Shot:
     def build(self) -> Scene:
         """Return the scene at its time, from its side and under its lamps."""
         scene = canonical(self.scene, time=self.time)
+        if self.sun and (sky := scene.environment):
+            scene = replace(scene, environment=replace(sky, zenith=BLACK, horizon=BLACK, ground=BLACK))
         return scene if self.variation == AT_REST else varied(scene, self.variation)
 
 
@@ -163,6 +166,14 @@ def relit(frame: Frame, own: Floats, lit: Floats) -> Frame:
     """Return a frame whose colour has other direct light than what its own paths have found."""
     color = np.maximum(frame["color"] - own, 0.0) + lit
     return Frame({**frame.layers, "color": color}, frame.info)
+
+
+def in_sun(frame: Frame, sun: Frame, scene: Scene) -> Frame:
+    """Return a frame whose direct light, with and without shadows, is that of another frame: of the sun."""
+    cosines = np.maximum(frame["normal"] @ sun_of(scene), 0.0)[..., np.newaxis]
+    full = frame["albedo"] * cosines * (np.array(scene.environment.sun_irradiance) / np.pi)
+    layers = {"direct": sun["direct"], "unshadowed": full.astype(np.float32)}
+    return Frame({**frame.layers, **layers}, frame.info)
 
 
 def frames(folder: Path, shots: Iterable[Shot], executor: str = "opencl") -> list[Frame]:

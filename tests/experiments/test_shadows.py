@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shadows
 
+from wamnet.refimpl import metrics
 from wamnet.refimpl.frame import Frame
 
 
@@ -25,6 +26,28 @@ def test_scores_are_of_the_penumbra_too():
     found = shadows.score_lit(target + 0.1 * (half < 1.0), reference)
     assert abs(found["penumbra"] - 25.5) <= 255.0 * 2.0**-20  # float32 in, a tenth of 255
     assert 0.0 < found["blurred"] < found["penumbra"]
+
+
+def test_under_a_sun_the_penumbra_is_that_of_its_light(tmp_path):
+    """Of what the sun lights, all of it, or nothing, reaches most of a frame; its edge reaches the rest."""
+    options = shadows.options_of(
+        ["--tests", "1", "--size", "24", "--spp", "4", "--executor", "numpy", "--cache", str(tmp_path)]
+    )
+    ((_, target),) = shadows.Bench(options, "daylight").pairs("test", shadows.Row(1), 0)
+    full = target["unshadowed"].sum(axis=-1)
+    share = target["direct"].sum(axis=-1)[full > 0.1] / full[full > 0.1]
+    assert np.count_nonzero(share < 0.05) > 10 < np.count_nonzero(share > 0.9)
+    assert 0.0 < metrics.penumbra(target["direct"], target["unshadowed"]).mean() < 0.3
+
+
+def test_frames_outside_are_of_cameras_beyond_those_of_training(tmp_path):
+    found = [
+        [shot.variation.yaw_deg for shot in bench.shots(bench.tests, shadows.Row(16), 0)]
+        for outside in ([], ["--outside"])
+        for bench in [shadows.Bench(shadows.options_of(outside), "vitrine")]
+    ]
+    assert [len(yaws) for yaws in found] == [4, 4]
+    assert max(map(abs, found[0])) <= 24.0 < min(map(abs, found[1]))
 
 
 def test_the_same_direct_light_takes_the_place_of_the_path_s_own(tmp_path):

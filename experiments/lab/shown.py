@@ -352,13 +352,13 @@ def planted_faults(records: Records) -> str:
     return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
 
 
-SETS_IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight")
-"""Sets beside the mini cubes in which shadow rays are measured."""
+IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight", "outside", "paths", "sun")
+"""Tables of shadow rays in other sets than the mini cubes, with more paths, outside, and under a sun."""
 
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",
-    "course", "gpu-pipeline", "moving-quality", "savings", "shadows", "sines-speed", "specialisation",
-    "text-faults", "whole",
+    "course", "gpu-pipeline", "moving-quality", "savings", "shadows", "shadows-few",
+    "shadows-times", "sines-speed", "specialisation", "text-faults", "whole",
 )  # fmt: skip
 """Records that are shown as their command has printed them."""
 TABLES: Mapping[str, TableOf] = {
@@ -402,7 +402,7 @@ TABLES: Mapping[str, TableOf] = {
     "quality-readme": quality("minicubes", only=README_ROWS),
     "quality-times": quality_times,
     "ranks": as_printed("ranks", without=TIMES),
-    **{f"shadows-{name}": as_printed(f"shadows-{name}", without=("ms",)) for name in SETS_IN_SHADOW},
+    **{f"shadows-{name}": as_printed(f"shadows-{name}", without=("ms",)) for name in IN_SHADOW},
     "shadows-bundled": as_printed("shadows-bundled", without=(*TIMES, "PSNR, range of seeds")),
     **{f"verified{end}": as_printed("verified", table) for end, table in {"": 1, "-deviations": 2}.items()},
     "sines-octaves": as_printed("sines", 2),

@@ -64,13 +64,18 @@ class Turns:
         reads.append((element, who))
 
     def written(self, cells: Cells, element: Any, who: Any) -> Any:
-        """Note who writes elements; return where no later turn has; `Race` where several may not."""
-        owner = self.users(cells)[1]
+        """Note who writes elements; return where no later turn has; `Race` where several may not.
+
+        They may not where one has read an element, even the last: it would have read what one before wrote.
+        """
+        _, owner, reads = self.users(cells)
         before = owner[element]
         last = np.maximum(before, who)
         owner[element] = last
         others = (before != NOBODY) & (before != who)
         if (owner[element] != last).any() or (others.any() and not self.ordered):
+            raise Race
+        if others.any() and any(np.isin(element[others], own).any() for own, _ in reads):
             raise Race
         return before <= who
 

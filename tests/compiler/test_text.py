@@ -276,6 +276,14 @@ def test_the_opposite_of_a_number_is_no_constant(plain, old, new):
         run_text(*changed(plain, old, new.replace("v5", name)))
 
 
+@pytest.mark.parametrize("or_else", ["", "else "])
+def test_numbers_that_two_turns_write_are_read_in_order(plain, or_else):
+    """Turn 5 reads what turn 2 writes; the one that writes last is turn 5 itself."""
+    more = f"if (i < 2) {{ v50[i + 3] = t86; }} {or_else}{{ v50[i] = t86; }}"
+    with pytest.raises(Refused, match="the sums of %8 are never made"):
+        run_text(*changed(plain, "v86[i] = t86;", f"v86[i] = t86; {more}"))
+
+
 def test_constants_of_type_double_are_not_read(plain):
     """C takes 0.5 for a double; GLSL takes it for a float."""
     with pytest.raises(Unread, match="begins with no token"):

@@ -101,6 +101,18 @@ def test_the_last_turn_writes_last():
     assert get(cells, Turns(1), [0]) + get(cells, Turns(1), [1]) == [4, 2]
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_no_turn_reads_before_two_write(first):
+    """In order, the second turn would read what the first one wrote."""
+    cells, turns = Cells("x", 3, 1), Turns(2, ordered=True)
+    put(cells, Turns(1), [1], 7)
+    assert get(cells, turns, [0, 1], active=np.array([False, True]))[1] == 7
+    ways = [[0, 1], [1, 2]]
+    put(cells, turns, ways[first], 1, 2)
+    with pytest.raises(Race, match="with each other"):
+        put(cells, turns, ways[1 - first], 3, 4)
+
+
 def test_turns_inside_turns_have_used_what_these_use():
     cells, outer = Cells("x", 8, 1), Turns(2)
     inner = Turns(4)

@@ -136,8 +136,8 @@ def spirv(source: str, folder: Path | None) -> bytes:
 GROUPS = ("plain", "group:1", "group:2", "group:4", "fftpasses:32")
 """Schedules for graphics processors, and the simplest; OpenCL has all but the last."""
 
-EXPORTED, ADVISED = ("tile:8", "fft:8"), ("-O3", "-march=native")
-"""Schedules of C that are compiled as an export's user does, and the advised options."""
+EXPORTED, NATIVE = ("tile:8", "fft:8"), ("-O3", "-march=native")
+"""Schedules of C that are compiled as an export's user does, and the options for this processor."""
 
 WAYS: Mapping[str, Way] = {
     "cuda": Way(
@@ -154,7 +154,7 @@ WAYS: Mapping[str, Way] = {
     ),
     "c": Way((lambda _: open_executor("c"),), ()),
     "c header -O2": Way((lambda _: CRunner("-O2"),), EXPORTED, target="c"),
-    "c header -O3 -march=native": Way((lambda _: CRunner(*ADVISED),), EXPORTED, target="c"),
+    "c header -O3 -march=native": Way((lambda _: CRunner(*NATIVE),), EXPORTED, target="c"),
     "opengl": Way((lambda _: open_executor("opengl", context="egl"),), GROUPS),
     "glsl-compute": Way((lambda _: Compute("egl"),), GROUPS),
     "wgsl": Way((lambda _: Wgpu(),), GROUPS),

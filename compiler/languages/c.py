@@ -267,16 +267,17 @@ class C(Arguments):
         """Return which function does what, and what a denoiser takes of the stack."""
         name, role = self.entries[kernel.interface.role].removesuffix("_pixel"), kernel.interface.role
         columns, rows = (integer(kernel, each) for each in kernel.step)
-        one, stack = "one", ""
+        one, own, stack = "one", "call that from your own loops", ""
         if role == PATH:
             one = "WAMNET_PATHS of a row from a column on, or fewer at its end"
         elif columns > 1 or rows > 1:
             multiples = f"for each x that is a\nmultiple of {columns} and each y of {rows}"
             one = f"{columns} x {rows} from (x, y) on, {multiples}"
+            own += "" if kernel.weights.dtype == "int32" else "\n(with clang, compile for your processor)"
         if role == DENOISE:
             stack = "\n" + STACK.format(stack=stack_bytes(item_bytes(kernel)))
         every = "wamnet_image" if role == DENOISE else name
-        return f"{every} does all pixels, {name}_pixel {one}: call that from your own loops{stack}"
+        return f"{every} does all pixels, {name}_pixel {one}: {own}{stack}"
 
     def fitted(self, kernel: Kernel) -> Dialect:
         """Return the dialect for a kernel: vectors of floats have operations in expressions.

@@ -204,12 +204,12 @@ def measure(
     """Return the entry `speed` of a manifest: what a picture of `size` x `size` pixels takes, with copies.
 
     It has milliseconds, the median of `rounds`, the least and the most; seconds to compile; and `plain_ms`,
-    the median of a program in C that is compiled without the advised options. Raises InputError for a target
+    the median of a program in C that is compiled with -O2 alone. Raises InputError for a target
     whose own kind of device nothing opens here, ExecutorUnavailable where it is missing on this machine.
     """
     check_measured(export.target)
-    advised, *plain = TARGETS[export.target].timed or [()]
-    found = _measured(export, size, rounds, clock, advised)
+    native, *plain = TARGETS[export.target].timed or [()]
+    found = _measured(export, size, rounds, clock, native)
     for options in plain:
         found["plain_ms"] = _measured(export, size, rounds, clock, options)["ms"]
     return found

@@ -229,6 +229,7 @@ def _called(kind: str, row: Row, kernel: Mapping[str, Any]) -> str:
         or None,
         dispatch=said(_of("dispatch", row), **sizes, height="rows" if kernel["role"] == PATH else "height"),
         integers=", ".join(integers) or None,
+        cloned="" if kernel.get("schedule", {}).get("name", "").startswith(("tile:", "fft:")) else None,
         written=", ".join(each["name"] for each in bindings if each["access"] == "write"),
         note=TEXTS.get(f"note {row.name}"),
     )

@@ -114,9 +114,8 @@ class Row:
 
     `opens`: what runs its kernels here, the target's own compiler and device or the nearest to it
     [`opened`], to which they are translated by `route`. `stands_in`: it computes the same, but is nothing
-    that the target's users have. `timed`: where options of a compiler decide, those that are timed: the
-    advised ones, and those of a plain build. `tool`: what takes its files, if not what runs them.
-    `translated`: from the stem of a name and a source to files of another language.
+    that the target's users have. `timed`: options of a compiler that are timed, those for this processor
+    first. `tool`: what takes its files, if not what runs them. `translated`: to another language's files.
     """
 
     name: str

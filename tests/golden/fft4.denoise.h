@@ -35,8 +35,7 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
-/* Without options for newer processors they are compiled for too, and a program takes what its own suits:
-   by GCC each function on vectors, by clang all of them within wamnet_image. */
+/* Compiled for newer processors too: by GCC each function on vectors, by clang wamnet_image alone. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
     !defined(__AVX__) && !defined(WAMNET_PORTABLE)
 #if defined(__clang__) && __clang_major__ >= 14

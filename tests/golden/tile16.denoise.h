@@ -19,6 +19,7 @@
  *           width; height.
  *           wamnet_image does all pixels, wamnet_pixel 14 x 1 from (x, y) on, for each x that is a
  *           multiple of 14 and each y of 1: call that from your own loops
+ *           (with clang, compile for your processor)
  *           fewer than 2^31 floats an image; stack: 14108 bytes at most, without optimisation too
  * weights   W0 (1 x 12 x 16) at 0, b0 (16) at 192, W1 (1 x 5 x 16) at 208; vectors filled up with
  *           zeros; matrices block by block of neurons: blocks x D_in x neurons; the rows of one that
@@ -58,8 +59,7 @@
 #if !defined(WAMNET_ROLLED)
 #define WAMNET_ROLLED
 #endif
-/* Without options for newer processors they are compiled for too, and a program takes what its own suits:
-   by GCC each function on vectors, by clang all of them within wamnet_image. */
+/* Compiled for newer processors too: by GCC each function on vectors, by clang wamnet_image alone. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GLIBC__) && defined(__OPTIMIZE__) && \
     !defined(__AVX__) && !defined(WAMNET_PORTABLE)
 #if defined(__clang__) && __clang_major__ >= 14

@@ -125,6 +125,14 @@ def test_it_says_what_has_no_certificate_or_is_not_read(target, options, said):
     assert ("no certificate" in said) == (made.manifest["certificate"] is None)
 
 
+@pytest.mark.parametrize("schedule", ["plain", "tile:8", "dot:16"])
+def test_only_a_header_for_several_processors_is_advised_as_one(schedule):
+    made = exported("c", "", schedule, variant="whole8" if schedule == "dot:16" else "full")
+    told, header = (made.contents()[name].decode() for name in ("README.md", "denoise/denoise.h"))
+    assert ("WAMNET_PORTABLE" in told) == ("WAMNET_CLONES" in header)
+    assert "-O3 -march=native" in told
+
+
 def test_paths_have_none():
     scene, settings = canonical("lone_light"), Settings(max_depth=1)
     for given in (None, scene):

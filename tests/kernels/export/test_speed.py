@@ -50,7 +50,7 @@ def test_the_readme_says_what_the_clock_said(executor_named):
 
 
 @pytest.mark.needs("devices")
-def test_c_is_measured_with_the_advised_options_and_without():
+def test_c_is_measured_for_this_processor_and_with_o2():
     made = export(Request(random_model(), "c"))
     speed = measure(made, size=16, rounds=1, clock=clock_of(2.25, 0.25, 2.5, 0.5))
     assert (speed["ms"], speed["plain_ms"]) == (250.0, 500.0)

@@ -189,7 +189,8 @@ class Bench:
             for name, row in rows.items()
             if not (mirrors and row.oidn and row.shadow_rays) or row.usual
         }
-        return {name: row for name, row in shown.items() if any(text in name for text in self.options.rows)}
+        asked = {name: row for name, row in shown.items() if any(text in name for text in self.options.rows)}
+        return asked | {USUAL: ROWS[USUAL]} if self.options.times else asked
 
     def frames(self, shots: Sequence[Shot]) -> list[Frame]:
         """Return frames, rendered where they are not there."""

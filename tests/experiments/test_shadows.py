@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import shadows
 
 from wamnet.refimpl import metrics
@@ -38,6 +39,16 @@ def test_under_a_sun_the_penumbra_is_that_of_its_light(tmp_path):
     share = target["direct"].sum(axis=-1)[full > 0.1] / full[full > 0.1]
     assert np.count_nonzero(share < 0.05) > 10 < np.count_nonzero(share > 0.9)
     assert 0.0 < metrics.penumbra(target["direct"], target["unshadowed"]).mean() < 0.3
+
+
+@pytest.mark.parametrize("given", [["--rows", "2 paths"], ["--models", "glossy"]])
+def test_times_are_compared_with_the_usual_row_whatever_is_asked_for(given, monkeypatch):
+    bench = shadows.Bench(shadows.options_of(["--times", *given]), "vitrine")
+    monkeypatch.setattr(shadows, "milliseconds", lambda bench, models, clock: dict.fromkeys(models, 5.0))
+    monkeypatch.setattr(shadows.Bench, "untrained", lambda bench, row: None)
+    found = shadows.times_of(bench)
+    assert [shadows.USUAL, "5", "1.00"] in found
+    assert len(found) > 1
 
 
 def test_frames_outside_are_of_cameras_beyond_those_of_training(tmp_path):

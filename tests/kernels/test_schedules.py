@@ -83,6 +83,15 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
     executor._built.clear()
 
 
+@pytest.mark.parametrize(("target", "schedule"), [("opencl", "fft:16"), ("c", "fft:8")])
+def test_pictures_of_more_tiles_than_one(executor_named, kit, target, schedule):
+    """Tiles of 21 x 21 pixels, three below one another and two side by side; images of odd channels."""
+    program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, "zero")
+    artifact = compile_program(program, target, "ieee", schedule)
+    assert artifact.manifest["schedule"]["name"] == schedule
+    assert kit.excess(executor_named(target), program, pictures({"a": 5, "b": 7}, (43, 22), 2), artifact) <= 1
+
+
 def elementwise(x):
     """Return operations on vectors that a network does not have: each has words of its own."""
     first, second = (np.linspace(-0.5, 0.5, 20 * n, dtype=np.float32).reshape(n, 20) for n in (17, 2))

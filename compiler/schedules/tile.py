@@ -9,7 +9,7 @@
    14 pixels and 2 vectors there are 28 independent sums for 3 loads a step and input: arithmetic units, not
    loads, set the pace (the register tile of K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix
    Multiplication, 2008, section 4).
-4. Weights are stored in the order in which the loops need them [`tiled_layout`].
+4. Weights are stored in the order in which the loops need them [`all_stored`].
 5. Elementwise operations run on vectors, or on components where a language has no arithmetic on vectors.
 """
 

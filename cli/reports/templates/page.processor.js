@@ -85,7 +85,7 @@ class Processor {
 }
 
 /** Weights of a kernel with transforms: the spectra of the packed one's (FOU-4), as
- * compiler/schedules/fft.py: spectra_stored, and all others. */
+ * compiler/schedules/fft.py: Transformed.stored, and all others. */
 function transformed(packed, { from, to, window, order, others }) {
   const [columns, groups, points, pairs, halves, parts, lanes] = to.shape;
   const [inputs, neurons] = from.shape;

@@ -68,7 +68,7 @@ RECORDS = {
     f"{module}:{name}": (module, name)
     for module, names in (
         ("wamnet.refimpl.light.intersection", ("Surface",)),
-        ("wamnet.refimpl.network.dataset", ("Window",)),
+        ("wamnet.refimpl.network.window", ("Window",)),
         ("wamnet.compiler.core.ir", ("Program", "Node", "Type", "Gather", "Image")),
         ("wamnet.compiler.kernel.kernel", ("Expr", "Type", "Let", "Store", "For")),
     )

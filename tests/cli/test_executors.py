@@ -2,6 +2,7 @@
 
 import inspect
 import shutil
+from threading import local
 
 import pytest
 
@@ -78,6 +79,8 @@ def test_a_device_that_is_missing(refused, samples, tmp_path, monkeypatch, comma
 
     for module in ("wamnet.kernels", "wamnet.kernels.run.render_frame"):
         monkeypatch.setattr(f"{module}.open_executor", missing)
+    # A thread keeps its devices open: an earlier test may have opened this one.
+    monkeypatch.setattr("wamnet.kernels.run.render_frame._opened", local())
     shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
     line = refused(*command.split(), "--executor", "opencl")
     assert line == "wamnet: error: opencl: no device was found; install one\n"

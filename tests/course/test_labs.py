@@ -9,6 +9,7 @@ import pytest
 from wamnet.refimpl.errors import InputError
 from wamnet_course.frame import Wrong
 from wamnet_course.labs import LABS, lab_named
+from wamnet_course.wire import RECORDS, STUDENT, named
 
 SOLUTIONS = Path(__file__).parent / "solutions"
 """Right answers: for these tests, not for students."""
@@ -33,6 +34,13 @@ def here(tmp_path, monkeypatch):
     """Work in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def test_records_go_by_the_name_that_their_class_has():
+    """A class that moved is no record for a student's process any more."""
+    ours = {key: named(*where) for key, where in RECORDS.items() if not key.startswith(STUDENT)}
+    wrong = [key for key, one in ours.items() if key != f"{one.__module__}:{one.__qualname__}"]
+    assert not wrong
 
 
 @pytest.mark.parametrize("lab", EVERY)

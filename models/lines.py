@@ -1,9 +1,9 @@
-"""A program in a process of its own that answers lines: a line on its input, a line back on its output.
+"""A program in a separate process that answers lines: a line on its input, a line back on its output.
 
-1. It has a process group of its own: an interrupt is for whoever asks, and what the program starts ends with
+1. It has its own process group: an interrupt is for whoever asks, and what the program starts ends with
    it: its input is closed, and what has not ended then is killed [`LineProcess.end`].
 2. A program that does not read, or that prints errors without end, must not stop whoever asks: a thread
-   writes, and another one keeps the last errors.
+   writes, another one keeps the last errors, and one reads the output that is left in the end.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
-from typing import Any
+from typing import IO, Any
 
 from ..refimpl.errors import ExecutorUnavailable
 
@@ -58,9 +58,14 @@ class LineProcess:
         assert self._process.stdin and self._process.stdout and self._process.stderr  # noqa: PT018
         self._in, self._out, self._err = self._process.stdin, self._process.stdout, self._process.stderr
         self._unsent, self._unread, self._errors = SimpleQueue[bytes | None](), bytearray(), bytearray()
-        self._helpers = [Thread(target=work, daemon=True) for work in (self._write, self._keep_errors)]
-        for helper in self._helpers:
-            helper.start()
+        self._helpers: list[Thread] = []
+        self._help(self._write)
+        self._help(self._read, self._err, self._errors)
+
+    def _help(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Do something in a thread."""
+        self._helpers.append(Thread(target=work, args=arguments, daemon=True))
+        self._helpers[-1].start()
 
     def _write(self) -> None:
         """Write what is to be sent, and close the input in the end."""
@@ -69,12 +74,12 @@ class LineProcess:
                 self._in.write(line)
                 self._in.flush()
 
-    def _keep_errors(self) -> None:
-        """Read errors until there are no more."""
-        with self._err:
-            while part := os.read(self._err.fileno(), 1 << 16):
-                self._errors += part
-                del self._errors[:-KEPT_ERRORS]
+    def _read(self, pipe: IO[bytes], kept: bytearray) -> None:
+        """Read what comes until there is no more, and keep the last bytes."""
+        with pipe:
+            while part := os.read(pipe.fileno(), 1 << 16):
+                kept += part
+                del kept[:-KEPT_ERRORS]
 
     @property
     def status(self) -> int | None:
@@ -97,18 +102,18 @@ class LineProcess:
                 part = os.read(self._out.fileno(), 1 << 16)
                 self._unread += part
                 at_end = not part
-            taken, _, self._unread[:] = self._unread.partition(b"\n")
-            line = bytes(taken)
+            first, _, self._unread[:] = self._unread.partition(b"\n")
+            line = bytes(first)
         return line.strip()
 
     def answer(self) -> dict[str, Any]:
         """Return the next answer; ExecutorUnavailable says that the program has ended."""
         while line := self.line():
             if line.startswith(self._mark):
-                found: dict[str, Any] = json.loads(line.removeprefix(self._mark))
-                return found
-        last = self.end(LATE_S).splitlines()[-1:]
-        raise ExecutorUnavailable(": ".join([self._ended, *(line.strip() for line in last)]))
+                answer: dict[str, Any] = json.loads(line.removeprefix(self._mark))
+                return answer
+        errors = self.end(LATE_S).splitlines()[-1:]
+        raise ExecutorUnavailable(": ".join([self._ended, *(line.strip() for line in errors)]))
 
     def ask(self, question: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer to a question."""
@@ -117,14 +122,15 @@ class LineProcess:
 
     def end(self, patience_s: float = CLOSING_S) -> str:
         """End it after so many seconds, where it does not by itself, and return the end of its errors."""
-        self._unsent.put(None)
-        with suppress(subprocess.TimeoutExpired):
-            # An error is on its way: nobody waits.
-            self._process.wait(patience_s if sys.exc_info()[0] is None else 0.0)
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        for helper in self._helpers:
-            helper.join(LATE_S)
-        self._out.close()
+        if self._helpers:  # once: later, the number of its group may be another's
+            self._unsent.put(None)
+            self._help(self._read, self._out, bytearray())
+            with suppress(subprocess.TimeoutExpired):
+                # An error is on its way: nobody waits.
+                self._process.wait(patience_s if sys.exc_info()[0] is None else 0.0)
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+        while self._helpers:
+            self._helpers.pop().join(LATE_S)
         return self._errors.decode(errors="replace").strip()

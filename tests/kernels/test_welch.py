@@ -40,9 +40,10 @@ def test_welch_is_scipy_s():
     assert np.allclose(welch_p(*moments), expected, rtol=1e-9, atol=0)
 
 
-def test_without_noise_only_equals_agree():
+@pytest.mark.parametrize("of", [welch.welch_p, welch_p], ids=["wamnet", "tests"])
+def test_without_noise_only_equals_agree(of):
     zero = np.zeros(3)
-    p = welch.welch_p(np.array([1.0, 2.0, np.nan]), zero, 4, np.array([1.0, 3.0, 1.0]), zero, 4)
+    p = of(np.array([1.0, 2.0, np.nan]), zero, 4, np.array([1.0, 3.0, 1.0]), zero, 4)
     assert p[:2].tolist() == [1, 0]
     assert np.isnan(p[2])
 

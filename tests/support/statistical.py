@@ -57,9 +57,13 @@ def z_p(difference: np.ndarray, standard_error: np.ndarray) -> np.ndarray:
 
 
 def welch_p(mean_a, variance_a, count_a, mean_b, variance_b, count_b) -> np.ndarray:
-    """Return SciPy's p-values of Welch's t-test for equal means; variances are those of single samples."""
+    """Return SciPy's p-values of Welch's t-test for equal means; variances are those of single samples.
+
+    Equal means without variance have p = 1, where SciPy divides 0 by 0.
+    """
     a, b = np.sqrt(variance_a), np.sqrt(variance_b)
-    return stats.ttest_ind_from_stats(mean_a, a, count_a, mean_b, b, count_b, equal_var=False).pvalue
+    p = stats.ttest_ind_from_stats(mean_a, a, count_a, mean_b, b, count_b, equal_var=False).pvalue
+    return np.where((mean_a == mean_b) & (variance_a + variance_b == 0), 1.0, p)
 
 
 def assert_all_plausible(p_values: np.ndarray, significance: float = SIGNIFICANCE) -> None:

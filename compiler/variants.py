@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 
 from ..refimpl.errors import InputError
 from ..refimpl.network import factored, whole
-from ..refimpl.network.dataset import FEATURES, Window
+from ..refimpl.network.dataset import FEATURES
 from ..refimpl.network.denoise import Model
 from ..refimpl.network.siren import Siren
+from ..refimpl.network.window import Window
 from .core import ir, sine
 from .core.enclosure import round_up
 from .core.lower import lower

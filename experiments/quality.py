@@ -49,9 +49,9 @@ from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import SUN, Floats, Frame
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import BEST, MIRRORS, SHADOWS, SHORT, SKY, Recipe
+from wamnet.refimpl.network.window import Window
 from wamnet_peers.peer_oidn import filtered, prefiltered
 
 SHIPPED_SET = "minicubes-page"

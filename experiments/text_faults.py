@@ -31,8 +31,9 @@ from wamnet.compiler.reading.lanes import Unread
 from wamnet.compiler.reading.languages import TITLES
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 TILES = (
     ("c", "tile:8", "full"), ("opencl", "tile:8", "full"), ("opencl", "group:1", "full"),

@@ -31,12 +31,13 @@ from safetensors import SafetensorError, deserialize
 from ..refimpl.errors import InputError
 from ..refimpl.network import train
 from ..refimpl.network.activation import SINE, activation_named
-from ..refimpl.network.dataset import Normalization, Window, normalization_from_json
+from ..refimpl.network.dataset import Normalization, normalization_from_json
 from ..refimpl.network.denoise import Model, check_model
 from ..refimpl.network.imported import Imported, Source, Step
 from ..refimpl.network.siren import Siren
 from ..refimpl.network.train import TrainState
 from ..refimpl.network.whole import Whole
+from ..refimpl.network.window import Window
 from ..refimpl.reading import BROKEN, parse_json, read_file, to_value
 from .writing import write_bytes
 

@@ -324,7 +324,7 @@ def trace(
     from .compiler.core.ir import OUTPUT_ENCODING, Gather, Image, Type
     from .compiler.core.trace import trace as traced
     from .compiler.core.verify import verify
-    from .refimpl.network.dataset import Window, check_window
+    from .refimpl.network.window import Window, check_window
 
     ends = dict.fromkeys(shapes, (0.0, 1.0)) | {
         name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()

@@ -27,8 +27,9 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 from ..frame import Check, Likely, Wrong, expect, hold, number_text, numbers_of, spread, still
 

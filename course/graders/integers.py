@@ -12,8 +12,8 @@ from wamnet.compiler.core.verify import verify
 from wamnet.compiler.proof.whole import Rounds, known
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.whole import SINES, TURN, colour, rounded, whole_sine
+from wamnet.refimpl.network.window import Window
 from wamnet.spec.conformance.kinds.network import network_from
 
 from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors

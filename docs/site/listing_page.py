@@ -28,7 +28,8 @@ from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.light.shapes import sphere
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import denoise, siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
+from wamnet.refimpl.network.window import Window
 
 ROOT = Path(siren.__file__).parents[2]
 """The folder whose places are shown."""

@@ -36,7 +36,7 @@ from ...compiler.core.ir import Gather, Image, Program, Type
 from ...compiler.core.trace import trace
 from ...compiler.schedules.common import kernel_gather, output_channels
 from ...refimpl import rng
-from ...refimpl.network.dataset import Window
+from ...refimpl.network.window import Window
 from ..devices.executor import Executor
 from ..measure import Round, Times, in_turns
 from ..memory import cores

@@ -20,6 +20,7 @@ from ...refimpl.frame import LAYERS, Frame
 from ...refimpl.network import dataset, siren
 from ...refimpl.network.denoise import Model
 from ...refimpl.network.whole import round_image
+from ...refimpl.network.window import Window
 from ..devices.kernel import Images
 from ..run.denoise_on import images_of
 
@@ -62,7 +63,7 @@ def paper_model(
 ) -> Model:
     """Return an untrained network for these features, by default the paper's: windows of `size` pixels."""
     dataset.check_features(features)
-    window = dataset.Window(size, "clamp")
+    window = Window(size, "clamp")
     widths = [dataset.n_inputs(tuple(features), window), *hidden, 3]
     network = siren.init(widths, OMEGA_0, OMEGA_0, seed=1, dtype=np.float32)
     return Model(network, tuple(features), window, dataset.Normalization(**scales))
@@ -72,7 +73,7 @@ def random_model() -> Model:
     """Return a small network of random weights, whose outputs are around 0.5."""
     network = siren.init((96, 8, 3), 2.0, 2.0, 5, np.float32)
     network = replace(network, biases=(*network.biases[:-1], np.full(3, 0.5, np.float32)))
-    return Model(network, ("color", "normal"), dataset.Window(4, "clamp"), dataset.Normalization())
+    return Model(network, ("color", "normal"), Window(4, "clamp"), dataset.Normalization())
 
 
 def given(model: Model, frame: Frame) -> Given:

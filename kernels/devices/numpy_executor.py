@@ -17,7 +17,7 @@ from ...compiler.core.interpret import interpret
 from ...compiler.kernel.interface import DENOISE, IMAGE, READ, RESULT
 from ...compiler.kernel.run import run_on
 from ...compiler.schedules.common import kernel_gather
-from ...refimpl.network import dataset
+from ...refimpl.network.window import all_windows, pad
 from .executor import Executor
 from .kernel import Memory
 
@@ -55,12 +55,12 @@ def _denoised(artifact: Artifact, image: NDArray[np.float32], result: NDArray[np
     """Fill the output (H, W, C) of one kernel for its images, joined."""
     gather = kernel_gather(artifact.programs)
     height, width, _ = image.shape
-    padded = dataset.pad(image, gather.window, gather.axes)
+    padded = pad(image, gather.window, gather.axes)
     rows = max(1, BLOCK_NUMBERS // (width * gather.n_inputs))
     for top in range(0, height, rows):
         bottom = min(top + rows, height)
         # These rows and the margin around them are all that their pixels see.
         strip = padded[top : bottom + gather.rows - 1]
-        windows = dataset.all_windows(strip, gather.window, gather.axes)
+        windows = all_windows(strip, gather.window, gather.axes)
         (value,) = interpret(artifact.programs, {"window": windows}).values()
         result[top:bottom] = np.reshape(value, (bottom - top, width, -1)) if np.ndim(value) > 1 else value

@@ -42,9 +42,6 @@ TRIED: Mapping[str, Mapping[str, str]] = {
 }
 """What the environment is given where it has no device by itself, unless it says otherwise."""
 
-CLOSING_S = 10.0
-"""Seconds in which Node ends by itself."""
-
 SCRIPT = "dawn.mjs"
 """The shim that Node runs: one device; each line asks for a kernel to be built, or built and run."""
 
@@ -84,7 +81,7 @@ class TintRunner(BufferRunner):
         if "device" in told:
             self.device = f"Dawn, {told['device']}, {told['described']}"
             return ""
-        said = self._process.end(CLOSING_S).splitlines()
+        said = self._process.end(10.0).splitlines()
         warnings = ["no warning", *(line for line in said if line.startswith("Warning: "))]
         return " ".join(f"{told.get('missing', told.get('error'))}; {warnings[-1]}".split())
 
@@ -124,4 +121,4 @@ class TintRunner(BufferRunner):
 
     def close(self) -> None:
         """End the process."""
-        self._process.end(CLOSING_S)
+        self._process.end(10.0)

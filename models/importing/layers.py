@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import InputError
-from ...refimpl.network.dataset import LARGEST_WINDOW_PX
 from ...refimpl.network.imported import Imported, Source, Step
+from ...refimpl.network.window import LARGEST_WINDOW_PX
 from .fields import Array, Field
 from .graph import GraphNode
 

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from ...refimpl.errors import InputError, choice
-from ...refimpl.network.dataset import BORDERS, Window
 from ...refimpl.network.denoise import Model, check_model
 from ...refimpl.network.imported import MOST_CHANNELS, Source
+from ...refimpl.network.window import BORDERS, Window
 from ...refimpl.reading import BROKEN
 from ..model_file import imported_model
 from .axes import AXES

@@ -29,14 +29,7 @@ from ..rng import counter, random_block
 from ..vectors import vector
 from .smoothing import DEPTH, GUIDES, LEVELS, dimmed, smooth
 from .whole import steps_of
-from .window import BORDERS as BORDERS
-from .window import LARGEST_WINDOW_PX as LARGEST_WINDOW_PX
-from .window import Window as Window
-from .window import all_windows as all_windows
-from .window import check_window as check_window
-from .window import gathered
-from .window import pad as pad
-from .window import windows_at as windows_at
+from .window import Window, gathered, pad
 
 Array = NDArray[Any]
 Indices = NDArray[np.int64]

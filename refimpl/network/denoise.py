@@ -23,10 +23,11 @@ from ..errors import InputError
 from ..frame import LIT, Frame
 from . import dataset
 from .activation import activation_named
-from .dataset import Normalization, Window
+from .dataset import Normalization
 from .imported import Imported, check_imported, forward_imported
 from .siren import LARGEST_PARAMETER, Siren, check_shape, forward
 from .whole import Whole, check_whole, forward_whole, round_image
+from .window import Window, all_windows, check_window, pad
 
 Array = NDArray[np.floating[Any]]
 
@@ -71,12 +72,12 @@ class Model:
 def check_model(model: Model) -> None:
     """Refuse a model whose parts do not fit each other or whose parameters are not finite numbers."""
     if isinstance(model.siren, Imported):
-        dataset.check_window(model.window)
+        check_window(model.window)
         _check_layers(model.siren)
         check_imported(model.siren, model.window)
         return
     dataset.check_features(model.features)
-    dataset.check_window(model.window)
+    check_window(model.window)
     dataset.check_normalization(model.normalization)
     activation_named(model.siren.activation)
     _check_layers(model.siren)
@@ -157,13 +158,13 @@ def denoise(model: Model, frame: Frame, dtype: DTypeLike = np.float32) -> Array:
     siren = as_dtype(model.siren, dtype)
     image = input_image(model, frame).astype(dtype)
     height, width, _ = image.shape
-    padded = dataset.pad(image, model.window)
+    padded = pad(image, model.window)
     rows = max(1, BLOCK_NUMBERS // (width * siren.widths[0]))
     blocks = []
     for top in range(0, height, rows):
         # These rows and the margin around them are all that their pixels see.
         strip = padded[top : min(top + rows, height) + model.window.size - 1]
-        blocks.append(denoise_pixel(siren, dataset.all_windows(strip, model.window)))
+        blocks.append(denoise_pixel(siren, all_windows(strip, model.window)))
     return np.concatenate(blocks).astype(dtype, copy=False)
 
 

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..errors import InputError
-from .dataset import Window, all_windows, pad
 from .siren import LARGEST_PARAMETER, Siren
+from .window import Window, all_windows, pad
 
 Array = NDArray[np.floating[Any]]
 

@@ -34,11 +34,12 @@ from ..reading import parse_json, to_dataclass
 from . import adam, dataset, factored, siren, whole
 from .activation import SINE, activation_named
 from .adam import AdamState
-from .dataset import Dataset, Normalization, Window
+from .dataset import Dataset, Normalization
 from .denoise import OUTPUT_CHANNELS, Model
 from .factored import Factors
 from .siren import Siren
 from .whole import SINES, Whole
+from .window import Window, check_window
 
 Array = NDArray[np.floating[Any]]
 
@@ -171,7 +172,7 @@ PRESETS: Mapping[str, Recipe] = {
 def check_recipe(recipe: Recipe) -> None:
     """Refuse a recipe with a value that means nothing."""
     dataset.check_features(recipe.features)
-    dataset.check_window(recipe.window)
+    check_window(recipe.window)
     siren.check_shape(recipe.layer_widths, recipe.omega_0_first, recipe.omega_0_hidden)
     counts = {"batch": 1, "steps": 1, "log_every": 1, "n_windows": 0, "seed": 0, "rank": 0}
     for name, least in counts.items():

@@ -39,8 +39,8 @@ from ...refimpl.frame import LAYERS
 from ...refimpl.light import scene as scene_module
 from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
-from ...refimpl.network.dataset import Window
 from ...refimpl.network.whole import INPUT_LEVELS, Whole
+from ...refimpl.network.window import Window
 from .case import check_integers, given
 from .functions import Function, values_of
 from .kinds import FUNCTIONS, KINDS

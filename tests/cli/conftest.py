@@ -15,8 +15,9 @@ from wamnet.models.model_file import save_model
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 
 class Outcome(NamedTuple):

@@ -25,8 +25,9 @@ from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.variation import Ranges, Variation, varied
 from wamnet.refimpl.network import factored, siren
-from wamnet.refimpl.network.dataset import Normalization, Window, n_inputs
+from wamnet.refimpl.network.dataset import Normalization, n_inputs
 from wamnet.refimpl.network.denoise import Model, denoise, learned_feature_spp
+from wamnet.refimpl.network.window import Window
 
 SHORT = ("--seconds", 0.4, "--fps", 5, "--size", 13)
 

@@ -15,8 +15,9 @@ from wamnet.cli.files.exr import write_frame
 from wamnet.models.model_file import save_model
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 pytestmark = pytest.mark.needs("programs", "devices")
 

@@ -36,6 +36,7 @@ from wamnet.refimpl.metrics import psnr
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import forward_whole
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 WITHOUT_WEBGL = """
 const known = HTMLCanvasElement.prototype.getContext;
@@ -108,7 +109,7 @@ def share_alike(found, held):
 
 def test_all_features_together_are_the_reference_s(chromium, kit, tmp_path):
     """They take two kernels of paths, which trace three rays for them; lamps' light follows their colours."""
-    features, window = tuple(dataset.FIRST_HITS), dataset.Window(3, "clamp")
+    features, window = tuple(dataset.FIRST_HITS), Window(3, "clamp")
     network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
     animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))
     learned = {"trained_on_feature_spp": "3", "trained_on_feature_sampler": "net"}
@@ -171,7 +172,7 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
 
 def test_a_module_with_transforms_has_the_spectra_of_the_weights(chromium, kit, tmp_path):
     """FOU-4, WEB-14: the page computes them in float64, and rounds once; pictures end within a tile."""
-    features, window = ("color", "normal"), dataset.Window(12, "clamp")
+    features, window = ("color", "normal"), Window(12, "clamp")
     network = kit.network([dataset.n_inputs(features, window), 32, 7, 3], (3.0, 3.0))
     model = Model(network, features, window, SCALES)
     networks = [each for each in P.networks_of(model, processor=True) if each.name in ("full", "processor")]
@@ -204,7 +205,7 @@ def test_the_network_in_integers_is_beside_those_of_floats(still, model, data):
     draw(still, frame=FRAME, seed=SEED, variant="whole")
     joined = np.concatenate([read(still, f"whole_{name}")[..., :3] for name in FEATURES], axis=-1)
     assert (joined == np.rint(joined)).all()
-    held = forward_whole(whole.siren, dataset.all_windows(dataset.pad(joined, model.window), model.window))
+    held = forward_whole(whole.siren, all_windows(pad(joined, model.window), model.window))
     assert read(still, "picture")[..., :3].tobytes() == held.astype(np.float32).tobytes()
     assert still.text("error") == "none: the same bits as the reference"
     assert still.page.locator("#variant option:checked").text_content() == "integers of 8 bits"

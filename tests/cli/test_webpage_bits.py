@@ -16,6 +16,7 @@ from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.whole import forward_whole, rounded
+from wamnet.refimpl.network.window import all_windows, pad
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_the_page_shows_the_same_bits_and_their_digest(chromium, data, path, mod
         tab.page.evaluate("options => wamnet.draw(options)", {"size": SIZE, "seed": 5})
         joined = np.concatenate([read(tab, f"whole_{name}")[..., :3] for name in FEATURES], axis=-1)
         assert (joined == np.rint(joined)).all()
-        windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
+        windows = all_windows(pad(joined, model.window), model.window)
         held = forward_whole(model.siren, windows).astype(np.float32)
         assert len(np.unique(held)) > 50
         assert read(tab, "picture")[..., :3].tobytes() == held.tobytes()

@@ -16,7 +16,7 @@ from wamnet.compiler.core.profiles import EMITTED_COSINE, EMITTED_SINE, SineCont
 from wamnet.compiler.core.sine import COSINE_DOMAIN, cosine
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import bounds
-from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.window import Window
 
 floats = st.floats(-100, 100, width=32)
 shifts = st.integers(-(2**20), 2**20).map(lambda n: n / 2**20)

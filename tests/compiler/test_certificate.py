@@ -19,8 +19,9 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import checker, evidence, scaled, sine_checker, spectra_checker
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 NAME = artifact.CERTIFICATE_NAME
 SPEC = Path(__file__).parents[2] / "spec"

@@ -27,8 +27,8 @@ from wamnet.compiler.schedules.plain import Packed
 from wamnet.compiler.targets import DENOISERS, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
+from wamnet.refimpl.network.window import Window
 
 
 def model(widths=(24, 4, 3), window=None, omega_0=3.0):

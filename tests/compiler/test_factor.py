@@ -16,8 +16,9 @@ from wamnet.compiler.plan import analysed, sine_contract
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
+from wamnet.refimpl.network.window import BORDERS, Window, all_windows, pad
 
 SIZE, CHANNELS = 4, 3
 CONTRACT = sine_contract("ieee", "opencl")
@@ -26,21 +27,21 @@ CONTRACT = sine_contract("ieee", "opencl")
 def program(function=None, border="clamp"):
     """Trace a function of the window vector over one image in [-2, 2], or a small network."""
     network = siren.init([SIZE * SIZE * CHANNELS, 10, 8, 3], 3.0, 3.0, seed=1, dtype=np.float32)
-    gather = Gather(dataset.Window(SIZE, border), (Image("a", CHANNELS, -2.0, 2.0),))
+    gather = Gather(Window(SIZE, border), (Image("a", CHANNELS, -2.0, 2.0),))
     chosen = function or (lambda window: denoise_pixel(network, window))
     return analysed(trace(chosen, {"window": Type(shape=(gather.n_inputs,))}, gather))
 
 
 def windows(image, window, axes):
-    return dataset.all_windows(dataset.pad(image, window, axes), window, axes)
+    return all_windows(pad(image, window, axes), window, axes)
 
 
-@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("border", BORDERS)
 @pytest.mark.parametrize("rank", [1, 5, SIZE * CHANNELS])
 def test_both_passes_are_the_network_of_the_product(rank, border) -> None:
     """In float64, in which nothing but the order of sums differs."""
     cut = factor.factor(program(border=border), rank)
-    window = dataset.Window(SIZE, border)
+    window = Window(SIZE, border)
     image = np.random.default_rng(1).uniform(-2, 2, (6, 9, CHANNELS))
     (expected,) = interpret(
         factor.product(cut), {"window": windows(image, window, (0, 1))}, np.float64

@@ -25,8 +25,9 @@ from wamnet.compiler.schedules.fft import Fourier, sizes_of
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
 from wamnet.compiler.targets import schedule_named
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
+from wamnet.refimpl.network.window import BORDERS, Window
 
 POWERS = (1, 2, 4, 8, 16, 32, 64)
 """Lengths of transforms."""
@@ -223,10 +224,10 @@ def test_neurons_of_similar_scalings_share_an_image() -> None:
     assert np.abs(of.table - spectrum).max() <= 2.0**-24 * np.abs(spectrum).max() * 2
 
 
-@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("border", BORDERS)
 @pytest.mark.parametrize("shape", [(1, 1), (3, 17), (13, 6)])
 def test_norms_are_those_of_the_tiles_that_kernels_gather(border, shape) -> None:
-    window, points = dataset.Window(4, border), 8
+    window, points = Window(4, border), 8
     image = np.random.default_rng(1).normal(size=(*shape, 2))
     centres = (0.25, -1.5)
     out, found = points - window.size + 1, fourier.tile_norms(image, window, points, centres)
@@ -246,7 +247,7 @@ def test_norms_are_those_of_the_tiles_that_kernels_gather(border, shape) -> None
 
 def program(widths=(96, 20, 3), channels=6, size=4, border="clamp"):
     network = siren.init(list(widths), 3.0, 3.0, seed=1, dtype=np.float32)
-    gather = Gather(dataset.Window(size, border), (Image("a", channels, -2.0, 2.0),))
+    gather = Gather(Window(size, border), (Image("a", channels, -2.0, 2.0),))
     kind = {"window": Type(shape=(gather.n_inputs,))}
     return analysed(trace(lambda window: denoise_pixel(network, window), kind, gather))
 
@@ -291,7 +292,7 @@ REFUSED = {
         lambda: trace(
             lambda x: x[..., 0] * 2.0,
             {"window": Type(shape=(3,))},
-            Gather(dataset.Window(1), (Image("a", 3, 0.0, 1.0),)),
+            Gather(Window(1), (Image("a", 3, 0.0, 1.0),)),
         ),
         "plain",
         "%1 is component, which has no form on vectors",
@@ -320,7 +321,7 @@ TWICE = np.linspace(-0.1, 0.1, 36**2, dtype=np.float32).reshape(36, 36)
     ],
 )
 def test_two_readers_are_refused(function, reason) -> None:
-    gather = Gather(dataset.Window(6), (Image("a", 1, 0.0, 1.0),))
+    gather = Gather(Window(6), (Image("a", 1, 0.0, 1.0),))
     assert FFT32.refusal(trace(function, {"window": Type(shape=(36,))}, gather)).startswith(reason)
 
 
@@ -332,7 +333,7 @@ def test_windows_along_one_axis_are_refused() -> None:
 
 def test_sums_that_may_overflow_are_refused() -> None:
     network = siren.init([150, 32, 3], 3.0, 3.0, seed=1, dtype=np.float32)
-    gather = Gather(dataset.Window(5), (Image("a", 6, -1e38, 1e38),))
+    gather = Gather(Window(5), (Image("a", 6, -1e38, 1e38),))
     traced = trace(lambda x: denoise_pixel(network, x), {"window": Type(shape=(150,))}, gather)
     found = FFT32.enclosures(analysed(traced), CONTRACT)
     index = next(i for i, node in enumerate(analysed(traced).nodes) if node.op == "affine")
@@ -349,7 +350,7 @@ def emitted(program):
 def test_golden_spectra(golden) -> None:
     """Tiles of 4 x 4 points, vectors of 4 numbers, blocks of 2 pixels."""
     network = siren.init([12, 5, 2], 3.0, 3.0, seed=1, dtype=np.float32)
-    gather = Gather(dataset.Window(2, "zero"), (Image("i0", 2, -1.0, 1.0), Image("i1", 1, -1.0, 1.0)))
+    gather = Gather(Window(2, "zero"), (Image("i0", 2, -1.0, 1.0), Image("i1", 1, -1.0, 1.0)))
     first, last = network.weights
     function = lambda x: np.sin(x @ first.T) @ last.T  # noqa: E731
     traced = trace(function, {"window": Type(shape=(12,))}, gather)

@@ -17,9 +17,10 @@ from wamnet.compiler.proof import integer_checker
 from wamnet.compiler.proof.checker import check
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import rounded
+from wamnet.refimpl.network.window import Window
 
 
 def model(seed: int = 5, amplitude: int = 127, border: str = "zero") -> Model:

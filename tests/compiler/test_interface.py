@@ -18,8 +18,9 @@ from wamnet.kernels.export.targets import TARGETS
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 FEATURES = ("color", "normal")
 LISTED = ("opencl", "cuda", "c")

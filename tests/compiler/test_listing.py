@@ -19,8 +19,9 @@ from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.shapes import quad
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 ROOT = Path(siren.__file__).parents[2]
 

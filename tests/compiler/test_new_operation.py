@@ -14,7 +14,7 @@ from wamnet.compiler.languages.dialect import Dialect
 from wamnet.compiler.languages.glsl import GLSL
 from wamnet.compiler.languages.opencl import OpenCL
 from wamnet.compiler.proof import bounds
-from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.window import Window
 
 
 def _trunc(context, operands):

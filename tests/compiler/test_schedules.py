@@ -20,8 +20,8 @@ from wamnet.compiler.schedules.tile import Tile
 from wamnet.compiler.targets import TARGETS, language_named, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import denoise_pixel
+from wamnet.refimpl.network.window import Window
 
 
 def gathered(function, channels=(3,), size=1, border="clamp"):

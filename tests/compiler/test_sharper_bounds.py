@@ -17,8 +17,9 @@ from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import adjoint, bounds, scaled
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import ACTIVATIONS
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 U = 2.0**-24
 

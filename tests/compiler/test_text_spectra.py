@@ -24,8 +24,9 @@ from wamnet.compiler.reading.spectra import Arithmetic, sums, transform
 from wamnet.compiler.schedules import fft
 from wamnet.compiler.schedules.passes import FourierPasses
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 FLOATS = Arithmetic(operator.add, operator.sub, operator.mul, float)
 

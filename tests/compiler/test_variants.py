@@ -15,10 +15,11 @@ from wamnet.compiler.core import sine
 from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import parse, plan_model, vary, with_rank
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, as_dtype, check_model, denoise_pixel
 from wamnet.refimpl.network.whole import round_image
+from wamnet.refimpl.network.window import BORDERS, Window, all_windows, pad
 
 FEATURES = ("color", "normal")
 """What the small model sees: 6 channels, colours in [0, 1], normals in [-1, 1]."""
@@ -45,7 +46,7 @@ def denoised(model, picture):
     )
     chosen = [k for k, name in enumerate(np.repeat(FEATURES, 3)) if name in model.features]
     picture = picture[..., chosen]
-    return denoise_pixel(wide, dataset.all_windows(dataset.pad(picture, model.window), model.window))
+    return denoise_pixel(wide, all_windows(pad(picture, model.window), model.window))
 
 
 NAMES = ("window3", "window1", "hidden5", "rank4", "without-color", "without-normal", "half16")
@@ -106,7 +107,7 @@ def test_what_a_model_cannot_have_is_refused(name) -> None:
         vary(parse(name), small())
 
 
-@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("border", BORDERS)
 @pytest.mark.parametrize("name", [*NAMES, *COMBINED])
 def test_the_small_network_is_the_one_with_zeros(name, border) -> None:
     """The varied model, and the full one's shape with zeros, are one function: sums in another order."""

@@ -11,7 +11,7 @@ from wamnet.compiler.core import verify as verifier
 from wamnet.compiler.core.ir import Gather, Image, Node, Program, Type, attributes
 from wamnet.compiler.core.verify import verify
 from wamnet.refimpl.errors import CompileError
-from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.window import Window
 
 V3 = Type(shape=(3,))
 INPUT = Node("input", (), V3, attributes(name="window", type=V3))

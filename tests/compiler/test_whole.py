@@ -24,8 +24,8 @@ from wamnet.compiler.proof import whole
 from wamnet.compiler.schedules.bytes import Dot, GroupDot
 from wamnet.compiler.targets import LANGUAGES
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
+from wamnet.refimpl.network.window import Window
 
 CHANNELS = {"a": 3, "b": 1}
 """Images of the networks here."""

@@ -187,7 +187,7 @@ MUTANTS = {
     "two levels": (dataset, "LEVELS", 2, "image.features", "SMO-1"),
     "light clipped to 15 times white": (smoothing, "WHITES", 15.0, "image.features", "SMO-2"),
     "the centre one pixel off": (
-        dataset.Window,
+        window.Window,
         "before",
         property(lambda w: (w.size - 1) // 2),
         "image.window",

@@ -39,7 +39,8 @@ from wamnet.refimpl.light import scene, variation
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import denoise, siren, train
-from wamnet.refimpl.network.dataset import Normalization, Window, normalization_from_json
+from wamnet.refimpl.network.dataset import Normalization, normalization_from_json
+from wamnet.refimpl.network.window import Window
 from wamnet.refimpl.reading import parse_json
 from wamnet.spec.conformance import case, report
 from wamnet_course import frame, wire

@@ -16,8 +16,9 @@ from targets import Good
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 CORPUS = sorted(Path(__file__).with_name("corpus").glob("*/*"))
 """Inputs that once gave something else than a value or an error of ours, by target."""

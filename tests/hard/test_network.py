@@ -11,6 +11,7 @@ from wamnet.kernels import denoise_on
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network.window import Window
 
 CHANNELS = {"a": 3}
 
@@ -108,7 +109,7 @@ HARD_VALUES = (np.nan, np.inf, -np.inf, -3.0, 1e6, 3.4e38, 1e-45, -0.0)
 @pytest.fixture(scope="module")
 def model() -> denoise.Model:
     """Return a small model of colour and normal."""
-    window = dataset.Window(3, "clamp")
+    window = Window(3, "clamp")
     network = siren.init([54, 8, 3], 3.0, 3.0, seed=1, dtype=np.float32)
     return denoise.Model(network, ("color", "normal"), window, dataset.Normalization())
 

@@ -17,8 +17,9 @@ from wamnet.kernels.run.curve import Curve, Limits, Measurement, Point, choose
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 
 def point(variant, ms, error=0.1, loss=0.0, schedule="tile:16", mean=0.01):

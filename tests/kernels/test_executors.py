@@ -26,6 +26,7 @@ from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.network import dataset, denoise
 from wamnet.refimpl.network.activation import ACTIVATIONS
+from wamnet.refimpl.network.window import Window
 
 EXAMPLES = settings.default.max_examples // 10
 """Each example compiles a kernel, up to a second on Mesa: a tenth of what other tests draw."""
@@ -116,7 +117,7 @@ def test_denoise_on_equals_the_definition(denoiser, kit):
     """Whole frames: the float64 `denoise` is the reference, the bound the a-priori one, over all images."""
     random = np.random.default_rng(7)
     network = kit.network([54, 8, 3], (3.0, 3.0))
-    model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())
+    model = denoise.Model(network, ("color", "normal"), Window(3, "zero"), dataset.Normalization())
     noisy = frame.Frame(
         {
             "color": random.uniform(0, 4, (6, 11, 3)).astype(np.float32),
@@ -268,7 +269,7 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.window import Window
 
 gather = Gather(Window(1, "clamp"), (Image("a", 1, -1.0, 1.0),))
 program = trace(lambda x: np.sin(x), {"window": Type(shape=(1,))}, gather)
@@ -312,7 +313,7 @@ def test_two_contexts_that_open_before_either_runs(executor_named):
     kinds = ("egl", "osmesa")
     for kind in kinds:
         executor_named(f"opengl-{kind}")  # or the test is skipped
-    gather = Gather(dataset.Window(1, "clamp"), (Image("a", 1, 0.0, 1.0),))
+    gather = Gather(Window(1, "clamp"), (Image("a", 1, 0.0, 1.0),))
     artifacts = [
         compile_program(trace(lambda x, f=factor: x * f, {"window": Type(shape=(1,))}, gather), "opengl")
         for factor in (2.0, 3.0)

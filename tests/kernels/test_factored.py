@@ -25,6 +25,7 @@ from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, factored
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import BORDERS, Window
 
 WAYS = ways(lambda schedule: not isinstance(schedule, Transformed | Dot | GroupDot))
 """All targets and schedules that hold a first layer in two passes: spectra are of windows along both axes,
@@ -87,7 +88,7 @@ def paper_s(kit, border="clamp", rank=0):
 
 @pytest.mark.nightly(but=("numpy-plain-clamp", "c-tile:16-clamp"))
 @pytest.mark.product
-@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("border", BORDERS)
 @pytest.mark.parametrize(("target", "schedule"), [way for way in WAYS if way.values not in ONE_IMAGE])
 def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, border) -> None:
     """A model that was trained so loses nothing: its cut is as small as its own rounding to float32."""
@@ -108,7 +109,7 @@ def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, b
 def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
     """A variant rankR has the picture of the model with the expanded cut, up to both bounds of rounding."""
     network = kit.network([75, 9, 3], (3.0, 3.0))
-    model = Model(network, ("color",), dataset.Window(5, "zero"), dataset.Normalization())
+    model = Model(network, ("color",), Window(5, "zero"), dataset.Normalization())
     noisy = Frame({"color": np.random.default_rng(2).random((7, 18, 3), dtype=np.float32)})
     expanded = factored.expand(factored.cut(network.weights[0].astype(np.float64), 5, rank))
     low = replace(model, siren=replace(network, weights=(expanded.astype(np.float32), *network.weights[1:])))
@@ -125,7 +126,7 @@ def test_executors_agree_through_denoise_on(executor_named, kit, rank) -> None:
 @pytest.mark.parametrize("name", ["numpy", "opencl", "opengl-egl", "opengl-osmesa"])
 def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> None:
     """Between a path kernel and a picture that stay on the device: the bits of `run` on the same images."""
-    executor, window = executor_named(name), dataset.Window(4, "zero")
+    executor, window = executor_named(name), Window(4, "zero")
     model = Model(kit.network([96, 8, 3], (3.0, 3.0)), ("color", "normal"), window, dataset.Normalization())
     with Pipeline(executor, canonical("minicubes"), model, (6, 11), variant="rank6") as pipeline:
         assert len(pipeline.denoise.kernels) == 2

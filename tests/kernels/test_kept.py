@@ -17,6 +17,7 @@ from wamnet.kernels.run.denoise_on import data_of, kernel_of
 from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network.window import Window
 
 
 @pytest.fixture(autouse=True)
@@ -27,7 +28,7 @@ def own_folder(tmp_path, monkeypatch):
 def model(seed=1, features=("color", "normal"), window=4):
     channels = dataset.channels_of(features)
     network = siren.init((window * window * channels, 8, 3), 3.0, 3.0, seed, np.float32)
-    return denoise.Model(network, features, dataset.Window(window), dataset.Normalization())
+    return denoise.Model(network, features, Window(window), dataset.Normalization())
 
 
 def noisy(features=("color", "normal")):

@@ -24,7 +24,8 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.lower import lower
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
+from wamnet.refimpl.network.window import Window
 from wamnet.refimpl.network.denoise import Model
 network = siren.init((3, 80_000, 3), 2.0, 2.0, 5, np.float32)
 model = Model(network, ("color",), Window(1, "clamp"), Normalization(), {})

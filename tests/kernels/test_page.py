@@ -17,6 +17,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SETTINGS = Settings(max_depth=1)
 OF_ONE_PICTURE = tuple(
@@ -36,7 +37,7 @@ def model_of(kit):
     """Give a function that returns a small model of some features."""
 
     def make(*features):
-        window = dataset.Window(3, "clamp")
+        window = Window(3, "clamp")
         network = kit.network([dataset.n_inputs(features, window), 6, 3], (3.0, 3.0))
         return Model(network, features, window, SCALES)
 

@@ -30,6 +30,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
 from wamnet.refimpl.network.whole import rounded
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 SCALES = dataset.Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 SETTINGS = Settings(max_depth=3)
@@ -56,7 +57,7 @@ def model_of(kit):
     """Give a function that returns a small model whose pictures lie within 0.5 +- 0.45."""
 
     def make(features, size, border):
-        window = dataset.Window(size, border)
+        window = Window(size, border)
         network = kit.network([dataset.n_inputs(features, window), 8, 3], (3.0, 3.0))
         return Model(network, features, window, SCALES)
 
@@ -93,7 +94,7 @@ def difference_bound(model, executor, images, errors):
     for sign in (-1, 1):
         moved = [images[name].astype(np.float64) + sign * errors[name] for name in model.features]
         joined = np.concatenate(moved, axis=-1)
-        ends.append(dataset.all_windows(dataset.pad(joined, model.window), model.window))
+        ends.append(all_windows(pad(joined, model.window), model.window))
     found = bounds.enclose(program, {"window": tuple(ends)}, sine_contract("ieee", executor.name))
     (_, index) = program.outputs[0]
     return found[index].high - found[index].low + 2 * found[index].read
@@ -365,7 +366,7 @@ def test_a_pipeline_of_integers_shows_what_they_stand_for(executor, model_of):
     steps = {name: np.rint(image * 127).astype(np.float32) for name, image in shown.items()}
     assert all(np.array_equal(steps[n] / np.float32(127), image) for n, image in shown.items())
     joined = np.concatenate(list(steps.values()), axis=-1)
-    windows = dataset.all_windows(dataset.pad(joined, whole.window), whole.window)
+    windows = all_windows(pad(joined, whole.window), whole.window)
     assert found.tobytes() == denoise_pixel(whole.siren, windows).tobytes()
     with Pipeline(executor, scene("cornell"), model, (5, 7), settings=SETTINGS) as pipeline:
         pipeline.run(seed=3)

@@ -21,6 +21,7 @@ from wamnet.refimpl import frame
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, denoise, siren
 from wamnet.refimpl.network.train import PRESETS
+from wamnet.refimpl.network.window import Window
 
 LADDER = ways(lambda schedule: schedule.name != "plain" and not schedule.bytewise)
 """All schedules except for the plain ones, with their targets; those of integers: test_whole.py."""
@@ -185,7 +186,7 @@ def test_the_time_of_a_kernel_alone(executor_named, kit):
 
 def test_the_device_s_schedule_is_taken_and_told(executor, kit):
     network = kit.network([54, 8, 3], (3.0, 3.0))
-    model = denoise.Model(network, ("color", "normal"), dataset.Window(3, "zero"), dataset.Normalization())
+    model = denoise.Model(network, ("color", "normal"), Window(3, "zero"), dataset.Normalization())
     noisy = frame.Frame({name: np.zeros((3, 4, 3), np.float32) for name in ("color", "normal")})
     assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule_for((3, 4))}: ")
     asked = denoise_on(executor, model, noisy, schedule="plain")

@@ -9,7 +9,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import sine
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
-from wamnet.refimpl.network.dataset import Window
+from wamnet.refimpl.network.window import Window
 
 DEGREES = sorted(sine.POLYNOMIALS)
 NUMPY = 2.0**-50

@@ -14,8 +14,9 @@ from wamnet.kernels.run.denoise_on import Denoiser, denoise_on, images_of
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import FIRST_HIT, Frame
 from wamnet.refimpl.network import dataset, smoothing
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SCALES = Normalization(exposure_stops=-1.5)
 

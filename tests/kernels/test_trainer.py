@@ -28,9 +28,10 @@ from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import adam, dataset, factored, train
 from wamnet.refimpl.network.activation import ACTIVATIONS
-from wamnet.refimpl.network.dataset import Dataset, Window
+from wamnet.refimpl.network.dataset import Dataset
 from wamnet.refimpl.network.factored import Factors
 from wamnet.refimpl.network.train import Recipe, TrainState
+from wamnet.refimpl.network.window import Window
 
 SMALL = Recipe(
     features=("color",),

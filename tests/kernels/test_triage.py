@@ -17,8 +17,9 @@ from wamnet.kernels.judge import triage
 from wamnet.kernels.judge.reduce import Box, Stage, first_stage, reduced, shrink, stage_program, stages
 from wamnet.kernels.judge.triage import Apart, Outcome, attempt
 from wamnet.refimpl.errors import ExecutorUnavailable
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SHAPE = (7, 9)
 """Height and width of the picture."""

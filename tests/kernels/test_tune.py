@@ -17,6 +17,7 @@ from wamnet.kernels.run.tune import Row, Subject, Table, Tuning
 from wamnet.refimpl import frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, denoise, siren
+from wamnet.refimpl.network.window import Window
 
 SIZE = (12, 20)
 """Height and width of the pictures."""
@@ -29,7 +30,7 @@ def own_folder(tmp_path, monkeypatch):
 
 def model(hidden=(8,), window=3):
     network = siren.init((window * window * 6, *hidden, 3), 3.0, 3.0, 1, np.float32)
-    return denoise.Model(network, ("color", "normal"), dataset.Window(window), dataset.Normalization())
+    return denoise.Model(network, ("color", "normal"), Window(window), dataset.Normalization())
 
 
 SUBJECT = Subject(model())
@@ -136,7 +137,7 @@ def test_a_table_of_another_network_or_size_is_not_taken(executor_named):
     executor = executor_named("opencl")
     keep(executor, [row("plain", 1.0)])
     assert choose(executor, planned(executor), (16, 16))[0] == "plain"  # 240 and 256 pixels: 2^7 to 2^8
-    zero = replace(model(), window=dataset.Window(3, "zero"))
+    zero = replace(model(), window=Window(3, "zero"))
     albedo = replace(model(), features=("color", "albedo"))
     cases = [(model((9,)), SIZE), (zero, SIZE), (albedo, SIZE), (model(), (13, 20)), (model(), (12, 10))]
     for other, size in cases:

@@ -19,6 +19,7 @@ from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import SINES, forward_whole, rounded
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 SLOW = {"inlined", "group:1", "group:2", "group:4", "groupdot:4"}
 """Schedules in straight code, which compilers take long for."""
@@ -31,7 +32,7 @@ def cases(draw, small):
     omega = draw(st.sampled_from([1.0, 9.0, 1e6]))
     drawn = siren.init(case["widths"], omega, omega, seed=case["seed"] % 2**31)
     found = rounded(drawn, case["size"], draw(st.sampled_from(sorted(SINES))))
-    window = dataset.Window(case["size"], case["border"])
+    window = Window(case["size"], case["border"])
     return {**case, "network": found, "window": window, "level": draw(st.sampled_from([0, 1, 127]))}
 
 
@@ -54,8 +55,8 @@ def images_of(case):
 def reference(case, images):
     """Return the picture (H, W, C) of the reference."""
     joined = np.concatenate(list(images.values()), axis=-1)
-    padded = dataset.pad(joined, case["window"])
-    return forward_whole(case["network"], dataset.all_windows(padded, case["window"]))
+    padded = pad(joined, case["window"])
+    return forward_whole(case["network"], all_windows(padded, case["window"]))
 
 
 @pytest.mark.parametrize(("target", "schedule"), ways(lambda schedule: not isinstance(schedule, Fourier)))
@@ -80,7 +81,7 @@ def chosen(executor, whole):
     """Return the schedule of a network, of integers or of floats, for a picture of 64 x 64."""
     network = siren.init([12 * 12 * 6, 32, 32, 3], 1.0, 3.0, seed=1)
     siren_or_whole = rounded(network, 12) if whole else network
-    model = Model(siren_or_whole, ("color", "normal"), dataset.Window(12), dataset.Normalization())
+    model = Model(siren_or_whole, ("color", "normal"), Window(12), dataset.Normalization())
     plan = plan_model(model, executor.name)
     plan = plan.scheduled(Tuning(executor, Subject.of(plan), (64, 64)).picked()[0])
     return plan.schedule.name

@@ -17,9 +17,10 @@ from wamnet.models import model_file
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren, train, whole
-from wamnet.refimpl.network.dataset import FEATURES, Normalization, Window, n_inputs
+from wamnet.refimpl.network.dataset import FEATURES, Normalization, n_inputs
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.train import Recipe
+from wamnet.refimpl.network.window import Window
 
 
 def model_of(features: tuple[str, ...] = ("color", "depth"), size: int = 2, dtype: Any = np.float32) -> Model:

@@ -10,9 +10,10 @@ import wamnet
 from wamnet.refimpl.encoding import from_display
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network import train as reference_training
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.denoise import denoise as reference
+from wamnet.refimpl.network.window import Window
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,9 @@ from wamnet.compiler.training.step import lower_step
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import activation, siren
 from wamnet.refimpl.network.activation import ACTIVATIONS, Activation, activation_named
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 ROWS = pytest.mark.parametrize("row", ACTIVATIONS.values(), ids=ACTIVATIONS.keys())
 

@@ -13,7 +13,8 @@ from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import LAYERS, Frame
 from wamnet.refimpl.network import dataset
-from wamnet.refimpl.network.dataset import FEATURES, Normalization, Window
+from wamnet.refimpl.network.dataset import FEATURES, Normalization
+from wamnet.refimpl.network.window import BORDERS, Window, all_windows, check_window, pad, windows_at
 
 
 def frame_of(height: int, width: int, seed: int = 0, dtype: Any = np.float32) -> Frame:
@@ -47,21 +48,21 @@ SHAPES = st.tuples(st.integers(1, 9), st.integers(1, 9), st.integers(1, 3))
 """Height, width, channels: 1x1, 1xN and images smaller than the window are all among them."""
 
 
-@given(shape=SHAPES, size=st.integers(1, 13), border=st.sampled_from(sorted(dataset.BORDERS)))
+@given(shape=SHAPES, size=st.integers(1, 13), border=st.sampled_from(sorted(BORDERS)))
 def test_windows_match_a_loop_over_taps(shape: tuple[int, int, int], size: int, border: str) -> None:
     image = np.random.default_rng(size).random(shape)
     window = Window(size, border)
     y, x = (index.reshape(-1) for index in np.indices(shape[:2]))
     expected = np.array([slow_window(image, *pixel, window) for pixel in zip(y, x, strict=True)])
-    assert np.array_equal(dataset.windows_at(image, y, x, window), expected)
-    every = dataset.all_windows(dataset.pad(image, window), window)
+    assert np.array_equal(windows_at(image, y, x, window), expected)
+    every = all_windows(pad(image, window), window)
     assert every.shape == (*shape[:2], size * size * shape[2])
     assert np.array_equal(every.reshape(len(y), -1), expected)
 
 
 def test_centre_tap_of_an_even_window_has_index_half_its_size() -> None:
     image = np.arange(20 * 20, dtype=np.float64).reshape(20, 20, 1)
-    vector = dataset.windows_at(image, [10], [9], Window(12))[0].reshape(12, 12)
+    vector = windows_at(image, [10], [9], Window(12))[0].reshape(12, 12)
     assert vector[6, 6] == image[10, 9, 0]
     assert (vector[0, 0], vector[11, 11]) == (image[4, 3, 0], image[15, 14, 0])
     assert (Window(12).before, Window(12).after, Window(3).before, Window(3).after) == (6, 5, 1, 1)
@@ -70,7 +71,7 @@ def test_centre_tap_of_an_even_window_has_index_half_its_size() -> None:
 @given(
     sizes=st.lists(st.tuples(st.integers(1, 5), st.integers(1, 5)), min_size=1, max_size=4),
     size=st.integers(1, 6),
-    border=st.sampled_from(sorted(dataset.BORDERS)),
+    border=st.sampled_from(sorted(BORDERS)),
 )
 def test_examples_of_frames_of_any_sizes_match_their_windows_and_targets(
     sizes: list[tuple[int, int]], size: int, border: str
@@ -82,7 +83,7 @@ def test_examples_of_frames_of_any_sizes_match_their_windows_and_targets(
         y, x = (positions.reshape(-1) for positions in np.indices((height, width)))
         windows, targets = dataset.examples_at(data, np.full(len(y), index), y, x)
         image = dataset.feature_image(noisy, features, scales)
-        assert np.array_equal(windows, dataset.windows_at(image, y, x, window))
+        assert np.array_equal(windows, windows_at(image, y, x, window))
         assert np.array_equal(
             targets, to_display(reference["color"].astype(np.float64)).astype(np.float32)[y, x]
         )
@@ -282,12 +283,12 @@ def test_normalization_text_is_checked(text: str) -> None:
 @pytest.mark.parametrize("size", [0, -1, 65, 1.5])
 def test_window_sizes_are_checked(size: Any) -> None:
     with pytest.raises(InputError, match=r"window size .*must be an integer from 1 to 64"):
-        dataset.check_window(Window(size))
+        check_window(Window(size))
 
 
 def test_window_borders_are_checked() -> None:
     with pytest.raises(InputError, match=r"window border 'wrap': unknown \(choose one of clamp, zero"):
-        dataset.check_window(Window(12, "wrap"))
+        check_window(Window(12, "wrap"))
 
 
 def test_pairs_are_checked() -> None:

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, denoise, siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import BORDERS, Window, windows_at
 
 
 def frame_of(height: int, width: int) -> Frame:
@@ -31,7 +32,7 @@ def model_of(size: int = 3, border: str = "clamp", dtype: Any = np.float64) -> M
     height=st.integers(1, 6),
     width=st.integers(1, 6),
     size=st.integers(1, 7),
-    border=st.sampled_from(sorted(dataset.BORDERS)),
+    border=st.sampled_from(sorted(BORDERS)),
 )
 def test_denoise_is_the_network_on_every_window(height: int, width: int, size: int, border: str) -> None:
     """Both sum the same D_in products, perhaps in another order: gamma(D_in) times the sum of magnitudes.
@@ -42,7 +43,7 @@ def test_denoise_is_the_network_on_every_window(height: int, width: int, size: i
     model, frame = model_of(size, border), frame_of(height, width)
     image = dataset.feature_image(frame, model.features, model.normalization).astype(np.float64)
     y, x = (index.reshape(-1) for index in np.indices((height, width)))
-    rows = dataset.windows_at(image, y, x, model.window)
+    rows = windows_at(image, y, x, model.window)
     expected = np.array([denoise.denoise_pixel(model.siren, row) for row in rows])
     d_in, u = rows.shape[1], 2.0**-53
     bound = 2 * (5 * 0.37 * (3 * 2 * (d_in + 3) * u + 4 * u) + 3 * 10 * u)

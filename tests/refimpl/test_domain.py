@@ -9,9 +9,10 @@ import pytest
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import domain
-from wamnet.refimpl.network.dataset import Normalization, Window, feature_image
+from wamnet.refimpl.network.dataset import Normalization, feature_image
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.siren import Siren
+from wamnet.refimpl.network.window import Window
 
 ULP = 2.0**-52
 """Distance of 1 and the next float64."""

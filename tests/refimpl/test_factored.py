@@ -9,10 +9,11 @@ from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, factored, siren, train
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, check_model
 from wamnet.refimpl.network.factored import Factors
 from wamnet.refimpl.network.train import SHORT
+from wamnet.refimpl.network.window import BORDERS, Window, all_windows, pad
 
 SIZE, CHANNELS, N_OUT = 5, 3, 4
 
@@ -24,14 +25,14 @@ def random_factors(rank, seed=1):
     return Factors(*(rng.normal(size=shape) for shape in shapes))
 
 
-@pytest.mark.parametrize("border", dataset.BORDERS)
+@pytest.mark.parametrize("border", BORDERS)
 def test_two_passes_are_the_layer(border) -> None:
     """FAC-2, written as loops over taps, against the windows times the expanded weights."""
     factors = random_factors(2)
     image = np.random.default_rng(2).normal(size=(7, 6, CHANNELS))
     window = Window(SIZE, border)
-    padded = dataset.pad(image, window)
-    expected = dataset.all_windows(padded, window) @ factored.expand(factors).T
+    padded = pad(image, window)
+    expected = all_windows(padded, window) @ factored.expand(factors).T
     height, width, _ = image.shape
     # The horizontal pass on all padded rows: a row beyond the border is a row of the border, or nothing.
     h = np.zeros((height + SIZE - 1, width, 2))

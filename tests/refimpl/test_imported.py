@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wamnet.refimpl.errors import InputError
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.denoise import check_model
 from wamnet.refimpl.network.imported import STEPS, Imported, Source, Step, check_imported, evaluate
+from wamnet.refimpl.network.window import Window
 
 WINDOW = Window(3, "zero")
 

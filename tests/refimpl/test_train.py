@@ -12,8 +12,9 @@ from wamnet.refimpl.encoding import from_display, to_display
 from wamnet.refimpl.errors import InputError, TrainingError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import dataset, denoise, siren, train, whole
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.train import PRESETS, Recipe, TrainState
+from wamnet.refimpl.network.window import Window
 
 SIGMA = 0.1
 """Standard deviation of the noise in the synthetic frames, in display-encoded units."""

@@ -191,8 +191,9 @@ def prepare(folder: Path) -> None:
     from wamnet.refimpl.light.render import Job, render
     from wamnet.refimpl.light.scenes import canonical
     from wamnet.refimpl.network import siren
-    from wamnet.refimpl.network.dataset import Normalization, Window
+    from wamnet.refimpl.network.dataset import Normalization
     from wamnet.refimpl.network.denoise import Model
+    from wamnet.refimpl.network.window import Window
 
     scene = canonical("minicubes", time=1.0)
     for name, spp in (("n.exr", 1), ("r.exr", 8)):

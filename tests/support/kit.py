@@ -19,10 +19,11 @@ from wamnet.compiler.targets import DENOISERS
 from wamnet.kernels import Pipeline
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
-from wamnet.refimpl.network import dataset, siren
+from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import SINE
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 """Whether this run draws other cases each time, and wide networks among them."""
@@ -122,7 +123,7 @@ class Kit:
     ) -> Program:
         """Trace a function of the window vector over images with values in [-2, 2]."""
         images = tuple(Image(name, n, -2.0, 2.0) for name, n in channels.items())
-        gather = Gather(dataset.Window(size, border), images)
+        gather = Gather(Window(size, border), images)
         return trace(function, {"window": Type(shape=(gather.n_inputs,))}, gather)
 
     def denoiser(self, network: siren.Siren, channels: Mapping[str, int], size: int, border: str) -> Program:
@@ -132,7 +133,7 @@ class Kit:
     def windows(self, program: Program, images: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the windows (H, W, n) of the images."""
         joined = np.concatenate([images[image.name] for image in program.gather.images], axis=-1)
-        return dataset.all_windows(dataset.pad(joined, program.gather.window), program.gather.window)
+        return all_windows(pad(joined, program.gather.window), program.gather.window)
 
     def excess(
         self,

@@ -15,6 +15,7 @@ from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.light.variation import Ranges
 from wamnet.refimpl.network import dataset
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SIZE, FRAME, SEED = 40, 3, 5
 SETTINGS = Settings(max_depth=2)
@@ -44,7 +45,7 @@ class SmallPage(NamedTuple):
 
 def make(kit: Any, folder: Path) -> SmallPage:
     """Write the page of a network whose pictures lie within 0.5 +- 0.45, of an odd width."""
-    window = dataset.Window(5, "zero")
+    window = Window(5, "zero")
     network = kit.network([dataset.n_inputs(FEATURES, window), 10, 7, 3], (3.0, 3.0))
     model = Model(network, FEATURES, window, SCALES, {"trained_on_ranges": RANGES.to_json()})
     animation = P.Animation(TIMES, tuple(scenes.canonical("minicubes", time=time) for time in TIMES))

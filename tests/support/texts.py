@@ -9,8 +9,9 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.proof.evidence import read
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 NAME = artifact.CERTIFICATE_NAME
 

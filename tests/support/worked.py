@@ -37,6 +37,7 @@ from wamnet.refimpl.light import (
 )
 from wamnet.refimpl.network import adam, dataset, factored, siren, train
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window, windows_at
 from wamnet.spec.conformance.numbers import number_text
 
 SEED, SAMPLE, X, Y, SIZE_PX = 7, 5, 6, 10, 16
@@ -236,8 +237,7 @@ def window_at_border() -> list[str]:
     image = (10.0 * np.arange(3)[:, None] + np.arange(5))[..., None]
     lines = ["```text", f"{'image':<22} {'clamp':<18} zero"]
     clamp, zero = (
-        dataset.windows_at(image, [0], [0], dataset.Window(4, border)).reshape(4, 4)
-        for border in ("clamp", "zero")
+        windows_at(image, [0], [0], Window(4, border)).reshape(4, 4) for border in ("clamp", "zero")
     )
     for row in range(4):
         left = "  ".join(f"{v:2.0f}" for v in image[row, :, 0]) if row < 3 else " " * 18
@@ -375,7 +375,7 @@ def sine_steps() -> list[str]:
 
 def _small_model() -> Model:
     """Return a model of colour and normal, of 2 x 2 pixels and four neurons."""
-    features, window = ("color", "normal"), dataset.Window(2, "clamp")
+    features, window = ("color", "normal"), Window(2, "clamp")
     network = siren.init((dataset.n_inputs(features, window), 4, 3), 1.0, 1.0, SEED)
     return Model(network, features, window, dataset.Normalization())
 

@@ -24,7 +24,8 @@ from ....refimpl import metrics
 from ....refimpl.errors import InputError
 from ....refimpl.frame import LAYERS, Frame, validate
 from ....refimpl.network import dataset, smoothing
-from ....refimpl.network.dataset import Normalization, Window
+from ....refimpl.network.dataset import Normalization
+from ....refimpl.network.window import Window, check_window, windows_at
 from ..case import Kind, within
 from .tables import kind
 
@@ -105,7 +106,7 @@ def _bound_of(inputs: Mapping[str, Any], _value: Any) -> Any:
 def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the window vector of a pixel; the reference's own function leaves its place to the caller."""
     window, image = Window(int(inputs["size"]), str(inputs["border"])), inputs["image"]
-    dataset.check_window(window)
+    check_window(window)
     if not isinstance(image, np.ndarray) or image.ndim != 3 or image.dtype.kind != "i" or not image.size:
         rule = "must be integers [H][W][C], none of the three 0"
         raise InputError("image", getattr(image, "shape", image), rule, "see the format page of this kind")
@@ -114,7 +115,7 @@ def _window(inputs: Mapping[str, Any]) -> dict[str, Any]:
             rule = f"the image has the pixels 0 to {sides - 1} on this axis"
             raise InputError(name, int(inputs[name]), rule, "ask for a pixel of the image")
     x, y = (np.array([int(inputs[name])]) for name in ("x", "y"))
-    return {"window": dataset.windows_at(image, y, x, window)[0]}
+    return {"window": windows_at(image, y, x, window)[0]}
 
 
 # ---- draws ------------------------------------------------------------------------------------------------

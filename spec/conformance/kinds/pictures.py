@@ -24,6 +24,7 @@ from ....refimpl.frame import LAYERS, Frame, validate
 from ....refimpl.light import scene as scene_module
 from ....refimpl.light.render import Job, render
 from ....refimpl.network import dataset, denoise
+from ....refimpl.network.window import all_windows, pad
 from ..case import Output, within
 from ..numbers import mean_and_variance
 from . import paths
@@ -64,7 +65,7 @@ def _of_denoised(inputs: Mapping[str, Any], picture: Any) -> Any:
     model, frame = model_from(base64.b64decode(inputs["model"])), _layers(inputs)
     program = analysed(lower(model))
     image = dataset.feature_image(frame, model.features, model.normalization).astype(np.float64)
-    windows = dataset.all_windows(dataset.pad(image, model.window), model.window)
+    windows = all_windows(pad(image, model.window), model.window)
     nodes = bounds.enclose(program, {"window": (windows - ULP, windows + ULP)}, EMITTED_SINE)
     ((_, index),) = program.outputs
     found = nodes[index]

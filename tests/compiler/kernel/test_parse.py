@@ -53,8 +53,9 @@ from wamnet.compiler.targets import LANGUAGES as TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.activation import RELU
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 LANGUAGES = {
     dialect.target: dialect for dialect in (OpenCL(), C(), CUDA(), Metal(), GLSL(), Vulkan(), WGSL())

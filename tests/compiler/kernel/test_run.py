@@ -63,8 +63,8 @@ from wamnet.compiler.schedules.straight import Inline
 from wamnet.compiler.schedules.tile import Tile
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Window
 from wamnet.refimpl.network.whole import forward_whole, rounded
+from wamnet.refimpl.network.window import Window
 
 X, Y, TURN = map(name, ("x", "y", "i"))
 WRITTEN = Store(RESULT, (Y, X, const(0)), const(1.0))

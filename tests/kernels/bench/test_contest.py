@@ -15,8 +15,9 @@ from wamnet.kernels.bench.rates import Stage
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.frame import Frame
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.window import Window
 
 SIZE = 20
 """Width and height of pictures: more than a window, less than a crop."""

@@ -11,8 +11,9 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.plan import analysed
 from wamnet.kernels.bench.rates import Rates, Stage, fused, predicted_seconds, sines_of
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 from wamnet_peers.common import layered
 
 RATES = Rates(products_per_s=100.0, sines_per_s=10.0, bytes_per_s=1000.0, pixel_s=0.5)

@@ -11,6 +11,7 @@ from wamnet.kernels.bench.accuracy import Crop
 from wamnet.kernels.bench.contenders import Tools
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.window import Window
 from wamnet_peers import peer_onnxruntime, peer_openvino
 
 pytestmark = pytest.mark.apart
@@ -22,7 +23,7 @@ SIZE = 48
 @pytest.fixture(scope="module")
 def model():
     """A network that gives colours inside of [0, 1]."""
-    features, window = ("color", "normal"), dataset.Window(4)
+    features, window = ("color", "normal"), Window(4)
     network = siren.init((dataset.n_inputs(features, window), 8, 8, 3), 1.0, 3.0, seed=1)
     last = network.biases[-1] * 0 + np.float32(0.5)
     return Model(

@@ -18,9 +18,10 @@ from wamnet.kernels.bench import workload
 from wamnet.kernels.bench.contenders import Tools
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.frame import Frame
-from wamnet.refimpl.network import dataset, siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network import siren
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model, denoise
+from wamnet.refimpl.network.window import Window, all_windows, pad
 from wamnet_peers import table
 
 pytestmark = [
@@ -66,7 +67,7 @@ def test_a_peer_computes_the_network(peer, border, activation) -> None:
         for _ in range(2):
             picture = runner.display(runner.run(shown))
     joined = np.concatenate(list(shown.images.values()), axis=-1)
-    windows = dataset.all_windows(dataset.pad(joined, model.window), model.window)
+    windows = all_windows(pad(joined, model.window), model.window)
     (bound,) = bounds.at_inputs(analysed(lower(model)), {"window": windows}, LIBRARY_SINE).values()
     assert picture.shape == (7, 9, 3)
     assert (np.abs(picture - denoise(model, frame, np.float64)) <= bound).all()

@@ -16,8 +16,8 @@ from wamnet.kernels.export import tools
 from wamnet.kernels.export.wgpu_runner import vulkan_runner
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Window, all_windows, pad
 from wamnet.refimpl.network.whole import forward_whole, rounded
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 pytestmark = pytest.mark.apart  # drivers of several targets stay in memory
 

@@ -26,8 +26,9 @@ from wamnet.refimpl.light.render import Job, render
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import domain, siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 pytestmark = pytest.mark.apart  # drivers and runtimes of many targets stay in memory
 

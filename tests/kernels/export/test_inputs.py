@@ -12,8 +12,9 @@ from wamnet.compiler.scenes.history_kernel import compile_history
 from wamnet.compiler.scenes.smooth_kernel import compile_smoothing
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window, n_inputs
+from wamnet.refimpl.network.dataset import Normalization, n_inputs
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SCALES = Normalization(exposure_stops=-0.5)
 SCHEMA = json.loads((Path(__file__).parents[3] / "spec/export.schema.json").read_text())

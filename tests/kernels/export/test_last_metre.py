@@ -17,8 +17,9 @@ from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SETTINGS = Settings(max_depth=1)
 

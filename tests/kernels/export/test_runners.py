@@ -27,8 +27,9 @@ from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window, all_windows, encode_sums, pad
+from wamnet.refimpl.network.dataset import Normalization, encode_sums
 from wamnet.refimpl.network.whole import check_whole, forward_whole, rounded
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 pytestmark = pytest.mark.apart  # drivers of many targets stay in memory
 

@@ -15,9 +15,10 @@ from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window, all_windows, pad
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.whole import forward_whole
+from wamnet.refimpl.network.window import Window, all_windows, pad
 
 pytestmark = pytest.mark.apart  # a kernel of -Ofast makes its process flush denormal numbers
 

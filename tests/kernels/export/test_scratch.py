@@ -14,8 +14,9 @@ from wamnet.kernels.export import tools
 from wamnet.kernels.export.hosts.headers import stack_of
 from wamnet.kernels.export.package import Request, export
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 SCHEDULES = ("plain", "tile:16", "fft:16")
 

@@ -14,8 +14,9 @@ from wamnet.kernels.export.tint_runner import TintRunner
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable
 from wamnet.refimpl.light.transport import Settings
 from wamnet.refimpl.network import siren
-from wamnet.refimpl.network.dataset import Normalization, Window
+from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
+from wamnet.refimpl.network.window import Window
 
 pytestmark = pytest.mark.apart  # drivers of Vulkan stay in memory
 

@@ -122,6 +122,7 @@ def apply(node: Node, operands: list[Any], parameters: Parameters, kind: np.dtyp
     }
     if "dtype" in named:
         named["dtype"] = element(named["dtype"], kind)
+    assert op.definition, op.name
     return op.definition(*operands, **named)
 
 

@@ -40,7 +40,7 @@ class Op:
     name: str
     arity: int | None
     type_rule: TypeRule
-    definition: Any  # None: the interpreter's own
+    definition: Callable[..., Any] | None  # None: the interpreter's own
     required: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
     rounding: Rounding = "exact"

@@ -35,13 +35,11 @@ class Domain:
     def apply(self, operation: Expr, args: list[Any]) -> Any:
         """Return the result of an operation; its arguments and itself may be vectors (lanes, items)."""
         definition = OPS[operation.op].definition
-        if operation.op == "convert":
-            return (
-                converted(definition(args[0], dtype=self.dtype), operation)
-                if _is_float(operation)
-                else (converted(args[0], operation))
-            )
-        return definition(*args)
+        assert definition, operation.op
+        if operation.op != "convert":
+            return definition(*args)
+        value = definition(args[0], dtype=self.dtype) if _is_float(operation) else args[0]
+        return converted(value, operation)
 
     def cast(self, operation: Expr, args: list[Any]) -> Any:
         """Return the same bits as a value of another kind."""

@@ -264,9 +264,10 @@ class Runner(Walker):
             return self._divided(value.op, *args)
         if value.op in tree.INTEGERS and all(isinstance(each, int) for each in args):
             return tree.INTEGERS[value.op](*args)
-        if value.op == "convert":
+        definition = OPS[value.op].definition
+        if value.op == "convert" or definition is None:
             return self.domain.apply(value, args)
-        return OPS[value.op].definition(*args)
+        return definition(*args)
 
     def _divided(self, what: str, a: Values, b: Values) -> Values:
         """Return a quotient or remainder of indices, which are not negative."""

@@ -59,24 +59,27 @@ class OnExecutor:
 
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
-        own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
+        self._own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
         if language_named(executor.name).paths:
-            own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
-        self._own: Mapping[str, Own] = own
+            self._own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
         self.kinds = [*FUNCTIONS, *self._own]
-        self._compiled = cache(self._compile)
-        self._path_kernel, self._programs = cache(self._compile_path), cache(self._lowered)
+        self._compiled, self._programs = cache(self._compile), cache(self._lowered)
+        self._path_kernel = cache(self._compile_path)
 
     def answer(self, kind: str, inputs: Mapping[str, Any], profile: str) -> Mapping[str, Any]:
-        """Return the executor's outputs."""
-        if self.executor.profile != profile:
-            self.executor.profile = profile_named(profile).name
-            self._compiled.cache_clear()
-            self._path_kernel.cache_clear()
-        check_integers(KINDS[kind], inputs)
-        if kind in self._own:
-            return self._own[kind]({name: given(value) for name, value in inputs.items()})
-        function, kernels = FUNCTIONS[kind], self._compiled(kind)
+        """Return the executor's outputs; it has the profile meanwhile."""
+        before, self.executor.profile = self.executor.profile, profile_named(profile).name
+        try:
+            check_integers(KINDS[kind], inputs)
+            if kind in self._own:
+                return self._own[kind]({name: given(value) for name, value in inputs.items()})
+            return self._answer(kind, inputs)
+        finally:
+            self.executor.profile = before
+
+    def _answer(self, kind: str, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the outputs of a function of numbers."""
+        function, kernels = FUNCTIONS[kind], self._compiled(kind, self.executor.profile)
         fields = {name: np.asarray(from_json(inputs[name], name), np.float32) for name in function.inputs}
         parts = apart(values_of(function.inputs), fields)
         images = {part: np.full((1, 1, 1), value, np.float32) for part, value in parts.items()}
@@ -93,7 +96,7 @@ class OnExecutor:
         rows: list[dict[str, Any]] = []
         for depth in range(inputs["settings"]["max_depth"] + 1):
             settings = json.dumps({**inputs["settings"], "max_depth": depth})
-            kernel = self._path_kernel(inputs["scene"], settings)
+            kernel = self._path_kernel(inputs["scene"], settings, self.executor.profile)
             planes = self.executor.trace(kernel, part)[:, 0, x]
             state = dict(zip(kernel.planes, planes, strict=True))
             # A path that ended at the surface before has no vertex here.
@@ -102,12 +105,11 @@ class OnExecutor:
             rows.append(state)
         return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
 
-    def _compile_path(self, scene: str, settings: str) -> Artifact:
+    def _compile_path(self, scene: str, settings: str, profile: str) -> Artifact:
         """Return the kernel that reports the last vertex of paths."""
         stopped = Settings(**json.loads(settings))
         programs = replace(self._programs(scene, replace(stopped, max_depth=0)), settings=stopped)
-        device = self.executor
-        return compile_path(programs, device.name, device.profile, device.lanes, tuple(END))
+        return compile_path(programs, self.executor.name, profile, self.executor.lanes, tuple(END))
 
     def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
         """Return the programs of a path, which do not depend on the depth."""
@@ -135,7 +137,7 @@ class OnExecutor:
             for first in range(0, width, 3):
                 wanted = range(first, min(first + 3, width))
                 program = trace(partial(_some, network, name, wanted), types, gather)
-                picture = self.executor.run(self._kernel(program), pixel)
+                picture = self.executor.run(self._kernel(program, self.executor.profile), pixel)
                 found.setdefault(name, []).extend(picture[0, 0].tolist())
         return {name: np.array(values) for name, values in found.items()}
 
@@ -146,25 +148,24 @@ class OnExecutor:
         found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job)
         return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
-    def _compile(self, kind: str) -> list[Artifact]:
+    def _compile(self, kind: str, profile: str) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
         total = len(names(values_of(function.outputs)))
         threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
-        return [self._kernel(_program(function, wanted)) for wanted in threes]
+        return [self._kernel(_program(function, wanted), profile) for wanted in threes]
 
-    def _kernel(self, program: Program) -> Artifact:
+    def _kernel(self, program: Program, profile: str) -> Artifact:
         """Return the kernel of a program.
 
         Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there
         is no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
         """
-        target, profile = self.executor.name, self.executor.profile
         try:
-            return compile_program(program, target, profile)
+            return compile_program(program, self.executor.name, profile)
         except CompileError:
             expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
-            return compile_program(expanded, target, profile)
+            return compile_program(expanded, self.executor.name, profile)
 
 
 def _joined(state: Mapping[str, Any], name: str) -> Any:

@@ -338,6 +338,14 @@ SOME = (
 """Kinds that every executor is tested with here; the command tests all."""
 
 
+def test_an_executor_keeps_its_profile(executor_named):
+    """Others use it, and may have made plans for it."""
+    executor = executor_named("numpy")
+    found = [OnExecutor(executor).answer("sine", {"x": "0x1p+0"}, name) for name in ("ieee", "ieee-sine5")]
+    assert found[0] != found[1]
+    assert executor.profile == "ieee"
+
+
 @pytest.mark.nightly(but=("numpy", "opengl-osmesa"))
 def test_executors_pass(executor):
     answers = OnExecutor(executor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, NamedTuple, cast
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ....refimpl.light.materials import Conductor, Dielectric, Lambertian, Mirro
 from ....refimpl.light.materials.conductor import distribution, sample_visible_normal, schlick
 from ....refimpl.light.materials.dielectric import fresnel, refract
 from ....refimpl.light.materials.material import Site
-from ....refimpl.light.scene import Camera, Light, Quad, Scene, Sky, Sphere
+from ....refimpl.light.scene import Camera, Light, Quad, Sky, Sphere
 from ....refimpl.light.shapes.box import slabs
 from ....refimpl.light.shapes.quad import light_radiance, quad_row
 from ....refimpl.light.shapes.shape import BLACK, inverse
@@ -178,25 +178,15 @@ def _refracted(wo: Any, normal: Any, ratio: Any) -> tuple[Any, Any]:
     return refract(site, np.minimum(np.maximum(dot(wo, normal), 0.0), 1.0), ratio)
 
 
-class Heuristic(NamedTuple):
-    """All that a weight reads of settings."""
-
-    heuristic: str
-
-
 @cache
-def _terrace() -> Scene:
-    """Return the scene whose lamps are sampled."""
-    return scene_module.from_json((FOLDER / "scenes/terrace.json").read_text(encoding="utf-8"))
-
-
 def _world(dtype: Any) -> transport.World:
-    """Return the terrace where nobody reads settings."""
-    return transport.build(_terrace(), cast(transport.Settings, None), dtype)
+    """Return the scene whose lights are sampled."""
+    terrace = scene_module.from_json((FOLDER / "scenes/terrace.json").read_text(encoding="utf-8"))
+    return transport.build(terrace, transport.Settings(), dtype)
 
 
 def _light_pdf(dtype: Any, square: Any, cosine: Any) -> tuple[Any, Any]:
-    """Return the densities of both lamps of the terrace."""
+    """Return the densities of both lights of the terrace."""
     lights, index = _world(dtype).lights, np.zeros_like(square, np.int32)
     assert lights is not None
     first, second = (transport.light_pdf(lights, index + np.int32(k), square, cosine) for k in (0, 1))
@@ -257,7 +247,7 @@ UNTYPED: Mapping[str, Callable[..., Any]] = {
     "material.conductor_value": _valued,
     "material.dielectric": _sampled(Dielectric),
     "transport.mis_weight": lambda pdf, other: tuple(
-        transport.mis_weight(cast(Any, Heuristic(name)), pdf, other) for name in ("balance", "power")
+        transport.mis_weight(transport.Settings(heuristic=name), pdf, other) for name in ("balance", "power")
     ),
 }
 """All others."""

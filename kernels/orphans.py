@@ -4,7 +4,7 @@ A parent that is killed by SIGKILL can end nobody, and a worker that waits for w
 system closes what the parent held open: a thread of the worker waits for that [`end_with_parent`]. Signals do
 not meet workers that are not known yet [`starting_workers`].
 
-A [`Worker`] calls functions in a process of its own: that it ends, or never answers, is an answer too.
+A [`Worker`] calls functions in a separate process: that it ends, or never answers, is an answer too.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def _end_after(sentinel: int) -> None:
 def starting_workers() -> Iterator[None]:
     """Let SIGINT and SIGTERM wait while workers start: they are known by then, and their parent ends them.
 
-    Threads and processes inherit the mask of signals, so that every worker, also one in place of a lost one,
+    Threads and processes inherit the mask of signals, so that every worker, also one instead of a lost one,
     has SIGINT blocked: Ctrl-C in the terminal does not reach it. SIGTERM must not wait in them, and is only
     noted here. Python's tracker of shared resources unblocks SIGINT in the thread that starts it: it is
     started before.

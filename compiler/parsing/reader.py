@@ -46,7 +46,7 @@ class Scope:
 class Reader:
     """The tokens of a part of a source, and the scope at one of them.
 
-    `vector`: the type of the weights. C has vectors in arrays of floats, and functions in place of
+    `vector`: the type of the weights. C has vectors in arrays of floats, and functions instead of
     operators (`by_calls`). `bounded`: what an error bound rests on must be there.
     """
 

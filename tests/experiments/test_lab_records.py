@@ -7,7 +7,7 @@ import publish
 import pytest
 from lab import printed, texts
 from lab.records import Records, bench_of, checked, flat, nested, of_bench
-from lab.results import Results
+from lab.results import Results, summary
 from results_of import data_of
 
 from wamnet.cli.reports import bench_report
@@ -118,3 +118,15 @@ def test_a_record_of_a_benchmark_shows_what_the_benchmark_showed(tmp_path):
     again = bench_of(Records(tmp_path)["bench-x"])
     assert bench_report.table(again) == bench_report.table(data)
     assert bench_report.panels(again) == bench_report.panels(data)
+
+
+def test_what_is_shown_of_departures_follows_from_their_values():
+    """A decided question's tables are text in its record; these are differences of means, in dB."""
+    found = Records()["departures"]
+    shown = found.data()["shown"]
+    names = list(dict.fromkeys(record["configuration"] for record in found.records()))
+    rows = [summary(found.of(name, "psnr")) for name in names]
+    cells = [line.split(" | ")[-1].rstrip(" |") for line in shown["departures"].splitlines()[2:]]
+    assert cells == [row.text() for row in rows]
+    for name, other in (("clip", "unclipped"), ("loss", "summed"), ("replacement", "without replacement")):
+        assert shown[f"departures-{name}"] == f"{abs(rows[names.index(other)].mean - rows[0].mean):.2f}"

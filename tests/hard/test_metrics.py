@@ -68,7 +68,7 @@ def test_negative_and_huge_radiance():
 
 @pytest.mark.parametrize("shape", [(1, 1, 3), (10, 11, 3), (11, 10, 1), (40, 40)])
 def test_pictures_without_a_whole_window(shape):
-    """MSE needs a pixel, SSIM a window and channels: it refuses in place of inventing a border."""
+    """MSE needs a pixel, SSIM a window and channels: it refuses instead of inventing a border."""
     black = np.zeros(shape)
     assert metrics.mse(black, black) == 0.0
     with pytest.raises(InputError, match="at least 11 rows and columns"):

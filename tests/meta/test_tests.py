@@ -83,7 +83,6 @@ STATED = {"abs", "rel", "atol", "rtol", "abs_tol", "rel_tol"}
 
 
 def test_tolerances_are_stated_and_comparisons_fail_on_nan(house):
-    """Errors are matched too: ruff's PT011, for the names in pyproject.toml."""
     wrong = []
     for source in house.python("tests"):
         for node in source.nodes:
@@ -99,6 +98,16 @@ def test_tolerances_are_stated_and_comparisons_fail_on_nan(house):
         wrong,
         "Write assert abs(a - b) <= bound with a derived bound, never assert not err > bound: NaN fails.",
     )
+
+
+def test_errors_of_several_kinds_are_matched(house):
+    """Those of one kind too: ruff's PT011, for the names in pyproject.toml."""
+    wrong = []
+    for source in house.python("tests"):
+        calls = [n for n in source.nodes if isinstance(n, ast.Call) and called(n) == "raises" and n.args]
+        several = [call for call in calls if isinstance(call.args[0], ast.Tuple)]
+        wrong += [source.at(n, ast.unparse(n)) for n in several if "match" not in {k.arg for k in n.keywords}]
+    house.refuse(wrong, "A test of an error checks its sentence: pytest.raises(InputError, match=...).")
 
 
 def test_tests_can_fail(house):

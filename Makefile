@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # Seconds of processor time that the tests may take (tests/support/tiers.py).
 QUICK_S = 290
-TEST_S = 950
+TEST_S = 800
 
 # Two workers share two cores: one thread of linear algebra each.
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1

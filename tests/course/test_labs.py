@@ -37,7 +37,7 @@ def here(tmp_path, monkeypatch):
 
 
 def test_records_go_by_the_name_that_their_class_has():
-    """A class that moved is no record for a student's process any more."""
+    """A class that moved is not a record for a student's process any more."""
     ours = {key: named(*where) for key, where in RECORDS.items() if not key.startswith(STUDENT)}
     wrong = [key for key, one in ours.items() if key != f"{one.__module__}:{one.__qualname__}"]
     assert not wrong

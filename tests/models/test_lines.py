@@ -18,7 +18,7 @@ def test_output_that_nobody_reads_does_not_delay_the_end():
 
 
 def test_the_group_is_killed_once(monkeypatch):
-    """By then the number may be another group's: who was told that the program has ended closes it too."""
+    """By then the number may be that of another group; `close` ends a program that has ended too."""
     process, killed = LineProcess([sys.executable, "-c", "import sys; sys.exit('no device')"]), []
     monkeypatch.setattr(os, "killpg", lambda group, _signal: killed.append(group))
     assert [process.end(), process.end()] == ["no device", "no device"]

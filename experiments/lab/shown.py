@@ -352,8 +352,8 @@ def planted_faults(records: Records) -> str:
     return tables.markdown(["package", "faults", *RESULTS, "by a golden file"], cells)
 
 
-IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight", "outside", "paths", "sun")
-"""Tables of shadow rays in other sets than the mini cubes, with more paths, outside, and under a sun."""
+IN_SHADOW = ("cornell", "glossy", "vitrine", "daylight", "outside", "paths")
+"""Tables of shadow rays in other sets than the mini cubes, with more paths, and outside."""
 
 AS_PRINTED = (
     "bench-primitives", "bench-render", "bench-render-kernels", "certified", "exports", "feature-rays",

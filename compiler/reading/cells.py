@@ -155,10 +155,7 @@ class Cells:
             raise Wrong(f"{self.name} is read before it is written")
         if self.has_due and self.due[at].any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
-        if self.columns < turns.count:
-            element = np.broadcast_to(at[0] * self.columns + at[1], state.shape)
-            own = ... if active is None else active
-            turns.read(self, element[:, own], turns.who[own])
+        self._read(*at, turns, active)
         shape = self.shape[at]
         one = width == 1
         if not self.has_sums or not (state >= SUM).any():
@@ -174,6 +171,13 @@ class Cells:
         if not one:
             state, shape = state[:, None], shape[:, None]
         return Term(np.where(state == SUM, hashed("sum", *sums % P), shape), sums)
+
+    def _read(self, rows: Any, columns: Any, turns: Turns, active: Any) -> None:
+        """Note that active turns read elements."""
+        if self.columns < turns.count:
+            element = np.broadcast_to(rows * self.columns + columns, (len(rows), turns.count))
+            own = ... if active is None else active
+            turns.read(self, element[:, own], turns.who[own])
 
     def _integers(self, at: Any, one: bool, sums: Any) -> Term:
         """Return integers; one that is not a sum is not known."""
@@ -207,7 +211,8 @@ class Cells:
                 self.span[end][at] = own(value.span[end], 0)
 
     def confirm(self, place: Any, width: int, due: Words, turns: Turns, active: Any) -> None:
-        """Write in some lanes what all of them have written before."""
+        """Write in some lanes what all of them have written before: the others read that later."""
+        self._read(*self.at(place, width, turns, active), turns, active)
         at, own = self._written(place, width, turns, active)
         if (self.state[at] == EMPTY).any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")

@@ -158,6 +158,38 @@ def test_both_branches_at_borders_do_the_same(tile, old, new, why):
         run_text(*changed(tile, old, new))
 
 
+READ = "inside ? image_color[(row * width + column) * 3 + c] : 0.0f"
+"""What a kernel reads of an image."""
+
+PRODUCT = "weights[(tap + c) * 6 + j] * value"
+"""What it adds to a sum."""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (
+            f"part1[j] += {PRODUCT};",
+            f"""float a[1]; if (x >= 1) {{ float b = {PRODUCT}; if (x >= 2) {{ a[0] = b; }} }}
+            else {{ a[0] = {PRODUCT}; }} part1[j] += a[0];""",
+        ),
+        (
+            f"float value = {READ};",
+            f"""float a[2]; if (x >= 1) {{ a[1] = {READ}; }} else {{ a[1] = {READ}; a[0] = {READ}; }}
+            for (int t = 0; t < 2; ++t) {{ if (x >= t) {{
+                if (t > 0) {{ a[0] = {READ.replace(" c]", " (c + 1 - t) % 3]")}; }}
+                if (t < 1) {{ a[0] = {READ.replace(" c]", " (c + 1 - t) % 3]")}; }}
+            }} }} float value = c < 1 ? a[0] : a[1];""",
+        ),
+    ],
+    ids=["in fewer lanes than it is made for", "behind another turn's"],
+)
+def test_a_number_that_some_lanes_write_is_theirs_alone(plain, old, new):
+    """TXT-5: in the other lanes an element is unwritten, or has another number."""
+    with pytest.raises(Refused, match="several conditions on borders"):
+        run_text(*changed(plain, old, new))
+
+
 def test_a_sum_in_another_order_is_accepted(plain):
     """Any order is what the bound allows; parts of rows are not to be mixed."""
     turned = "for (int q = 0; q < 3; ++q) { int c = 2 - q;"

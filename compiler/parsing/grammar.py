@@ -160,7 +160,7 @@ LANGUAGES: Mapping[str, Language] = {
 CONSTANT = re.compile(
     "WINDOW_(SIZE|CENTRE|ROWS|COLUMNS)|CENTRE_(ROW|COLUMN)|PIXELS|LANES|PATCH_WIDTH|GROUP_(WIDTH|HEIGHT)|"
     "TILE_(WIDTH|HEIGHT|NUMBERS)|PLANE|POINTS|OUT|TILES|PAIRS|BLOCK|INPUTS|NEURONS|STRIDE|IMAGES|FREQUENCIES|"
-    "MIRRORED|ITEMS"
+    "MIRRORED"
 )
 """The names of constants; no macro has another name, so that none changes what surrounds the statements."""
 

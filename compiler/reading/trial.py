@@ -197,11 +197,10 @@ class Trial(Values):
             self._alike(array)
             cells.store(place, kind.lanes, value, *at, self.regions[-1])
             return
-        parts = [value.known] if kind.dtype == "float32" else value.term
         # A number that was made in a condition around this one is that of more lanes.
         lanes = np.asarray(self.mask if self.looking is None else self.looking, np.uint64)
         lanes = self.claim.fold.of(lanes, 0 if self.turns.slot is None else self.turns.slot)
-        due = hashed("due", *(part[..., 1:, :] for part in parts), lanes)
+        due = hashed("due", value.known[..., 1:, :], lanes)
         if self.looking is None:
             cells.confirm(place, kind.lanes, due, *at)
         elif self.regions[-1]:

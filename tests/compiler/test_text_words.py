@@ -70,6 +70,20 @@ def test_faults_of_bytes_are_named(dot16, old, new, why):
         run_text(*changed(dot16, old, new))
 
 
+def test_integers_are_not_those_of_the_field(dot16):
+    """TXT-5: P more is another integer far from borders."""
+    sizes = "WINDOW_SIZE * PATCH_WIDTH * 3"
+    begun = changed(dot16, "    for (int dy", f"    int q[{sizes}];\n    for (int dy")
+    for index, pixel in (("i", "left) * 3 + i"), ("dx * 3 + c", "column) * 3 + c")):
+        at, number = f"dy * PATCH_WIDTH * 3 + {index}]", f"(int)image_color[(row * width + {pixel}] + 128"
+        more = f" + {field.P}" if index == "i" else ""
+        begun = changed(begun, f"patch_color[{at} = (uchar)({number})", f"q[{at} = {number}{more}")
+    end = "    float16 v1[PIXELS];"
+    made = f"    for (int i = 0; i < {sizes}; ++i) {{ patch_color[i] = (uchar)q[i]; }}\n"
+    with pytest.raises(Refused, match="another number far from borders"):
+        run_text(*changed(begun, end, made + end))
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

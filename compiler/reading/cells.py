@@ -155,7 +155,10 @@ class Cells:
             raise Wrong(f"{self.name} is read before it is written")
         if self.has_due and self.due[at].any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
-        self._read(*at, turns, active)
+        if self.columns < turns.count:
+            element = np.broadcast_to(at[0] * self.columns + at[1], state.shape)
+            own = ... if active is None else active
+            turns.read(self, element[:, own], turns.who[own])
         shape = self.shape[at]
         one = width == 1
         if not self.has_sums or not (state >= SUM).any():
@@ -171,13 +174,6 @@ class Cells:
         if not one:
             state, shape = state[:, None], shape[:, None]
         return Term(np.where(state == SUM, hashed("sum", *sums % P), shape), sums)
-
-    def _read(self, rows: Any, columns: Any, turns: Turns, active: Any) -> None:
-        """Note that active turns read elements."""
-        if self.columns < turns.count:
-            element = np.broadcast_to(rows * self.columns + columns, (len(rows), turns.count))
-            own = ... if active is None else active
-            turns.read(self, element[:, own], turns.who[own])
 
     def _integers(self, at: Any, one: bool, sums: Any) -> Term:
         """Return integers; one that is not a sum is not known."""
@@ -212,8 +208,7 @@ class Cells:
 
     def confirm(self, place: Any, width: int, due: Words, turns: Turns, active: Any) -> None:
         """Write in some lanes what all of them have written before: the others read that later."""
-        self._read(*self.at(place, width, turns, active), turns, active)
-        at, own = self._written(place, width, turns, active)
+        at, own = self._written(place, width, turns, active, kept=True)
         if (self.state[at] == EMPTY).any():
             raise Wrong(f"{self.name} is read before it is written, in some lanes")
         # Two conditions on borders of two axes leave out a corner that no lane has.
@@ -222,14 +217,16 @@ class Cells:
             raise Wrong(f"{self.name} {why} near them")
         self.due[at] = 0
 
-    def _written(self, place: Any, width: int, turns: Turns, active: Any) -> Any:
-        """Return rows and columns that active turns write, and a function that gives values of these."""
+    def _written(self, place: Any, width: int, turns: Turns, active: Any, kept: bool = False) -> Any:
+        """Return rows and columns that active turns write (others `kept` these), and a function of values."""
         rows, columns = self.at(place, width, turns, active)
         turns.save(self)
         keep = np.ones((width, turns.count), bool) if active is None else np.tile(active, (width, 1))
         rows, columns = (np.broadcast_to(each, keep.shape)[keep] for each in (rows, columns))
         if self.columns < turns.count:
             who = np.broadcast_to(turns.who, keep.shape)[keep]
+            if kept:
+                turns.read(self, rows * self.columns + columns, who)
             last = turns.written(self, rows * self.columns + columns, who)
             keep[keep], rows, columns = last, rows[last], columns[last]
 

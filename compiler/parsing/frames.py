@@ -59,13 +59,15 @@ OPEN: Mapping[str, str] = {
     "dropped": r"(?:#undef wamnet_(?:difference|scaled|sum|zero)\n)*",
     "body": r"(?P<body>.*\n)?",
     "memory": r"(?P<memory>(?:layout\(std430, binding = \d+\) restrict buffer \w+ \{ vec2 \w+\[\]; \};\n)+)",
+    "wgsl_memory": r"(?P<memory>(?:@group\(0\) [^\n]+ \w+: array<vec2<f32>>;\n)+)",
     "launches": r"(?P<launches>#if STAGE == 0\n.*)",
+    "wgsl_launches": r"(?P<launches>@compute @workgroup_size\(\d, 1\)\nfn main_0\(.*)",
 }  # fmt: skip
 """The open places by name; `@each LINE@` are lines, one for each image."""
 
 BLOCKS = (
     "constants", "wgsl_constants", "functions", "undefined", "images", "body", "bounded", "words", "gnu",
-    "dropped", "memory", "launches", *"(|)<>",
+    "dropped", "memory", "wgsl_memory", "launches", "wgsl_launches", *"(|)<>",
 )  # fmt: skip
 """Places that match whole lines or nothing: the newline behind the marker is not part of the pattern."""
 
@@ -174,11 +176,24 @@ int (?P<row>line) = int\({}\.y\);
 SIZES = r"int width = imageSize\(result\)\.x;" "\n" r"int height = imageSize\(result\)\.y;" "\n"
 """The image's size in launches whose images are textures."""
 
+ENTRY = rf"""@compute @workgroup_size\({ITEMS}, 1\)
+fn main_(?P<number>\d+)\(@builtin\(global_invocation_id\) invocation: vec3<u32>\) \{{
+let width: i32 = size\.width;
+let height: i32 = size\.height;
+let first_tile: i32 = size\.first_tile;
+let tile_count: i32 = size\.tile_count;
+let (?P<column>tile): i32 = i32\(invocation\.x\);
+let (?P<row>line): i32 = i32\(invocation\.y\);
+(?P<body>(?:[^@\n][^\n]*\n)*?)\}}
+(?=@|\Z)"""
+"""The same in WGSL, an entry point."""
+
 LAUNCHES = {
-    True: re.compile(STAGE.format(SIZES, "gl_WorkGroupID")),
-    False: re.compile(STAGE.format("", "gl_GlobalInvocationID")),
+    "vec2": re.compile(STAGE.format("", "gl_GlobalInvocationID")),
+    "vec2<f32>": re.compile(ENTRY),
+    "texels": re.compile(STAGE.format(SIZES, "gl_WorkGroupID")),
 }
-"""The launches of languages whose images are textures, and of others."""
+"""The launches by the type of what they leave to each other, and of a language whose images are textures."""
 
 FRAMES: dict[str, str] = {
     "c": f"""
@@ -429,6 +444,9 @@ layout(std430, binding = 2) restrict buffer Result {{ float result[]; }};
 struct Size {{
 width: i32,
 height: i32,
+@(@@passes@first_tile: i32,
+tile_count: i32,
+@)@
 }}
 $group(0) $binding(0) var<uniform> size: Size;
 $group(0) $binding(1) var<storage, read> @<@weights: array<f32>@|@w: array<@vector@>@>@;
@@ -438,7 +456,7 @@ $group(0) $binding(2) var<storage, read_write> result: array<f32>;
 @)@
 @(@{WGSL_GROUP}
 @)@
-@<@$compute $workgroup_size(8, 8)
+@<@@<@$compute $workgroup_size(8, 8)
 fn main($builtin(global_invocation_id) invocation: vec3<u32>) {{
 @|@@group@$compute $workgroup_size(GROUP_WIDTH, GROUP_HEIGHT)
 fn main($builtin(local_invocation_id) item_place: vec3<u32>, $builtin(workgroup_id) group_place: vec3<u32>) {{
@@ -454,6 +472,9 @@ fn main($builtin(local_invocation_id) item_place: vec3<u32>, $builtin(workgroup_
     }
 @body@
 }}
+@|@@wgsl_memory@
+@wgsl_launches@
+@>@
 """,
 }
 """The frames by target; a dollar sign stands for WGSL's @."""

@@ -12,7 +12,7 @@ TOKEN = re.compile(
     r"(?P<pixel>vec4 color = vec4\(0\.0, 0\.0, 0\.0, 1\.0\);)"
     r"|(?P<unroll>#pragma unroll\n|WAMNET_UNROLL\n)|\s+"
     r"|(?P<float>\d+(?:\.\d+(?:e[+-]\d+)?|e[+-]\d+)f(?!\w))|(?P<mask>0x7fffffff)(?!\w)"
-    r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>vec4<[fi]32>|unsigned int|[A-Za-z_]\w*(?:::\w+)?)"
+    r"|(?P<integer>(?:0|[1-9]\d*)u?(?![\w.]))|(?P<word>vec[24]<[fi]32>|unsigned int|[A-Za-z_]\w*(?:::\w+)?)"
     r"|(?P<sign>\+\+|--|->|[-+]=|<=|>=|==|!=|&&|>>|[-+*/%<>=?:;,.(){}\[\]&^])"
 )
 """The tokens of all languages; a kernel has no others."""
@@ -147,12 +147,12 @@ LANGUAGES: Mapping[str, Language] = {
     "glsl-compute": BUFFERS,
     "wgsl": Language(
         {"f32": FLOAT, "i32": INT, "u32": Type("uint32"), "bool": BOOL}
-        | {"vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
+        | {"vec2<f32>": FLOAT.of(2), "vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
         {**SHADER, **DOTS},
         "workgroupBarrier()",
         casts=False,
         lets=True,
-        makers={"vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
+        makers={"vec2<f32>": FLOAT.of(2), "vec4<f32>": FLOAT.of(4), "vec4<i32>": INT.of(4)},
     ),
 }
 """The languages by target."""

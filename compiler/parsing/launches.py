@@ -17,14 +17,20 @@ def launches(parser: Any) -> list[Statement]:
     if not parser.passes:
         return found
     programs_of, memory = parser.passes
-    keys = re.findall(r"vec2 (\w+)\[\]", parser.parts["memory"])
-    textures = parser.language.texels
+    keys = re.findall(r"vec2 (\w+)\[\]|(\w+): array<", parser.parts["memory"])
+    keys = ["".join(each) for each in keys]
+    textures, has_entries = parser.language.texels, parser.language.lets
     first = 1 if textures else 3 + len(parser.parts["images"].splitlines())
     lines = []
     for number, key in enumerate(keys, first):
         block = f"{key}_buffer" if textures else key.capitalize()
-        lines.append(f"layout(std430, binding = {number}) restrict buffer {block} {{ vec2 {key}[]; }};\n")
-    programs = list(LAUNCHES[textures].finditer(text))
+        lines.append(
+            f"@group(0) @binding({number}) var<storage, read_write> {key}: array<vec2<f32>>;\n"
+            if has_entries
+            else f"layout(std430, binding = {number}) restrict buffer {block} {{ vec2 {key}[]; }};\n"
+        )
+    pattern = LAUNCHES["texels" if textures else "vec2<f32>" if has_entries else "vec2"]
+    programs = list(pattern.finditer(text))
     numbers = [int(each["number"]) for each in programs]
     named = keys == sorted(memory) and "".join(lines) == parser.parts["memory"]
     if not named or "".join(each[0] for each in programs) != text:
@@ -37,6 +43,7 @@ def launches(parser: Any) -> list[Statement]:
         if not NAME.fullmatch(key):
             raise Unread(f"{key!r} is not a name of an array")
         parser.scope.arrays[key] = (FLOAT.of(2), 1, False)
+        parser.scope.words[key] = "var" if has_entries else ""
         found.append(Array(key, FLOAT.of(2), (tiles * (memory[key] // 2),), "device"))
     for each, (of, count) in zip(programs, programs_of, strict=True):
         parser._read(each["body"])

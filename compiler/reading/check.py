@@ -273,12 +273,14 @@ def check_interface(kernel: Kernel, claim: Claim, manifest: Any) -> None:
     if (group and tuple(group)) != size:
         raise Wrong(f"its groups are not of {' x '.join(map(str, group or ['no']))} items")
     stated = [schedule.get(key, ()) for key in ("arrays", "entries")]
-    for launch, arrays, entry in zip(kernel.launches, *stated, strict=True):
+    # In WGSL each launch is an entry point, in other languages the program is compiled for each.
+    point, of_each = manifest["entry_point"], manifest["target"] == "wgsl"
+    for number, (launch, arrays, entry) in enumerate(zip(kernel.launches, *stated, strict=True)):
         every = walk(launch.body)
         used = {s.array for s in every if isinstance(s, Store)}
         used |= {e.value for s in every for v in values(s) for e in parts(v) if e.op == "load"}
         used -= {s.name for s in every if isinstance(s, Array)}
-        if used != {*arrays} or entry != manifest["entry_point"]:
+        if used != {*arrays} or entry != (f"{point}_{number}" if of_each else point):
             raise Wrong("its launches have other arrays, or entry points, than its manifest says")
     if kernel.launches and schedule["items"] != ITEMS:
         raise Wrong("its launches have groups of another size than its manifest says")

@@ -17,6 +17,7 @@ BUFFERS = dict.fromkeys(("glsl-vulkan", "wgsl", "cuda", "metal"), ("group", "til
 OF_FLOATS: Mapping[str, tuple[str, ...]] = {
     **BUFFERS, "opencl": ("tile", "vector", "group", "fft"), "c": ("tile", "fft"), "glsl-es": ("packed",),
     "opengl": ("group", "fftpasses"), "glsl-vulkan": ("group", "tile", "fftpasses"),
+    "wgsl": ("group", "tile", "fftpasses"),
 }  # fmt: skip
 """What the names of schedules other than plain begin with, of networks of floats."""
 

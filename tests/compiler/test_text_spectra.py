@@ -16,6 +16,7 @@ from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.glsl import GLSLCompute
 from wamnet.compiler.languages.glsl_buffers import Vulkan
 from wamnet.compiler.languages.opencl import OpenCL
+from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.proof import checker, spectra_checker
 from wamnet.compiler.proof.evidence import Refused
 from wamnet.compiler.reading.check import check_text, run_text
@@ -42,9 +43,8 @@ def kernel(folder, target="opencl", points=8, tiles=2, **kwargs):
     """Write a kernel of small tiles, by vectors of 4 numbers and blocks of 6 pixels."""
     dialect = OpenCL() if target == "opencl" else C()
     tiny = fft.Fourier(dialect, "fft8", "small tiles", lanes=4, pixels=6, points=points, tiles=tiles)
-    if target in ("opengl", "glsl-vulkan"):
-        words = GLSLCompute() if target == "opengl" else Vulkan()
-        tiny = FourierPasses(words, "fftpasses:8", "small tiles", points=points)
+    if words := {"opengl": GLSLCompute, "glsl-vulkan": Vulkan, "wgsl": WGSL}.get(target):
+        tiny = FourierPasses(words(), "fftpasses:8", "small tiles", points=points)
     whole = targets.LANGUAGES[target]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fft, "COST", 0.0)
@@ -245,6 +245,35 @@ def test_texts_of_passes_compute_what_is_certified(opengl, tmp_path):
             run_text(*changed(vulkan, old, new))
 
 
+@pytest.fixture(scope="module")
+def wgsl(tmp_path_factory):
+    return parts(kernel(tmp_path_factory.mktemp("wgsl"), "wgsl"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("+ line - WINDOW_CENTRE", "+ line"),
+        ("first_tile: i32,\n    tile_count: i32,", "tile_count: i32,\n    first_tile: i32,"),
+        ("let first_tile: i32 = size.first_tile;", "let first_tile: i32 = size.tile_count;"),
+        ("let line: i32 = i32(invocation.y);", "let line: i32 = i32(invocation.z);"),
+        ("@workgroup_size(8, 1)", "@workgroup_size(4, 1)"),
+        ("fn main_1(", "fn main_6("),
+        ("var<storage, read_write> back", "var<storage, read> back"),
+        ("@binding(8)", "@binding(18)"),
+        ("> columns: array<vec2<f32>>;", "> columns: array<vec4<f32>>;"),
+        ("@compute", "var<private> p: f32;\n@compute"),
+        ("] = vec2<f32>(t", "] = -vec2<f32>(t"),
+        (".x - whole_imaginary", ".x + whole_imaginary"),
+    ],
+)
+def test_passes_of_wgsl_are_entry_points(wgsl, old, new):
+    """TXT-12: each launch is one, of the manifest's name; the memory between them is storage buffers."""
+    assert run_text(*wgsl)["sums"] == 3 * 36
+    with pytest.raises((Refused, Unread), match=r"\S"):
+        run_text(*changed(wgsl, old, new))
+
+
 @pytest.mark.nightly(but=USUAL)
 @pytest.mark.parametrize(("what", "target", "old", "new"), WRONG, ids=[f"{t}: {w}" for w, t, *_ in WRONG])
 def test_wrong_texts_of_spectra_are_refused(what, target, old, new, request):
@@ -269,6 +298,14 @@ def test_hosts_of_less_memory_are_refused(array, opengl):
     memory[array] -= 2
     with pytest.raises((Refused, Unread), match=r"\S"):
         run_text(source, held, {**manifest, "schedule": {**manifest["schedule"], "memory": memory}}, weights)
+
+
+def test_entry_points_of_another_order_are_refused(wgsl):
+    source, held, manifest, weights = wgsl
+    entries = [*reversed(manifest["schedule"]["entries"])]
+    schedule = {**manifest["schedule"], "entries": entries}
+    with pytest.raises(Refused, match="than its manifest says"):
+        run_text(source, held, {**manifest, "schedule": schedule}, weights)
 
 
 @pytest.mark.parametrize(

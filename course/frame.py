@@ -16,7 +16,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -180,6 +180,40 @@ def hold(clause: str, what: str, good: Any, expected: str, found: Any, likely: s
         raise Wrong(clause, what, expected, found if isinstance(found, str) else number_text(found), likely)
 
 
+def equal(clause: str, what: str, found: Any, expected: Any, likely: str = "") -> None:
+    """Refuse what is not equal to what is expected: a count, a shape, a name."""
+    hold(clause, what, found == expected, str(expected), str(found), likely)
+
+
+def results(clause: str, what: str, found: Any, count: int, expected: str, likely: str = "") -> None:
+    """Refuse what is not a tuple or a list of so many results."""
+    several, kind = isinstance(found, (tuple, list)), type(found).__name__
+    told = f"{kind} of {len(found)}" if several else kind
+    hold(clause, what, several and len(found) == count, expected, told, likely)
+
+
+REFUSALS = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
+"""Exceptions that code raises where it should refuse with another one."""
+
+
+def refuses(
+    clause: str,
+    what: str,
+    kind: type[Exception],
+    call: Callable[[], Any],
+    likely: str,
+    told: Callable[[Any], str],
+) -> None:
+    """Call what must raise an exception of a kind; `told` says what an answer is."""
+    try:
+        found = told(call())
+    except kind:
+        return
+    except REFUSALS as error:
+        found = f"{type(error).__name__}: {error}"
+    raise Wrong(clause, what, kind.__name__, found, likely)
+
+
 def kind_of_number(clause: str, what: str, found: Any, dtype: Any) -> None:
     """Refuse an array of another kind of number than is expected."""
     array, wanted = numbers_of(clause, what, found), np.dtype(dtype)
@@ -240,6 +274,13 @@ def vectors(
                 raise Wrong(case.clause, what, "ValueError: this input is invalid", "an answer", text)
             expected = verdict.expected if verdict.stage else "what the case says"
             raise Wrong(case.clause, what, _decimal(expected), _decimal(verdict.got or verdict.text), reason)
+
+
+def asked(
+    kind: str, answer: Callable[[Any, Mapping[str, Any]], Mapping[str, Any]], likely: str
+) -> Callable[[Any], None]:
+    """Return the check that asks all cases of a kind; `answer` takes the student too."""
+    return lambda student: vectors(kind, partial(answer, student), likely=likely)
 
 
 def _kept(value: Any) -> Any:

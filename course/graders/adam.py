@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..frame import Check, alike, expect, hold, numbers_of, spread, still, vectors
+from ..frame import Check, alike, asked, equal, expect, hold, numbers_of, results, spread, still
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
 """The source's values."""
@@ -80,8 +80,7 @@ def compare(student: Any, slopes: Any, what: str) -> None:
     wrong = [(adam(slopes, how), told) for how, told in MISTAKES]
     for t, g in enumerate(slopes, 1):
         found = student.step(*still(theta, g, m, v), t, RATE)
-        good = isinstance(found, (tuple, list)) and len(found) == 3
-        hold("ADM-1", "the result of step", good, "theta, m and v", str(type(found)))
+        results("ADM-1", "the result of step", found, 3, "theta, m and v")
         for number, name in enumerate(("theta", "m", "v")):
             # The mistake that gives all three comes first.
             whole = [pair for pair in wrong if all(map(alike, found, pair[0][t - 1]))]
@@ -107,18 +106,14 @@ def small(student: Any) -> None:
     compare(student, np.array([[1e-9, -1e-8], [1e-9, 2e-8]]), "step of small slopes")
 
 
-def the_vectors(student: Any) -> None:
-    """The cases adam.run."""
-
-    def answer(given: Any) -> Any:
-        theta, rows = given["theta"].astype(np.float64), []
-        m, v = np.zeros_like(theta), np.zeros_like(theta)
-        for t, g in enumerate(given["gradients"], 1):
-            theta, m, v = student.step(theta, g, m, v, t, float(given["learning_rate"]))
-            rows.append((theta, m, v))
-        return dict(zip(("theta", "m", "v"), map(np.array, zip(*rows, strict=True)), strict=True))
-
-    vectors("adam.run", answer, likely="single precision, or the learning rate is not the argument's")
+def answer(student: Any, given: Any) -> Any:
+    """Return what the student's steps make of a case of adam.run."""
+    theta, rows = given["theta"].astype(np.float64), []
+    m, v = np.zeros_like(theta), np.zeros_like(theta)
+    for t, g in enumerate(given["gradients"], 1):
+        theta, m, v = student.step(theta, g, m, v, t, float(given["learning_rate"]))
+        rows.append((theta, m, v))
+    return dict(zip(("theta", "m", "v"), map(np.array, zip(*rows, strict=True)), strict=True))
 
 
 def decay(student: Any) -> None:
@@ -143,16 +138,8 @@ def decay(student: Any) -> None:
             (wanted, "times the learning rate"),
             (RATE, "the decay is missing"),
         ]
-        found = student.rate(RATE, k, 10)
-        expect(
-            "TRN-4",
-            f"the learning rate of step {k} of 10",
-            found,
-            RATE * wanted,
-            1e-15,
-            likely,
-            "(1 + cos(pi k / steps)) / 2",
-        )
+        what, text = f"the learning rate of step {k} of 10", "(1 + cos(pi k / steps)) / 2"
+        expect("TRN-4", what, student.rate(RATE, k, 10), RATE * wanted, 1e-15, likely, text)
 
 
 def training(student: Any) -> None:
@@ -171,7 +158,7 @@ def training(student: Any) -> None:
     lost = not np.all(np.isfinite(np.asarray(found, np.float64)))
     text = "t is counted from 1: with t = 0 the corrections divide by 0"
     hold("TRN-4", "theta after the steps", not lost, "numbers", found, text)
-    hold("TRN-2", "the number of slopes", len(calls) == count, str(count), str(len(calls)), once)
+    equal("TRN-2", "the number of slopes", len(calls), count, once)
     rates = [rate * (1 + np.cos(np.pi * k / count)) / 2 for k in range(count)]
 
     def after(rates: Any, how: str = "") -> Any:
@@ -212,15 +199,17 @@ def learns(student: Any) -> None:
 
     found = student.train(np.zeros(2), gradient, 2000, 0.02)
     # The rate ends at 0; what Adam leaves is far below a thousandth here.
-    expect(
-        "TRN-4", "the line after 2000 steps", found, np.array([0.75, -0.5]), 1e-3, (), "training stops early"
-    )
+    text = "training stops early"
+    expect("TRN-4", "the line after 2000 steps", found, np.array([0.75, -0.5]), 1e-3, (), text)
 
 
 CHECKS = (
     Check("three steps", steps),
     Check("small slopes", small),
-    Check("the spec's vectors", the_vectors),
+    Check(
+        "the spec's vectors",
+        asked("adam.run", answer, "single precision, or the learning rate is not the argument's"),
+    ),
     Check("the learning rate", decay),
     Check("training", training),
     Check("a line of least squares", learns),

@@ -31,7 +31,7 @@ from wamnet.refimpl.network.dataset import Normalization
 from wamnet.refimpl.network.denoise import Model
 from wamnet.refimpl.network.window import Window
 
-from ..frame import Check, Likely, Wrong, expect, hold, number_text, numbers_of, spread, still
+from ..frame import Check, Likely, Wrong, expect, hold, number_text, numbers_of, results, spread, still
 
 U, TINY, WIDER = 2.0**-24, 2.0**-110, 1 + 2.0**-16
 """float32's rounding, and the skeleton's number and factor."""
@@ -213,8 +213,7 @@ def one_layer(student: Any) -> None:
         w, b, low, high = map(np.array, numbers)
         for omega, sine in ((1.0, None), (3.0, SINE_ERROR)):
             found = student.layer(*still(w, b), omega, low, high, sine)
-            good = isinstance(found, (tuple, list)) and len(found) == 3
-            hold("CER-2", "the result of layer", good, "argument, rounding, error", str(type(found)))
+            results("CER-2", "the result of layer", found, 3, "argument, rounding, error")
             kind = f"{'a hidden' if sine is not None else 'the last'} layer of {w.shape[1]} inputs"
             right, low_right = step(w, b, omega, low, high, sine), least(w, b, omega, low, high, sine)
             parts = [numbers_of("CER-2", name, v, (2,)) for name, v in zip(NAMES, found, strict=True)]
@@ -243,8 +242,7 @@ def all_layers(student: Any, sine: float | None = None) -> Any:
     kernel, w, b, omegas, low, high = built()
     sine = float(kernel.certificate["sine"]["error_bound"]) if sine is None else sine
     found = student.layers(w, b, omegas, low, high, sine)
-    good = isinstance(found, (list, tuple)) and len(found) == len(w)
-    hold("CER-2", "the result of layers", good, f"{len(w)} steps", str(found)[:60])
+    results("CER-2", "the result of layers", found, len(w), f"{len(w)} steps")
     right, low_right = steps(w, b, omegas, low, high, sine), steps(w, b, omegas, low, high, sine, None)
     others = [(steps(w, b, omegas, low, high, sine, how), told) for how, told in MISTAKES]
     for layer, one in enumerate(found):
@@ -332,14 +330,8 @@ def measured(student: Any) -> None:
             exact, single = np.sin(omega * exact), np.sin(np.float32(omega) * single)
     worst = np.abs(single - exact).max(axis=0)
     below = bool(np.all(worst <= total))
-    hold(
-        "CER-3",
-        "the bound of each output",
-        below,
-        f"at least {number_text(worst)}, which is met",
-        total,
-        "a term is missing",
-    )
+    wanted = f"at least {number_text(worst)}, which is met"
+    hold("CER-3", "the bound of each output", below, wanted, total, "a term is missing")
 
 
 def certificate(student: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from wamnet.refimpl.light.scene import Camera
 from wamnet.spec.conformance.case import Case, given
 
-from ..frame import SINGLE, Check, alike, expect, hold, near, numbers_of, still, vectors
+from ..frame import SINGLE, Check, alike, equal, expect, hold, near, numbers_of, results, still, vectors
 
 CAMERA = Camera((0.5, 1.0, 4.0), (0.0, -0.2, 0.0), vertical_fov_deg=41.0)
 """The camera of the vectors; the image is 97 x 64."""
@@ -26,10 +26,19 @@ def ray(student: Any, camera: Camera, *values: Any) -> tuple[Any, Any]:
     x, y, u, v, width, height = values
     pixels = still(x, y, u, v) if np.ndim(x) else (x, y, u, v)
     found = student.camera_ray(camera, *pixels, width, height)
-    good = isinstance(found, tuple) and len(found) == 2
     text = "there is no `return`" if found is None else "return both: origin, direction"
-    hold("CAM-2", "the result", good, "a pair", type(found).__name__, text)
+    results("CAM-2", "the result", found, 2, "a pair", text)
     return numbers_of("CAM-2", "the origin", found[0]), numbers_of("CAM-2", "the direction", found[1])
+
+
+def unit(direction: Any) -> None:
+    """Refuse the direction of one ray that has another length than 1."""
+    numbers_of("CAM-2", "the direction of one ray", direction, (3,))
+    length = np.linalg.norm(direction)
+    text = "the direction is not divided by its length"
+    if np.isnan(length):
+        text = "nothing is left of it: forward, look_at - position, is one of the three terms that are added"
+    hold("CAM-2", "the length of a direction", abs(length - 1.0) <= BOUND, "1", length, text)
 
 
 def middle(student: Any) -> None:
@@ -39,12 +48,7 @@ def middle(student: Any) -> None:
     begin = "rays begin at camera.position"
     expect("CAM-2", "the origin", np.broadcast_to(origin, (3,)), position, BOUND, [(target, begin)], begin)
     wanted = (target - position) / np.linalg.norm(target - position)
-    numbers_of("CAM-2", "the direction of one ray", direction, (3,))
-    length = np.linalg.norm(direction)
-    unit = "the direction is not divided by its length"
-    if np.isnan(length):
-        unit = "nothing is left of it: forward, look_at - position, is one of the three terms that are added"
-    hold("CAM-2", "the length of a direction", abs(length - 1.0) <= BOUND, "1", length, unit)
+    unit(direction)
     likely = [
         (-wanted, "forward goes from position to look_at, not back"),
         (target / np.linalg.norm(target), "look_at is a point: forward is look_at - position"),
@@ -60,10 +64,7 @@ def middle(student: Any) -> None:
 def _at(student: Any, x: float, y: float) -> Any:
     """Return the point at a depth of 1 that a ray of PLAIN goes to, in an image of 4 x 2."""
     _, direction = ray(student, PLAIN, x, y, 0.0, 0.0, 4, 2)
-    numbers_of("CAM-2", "the direction of one ray", direction, (3,))
-    length = np.linalg.norm(direction)
-    unit = "the direction is not divided by its length"
-    hold("CAM-2", "the length of a direction", abs(length - 1.0) <= BOUND, "1", length, unit)
+    unit(direction)
     return direction / -direction[2]
 
 
@@ -80,15 +81,8 @@ def across(student: Any) -> None:
     text = "the horizontal coordinate: (2 (x + u) - width) / height * tan(vertical_fov / 2)"
     found = _at(student, 4.0, 1.0)
     text = SINGLE if near(found, (2.0, 0.0, -1.0)) else text
-    large = abs(found[0]) > 1e6
-    hold(
-        "CAM-2",
-        "the right edge",
-        not large,
-        "x = 2",
-        found,
-        "half of the field of view goes into the tangent",
-    )
+    half = "half of the field of view goes into the tangent"
+    hold("CAM-2", "the right edge", abs(found[0]) <= 1e6, "x = 2", found, half)
     expect("CAM-2", "the right edge at a depth of 1", found, (2.0, 0.0, -1.0), 1e-9, likely, text)
 
 
@@ -153,14 +147,7 @@ def arrays(student: Any) -> None:
     x = np.arange(6.0).reshape(2, 3)
     origin, direction = ray(student, CAMERA, x, x, 0.5, 0.5, 97, 64)
     text = "make the coordinates (..., 1) before they are multiplied with vectors: a[..., None]"
-    hold(
-        "CAM-2",
-        "the shape of directions",
-        direction.shape == (2, 3, 3),
-        "(2, 3, 3)",
-        str(direction.shape),
-        text,
-    )
+    equal("CAM-2", "the shape of directions", direction.shape, (2, 3, 3), text)
     shape = np.broadcast_shapes(origin.shape, (2, 3, 3))
     hold(
         "CAM-2", "the shape of origins", shape == (2, 3, 3), "one that goes with (2, 3, 3)", str(origin.shape)

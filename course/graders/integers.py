@@ -16,7 +16,7 @@ from wamnet.refimpl.network.whole import SINES, TURN, colour, rounded, whole_sin
 from wamnet.refimpl.network.window import Window
 from wamnet.spec.conformance.kinds.network import network_from
 
-from ..frame import Check, Wrong, expect, kind_of_number, numbers_of, spread, vectors
+from ..frame import Check, Wrong, asked, expect, kind_of_number, numbers_of, spread
 from ..wire import Expression
 
 PHASES = 64
@@ -48,15 +48,8 @@ def largest(student: Any) -> None:
         (128 * size.sum(axis=1), "inputs are in [-most, most]"),
         (127 * np.sqrt((weights**2).sum(axis=1)), "a bound of all inputs: the sum of magnitudes, not a norm"),
     ]  # fmt: skip
-    expect(
-        "WHO-3",
-        "largest sums",
-        found,
-        127 * size.sum(axis=1),
-        0.0,
-        likely,
-        "most * sum of |weights| of a row",
-    )
+    text = "most * sum of |weights| of a row"
+    expect("WHO-3", "largest sums", found, 127 * size.sum(axis=1), 0.0, likely, text)
 
 
 def phases(student: Any) -> None:
@@ -165,14 +158,9 @@ def every_angle(student: Any) -> None:
         expect("WHO-5", "sines beyond a turn", student.sine(beyond, amplitude), wanted[::997], 0.0, (), text)
 
 
-def sine_vectors(student: Any) -> None:
-    """The cases whole.sine."""
-
-    def answer(given: Any) -> Any:
-        at = np.asarray(given["phase"]).astype(np.uint32)
-        return {"value": student.sine(at, int(given["amplitude"]))}
-
-    vectors("whole.sine", answer, likely="the last bits of a phase")
+def sine_of(student: Any, given: Any) -> Any:
+    """Return the student's answer to a case of whole.sine."""
+    return {"value": student.sine(np.asarray(given["phase"]).astype(np.uint32), int(given["amplitude"]))}
 
 
 def forward(student: Any, network: Any, numbers: Any) -> list[Any]:
@@ -199,22 +187,21 @@ def one_layer(student: Any) -> None:
         (made(1, bias), "the factor is missing"),
         (numbers @ weights.T, "the sine is missing"),
     ]
-    text = "sine(phase(numbers @ weights.T, factor, bias), amplitude)"
-    expect("WHO-5", "a layer", found, made(factor, bias), 0.0, likely, text)
+    expect("WHO-5", "a layer", found, made(factor, bias), 0.0, likely, LAYER)
 
 
-def network_vectors(student: Any) -> None:
-    """The cases whole.forward; the last layer is not the student's, nor is what refuses a network."""
+LAYER = "sine(phase(numbers @ weights.T, factor, bias), amplitude)"
+"""What a layer is."""
 
-    def answer(given: Any) -> Any:
-        network = network_from(given)
-        numbers = np.asarray(given["n"], np.float32)
-        layers = forward(student, network, numbers)
-        sums = (layers or [numbers])[-1] @ network.weights[-1].T
-        named = {f"layer_{index}": values for index, values in enumerate(layers)}
-        return {**named, "color": colour(network, sums)}
 
-    vectors("whole.forward", answer, likely="sine(phase(numbers @ weights.T, factor, bias), amplitude)")
+def layers_of(student: Any, given: Any) -> Any:
+    """Return the answer to a case of whole.forward; last layer and refusals are not the student's."""
+    network = network_from(given)
+    numbers = np.asarray(given["n"], np.float32)
+    layers = forward(student, network, numbers)
+    sums = (layers or [numbers])[-1] @ network.weights[-1].T
+    named = {f"layer_{index}": values for index, values in enumerate(layers)}
+    return {**named, "color": colour(network, sums)}
 
 
 TRACE = Expression(
@@ -256,9 +243,9 @@ CHECKS = (
     Check("phases", phases),
     Check("sines of known angles", single),
     Check("every angle", every_angle),
-    Check("the vectors of the sine", sine_vectors),
+    Check("the vectors of the sine", asked("whole.sine", sine_of, "the last bits of a phase")),
     Check("a layer", one_layer),
-    Check("the vectors of a network", network_vectors),
+    Check("the vectors of a network", asked("whole.forward", layers_of, LAYER)),
     Check("nothing rounds", nothing_rounds),
 )
 """In the order in which they explain a mistake best."""

@@ -11,7 +11,6 @@ from wamnet.kernels.judge.welch import sidak
 
 from ..frame import (
     SIGNIFICANCE,
-    SINGLE,
     Check,
     alike,
     chi_square_p,
@@ -19,31 +18,24 @@ from ..frame import (
     hold,
     normal_p,
     numbers_of,
+    results,
     still,
     uniforms,
     vectors,
 )
+from .sampling import SECTORS, sectors, upwards
 
 COUNT = 20_000
 """Samples of each estimate."""
-
-SECTORS = 15
-"""Sectors around the normal, in which there are as many directions: an odd number of them."""
 
 SQUARES = ((1.0, 0.3), (1.0, 1.0), (1.0, 4.0), (0.5, 2.0))
 """Half the side and the height of the lights."""
 
 
-def bounced(student: Any, reflectance: float, block: int = 0) -> tuple[Any, Any, Any]:
+def bounced(student: Any, reflectance: float) -> tuple[Any, Any, Any]:
     """Return directions, weights and densities of COUNT bounces."""
-    found = student.bounce(reflectance, *still(*uniforms(9, COUNT, block)[:2]))
-    hold(
-        "LAM-1",
-        "the result of bounce",
-        isinstance(found, (tuple, list)) and len(found) == 3,
-        "three arrays",
-        str(type(found)),
-    )
+    found = student.bounce(reflectance, *still(*uniforms(9, COUNT)[:2]))
+    results("LAM-1", "the result of bounce", found, 3, "three arrays")
     return (
         numbers_of("LAM-1", "directions", found[0], (COUNT, 3)),
         numbers_of("LAM-1", "f cos / pdf", found[1], (COUNT,)),
@@ -54,22 +46,15 @@ def bounced(student: Any, reflectance: float, block: int = 0) -> tuple[Any, Any,
 def density(student: Any) -> None:
     """The density is that of the directions."""
     wi, _, pdf = bounced(student, 0.3)
-    off = float(np.abs(np.sqrt(np.sum(wi * wi, axis=-1)) - 1.0).max())
-    text = "x, y and z do not belong together: z = sqrt(1 - x^2 - y^2)"
-    text = SINGLE if off < 1e-6 else text
-    hold("LAM-1", "the largest deviation of a length from 1", off <= 1e-12, "at most 1e-12", off, text)
+    upwards("LAM-1", wi, "directions below the surface")
     z = wi[:, 2]
-    hold("LAM-1", "the least z", np.all(z >= 0.0), "at least 0", z.min(), "directions below the surface")
     # The mean of z under cos / pi is 2 / 3, its variance 1 / 18.
     deviate = (float(z.mean()) - 2.0 / 3.0) * math.sqrt(18.0 * COUNT)
     text = "uniform over the hemisphere: use the map of lab 3" if abs(z.mean() - 0.5) < 0.01 else ""
     text = "the radius in the disk is u0: it has to be sqrt(u0)" if z.mean() > 0.75 else text
     found = f"{z.mean():.4f}"
     hold("LAM-1", "the mean of the cosine", normal_p(deviate) >= SIGNIFICANCE / 2, "0.6667", found, text)
-    sector = np.minimum(
-        (SECTORS * (np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) + 0.5)).astype(int), SECTORS - 1
-    )
-    p = chi_square_p(np.bincount(sector, minlength=SECTORS), COUNT / SECTORS)
+    p = chi_square_p(np.bincount(sectors(wi), minlength=SECTORS), COUNT / SECTORS)
     what, text = f"the p-value of a chi-square test in {SECTORS} sectors", "the angle around z is 2 pi u1"
     # Both tests together reject a right answer with the significance at most.
     hold("LAM-1", what, p >= SIGNIFICANCE / 2, f"at least {SIGNIFICANCE / 2:g}", p, text)
@@ -157,16 +142,10 @@ def exact(half: float, height: float) -> float:
     return 4.0 / math.pi * a / root * math.atan(a / root)
 
 
-def lights(student: Any, half: float, height: float, block: int = 1) -> tuple[Any, Any, Any]:
+def lights(student: Any, half: float, height: float) -> tuple[Any, Any, Any]:
     """Return the student's samples of a light."""
-    found = student.by_light(0.8, half, height, *still(*uniforms(9, COUNT, block)[:2]))
-    hold(
-        "LTR-5",
-        "the result of by_light",
-        isinstance(found, (tuple, list)) and len(found) == 3,
-        "three arrays",
-        str(type(found)),
-    )
+    found = student.by_light(0.8, half, height, *still(*uniforms(9, COUNT, 1)[:2]))
+    results("LTR-5", "the result of by_light", found, 3, "three arrays")
     names = ("value", "pdf", "pdf of bounce")
     three = [numbers_of("LTR-5", name, v, (COUNT,)) for name, v in zip(names, found, strict=True)]
     return three[0], three[1], three[2]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..frame import Check, Likely, alike, expect, hold, spread, still, vectors
+from ..frame import Check, Likely, alike, asked, equal, expect, results, spread, still
 
 OMEGAS = (3.0, 2.5)
 """omega of the first sines and of the others."""
@@ -66,15 +66,7 @@ def layers(student: Any) -> None:
     found = student.forward(w, b, OMEGAS, x)
     wanted = forwards(w, b, OMEGAS, x)
     text = "the values of each layer, the last one's too, and not the input"
-    count = len(found) if isinstance(found, (list, tuple)) else 0
-    hold(
-        "SIR-2",
-        "the result of forward",
-        count == len(w),
-        f"a list of {len(w)} arrays",
-        f"{count} of them",
-        text,
-    )
+    results("SIR-2", "the result of forward", found, len(w), f"a list of {len(w)} arrays", text)
     for number, right in enumerate(wanted):
         likely = [(forwards(w, b, OMEGAS, x, how)[number], told) for how, told in FORWARD_MISTAKES]
         text = (
@@ -129,8 +121,7 @@ def slopes(student: Any) -> None:
     w, b = network()
     x, target = spread(51, (COUNT, SIZES[0]), -1.0, 1.0), spread(52, (COUNT, SIZES[-1]), 0.0, 1.0)
     found = student.gradients(list(still(*w)), list(still(*b)), OMEGAS, *still(x, target))
-    good = isinstance(found, (tuple, list)) and len(found) == 3
-    hold("SIR-7", "the result of gradients", good, "(loss, [dW], [db])", str(type(found)))
+    results("SIR-7", "the result of gradients", found, 3, "(loss, [dW], [db])")
     loss, dw, db = found
     right = backwards(w, b, x, target)
     likely: Likely = [
@@ -141,14 +132,14 @@ def slopes(student: Any) -> None:
         (right[0] ** 0.5, "the mean of squares, without a root"),
     ]
     expect("SIR-7", "the loss", loss, right[0], 1e-12, likely, "the mean of (y - target)^2")
-    count = (len(dw), len(db)) if isinstance(dw, (list, tuple)) and isinstance(db, (list, tuple)) else (0, 0)
-    hold("SIR-7", "the numbers of dW and db", count == (len(w), len(w)), str((len(w), len(w))), str(count))
+    for name, some in (("dW", dw), ("db", db)):
+        results("SIR-7", f"the numbers of {name}", some, len(w), f"a list of {len(w)} arrays")
     wrong = [(backwards(w, b, x, target, how), told) for how, told in BACKWARD_MISTAKES]
     text = "the chain: dy becomes dy @ W on the way to the layer before"
     for layer in reversed(range(len(w))):
         shape, own = np.shape(dw[layer]), w[layer].shape
         told = "the first layer of the list is the first of the network" if shape != own[::-1] else "dy.T @ x"
-        hold("SIR-7", f"the shape of dW of layer {layer}", shape == own, str(own), str(shape), told)
+        equal("SIR-7", f"the shape of dW of layer {layer}", shape, own, told)
         # A mistake that changes nothing in this layer explains nothing.
         likely = [(v[1][layer], told) for v, told in wrong if not alike(v[1][layer], right[1][layer])]
         expect("SIR-7", f"dW of layer {layer}", dw[layer], right[1][layer], 1e-11, likely, text)
@@ -164,26 +155,18 @@ def arguments(given: Any, *names: str) -> Any:
     return weights, biases, omegas, *(given[name] for name in names)
 
 
-def forward_vectors(student: Any) -> None:
-    """The cases network.forward."""
-
-    def answer(given: Any) -> Any:
-        *known, x = arguments(given, "x")
-        found = student.forward(*known, x[None])
-        return {f"layer_{i}": values[0] for i, values in enumerate(found)}
-
-    vectors("network.forward", answer, likely="a network of one layer, or of another number of neurons")
+def activations(student: Any, given: Any) -> Any:
+    """Return the student's answer to a case of network.forward."""
+    *known, x = arguments(given, "x")
+    found = student.forward(*known, x[None])
+    return {f"layer_{i}": values[0] for i, values in enumerate(found)}
 
 
-def backward_vectors(student: Any) -> None:
-    """The cases network.gradient."""
-
-    def answer(given: Any) -> Any:
-        loss, dweights, dbiases = student.gradients(*arguments(given, "x", "target"))
-        found = {f"dweight_{i}": dw for i, dw in enumerate(dweights)}
-        return {"loss": loss, **found, **{f"dbias_{i}": db for i, db in enumerate(dbiases)}}
-
-    vectors("network.gradient", answer, likely="a network of another number of layers or neurons")
+def derivatives(student: Any, given: Any) -> Any:
+    """Return the student's answer to a case of network.gradient."""
+    loss, dweights, dbiases = student.gradients(*arguments(given, "x", "target"))
+    found = {f"dweight_{i}": dw for i, dw in enumerate(dweights)}
+    return {"loss": loss, **found, **{f"dbias_{i}": db for i, db in enumerate(dbiases)}}
 
 
 def differences(student: Any) -> None:
@@ -210,8 +193,14 @@ def differences(student: Any) -> None:
 CHECKS = (
     Check("layer by layer", layers),
     Check("the loss and its derivatives", slopes),
-    Check("the spec's vectors, forwards", forward_vectors),
-    Check("the spec's vectors, backwards", backward_vectors),
+    Check(
+        "the spec's vectors, forwards",
+        asked("network.forward", activations, "a network of one layer, or of another number of neurons"),
+    ),
+    Check(
+        "the spec's vectors, backwards",
+        asked("network.gradient", derivatives, "a network of another number of layers or neurons"),
+    ),
     Check("central differences", differences),
 )
 """In the order in which they explain a mistake best."""

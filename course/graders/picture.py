@@ -14,13 +14,14 @@ from ..frame import (
     SIGNIFICANCE,
     Check,
     Likely,
-    Wrong,
     alike,
+    equal,
     expect,
     hold,
     normal_p,
     normals,
     numbers_of,
+    results,
     spread,
     vectors,
 )  # fmt: skip
@@ -37,8 +38,7 @@ def sums(student: Any, samples: Any) -> tuple[Any, Any, Any]:
     state = (0, np.zeros(samples.shape[1:]), np.zeros(samples.shape[1:]))
     for x in samples:
         found = student.add_sample(*state, x)
-        good = isinstance(found, (tuple, list)) and len(found) == 3
-        hold("RND-4", "the result of add_sample", good, "n, sum and sum of squares", str(type(found)))
+        results("RND-4", "the result of add_sample", found, 3, "n, sum and sum of squares")
         state = (found[0], found[1], found[2])
     return state
 
@@ -88,14 +88,8 @@ def divided(student: Any) -> None:
         (7.0**0.5, "the standard deviation: the variance has no root"),
         (14.0, "not divided"),
     ]
-    expect(
-        "RND-4",
-        "the variance of 3 samples whose squares are 14",
-        student.variance(3, 14.0),
-        7.0,
-        1e-12,
-        likely,
-    )
+    found, what = student.variance(3, 14.0), "the variance of 3 samples whose squares are 14"
+    expect("RND-4", what, found, 7.0, 1e-12, likely)
     expect("RND-4", "the variance of 2 samples whose squares are 3", student.variance(2, 3.0), 3.0, 1e-12)
     text = "one sample says nothing of its variance: divide by max(n - 1, 1)"
     expect(
@@ -126,33 +120,15 @@ def taken(student: Any, spp: int = SPP) -> tuple[Any, Any, list[int]]:
     asked: list[int] = []
 
     def radiance(x: Any, y: Any, n: int) -> Any:
-        hold(
-            "RND-1",
-            "the pixels of a call",
-            np.shape(x) == (WIDTH * HEIGHT,),
-            "all pixels (W * H,)",
-            str(np.shape(x)),
-            "one array of all columns: np.mgrid's are (H, W), so ravel() them",
-        )
-        hold(
-            "RND-1",
-            "the columns x",
-            int(np.max(x)) == WIDTH - 1,
-            f"up to {WIDTH - 1}",
-            int(np.max(x)),
-            "x and y are exchanged",
-        )
+        text = "one array of all columns: np.mgrid's are (H, W), so ravel() them"
+        equal("RND-1", "the shape of a call's pixels", np.shape(x), (WIDTH * HEIGHT,), text)
+        last, swapped = int(np.max(x)), "x and y are exchanged"
+        hold("RND-1", "the columns x", last == WIDTH - 1, f"up to {WIDTH - 1}", last, swapped)
         asked.append(int(n))
         return colours(x, y, n)
 
     found = student.picture(radiance, WIDTH, HEIGHT, spp)
-    hold(
-        "RND-1",
-        "the result of picture",
-        isinstance(found, (tuple, list)) and len(found) == 2,
-        "a pair",
-        str(type(found)),
-    )
+    results("RND-1", "the result of picture", found, 2, "a pair")
     return found[0], found[1], asked
 
 
@@ -202,14 +178,8 @@ def predicts(student: Any) -> None:
     true_variance = np.stack([np.full(x.shape, 1 / 12), (y + 1) ** 2 / 12], axis=-1)
     ratio = float(np.mean((np.asarray(mean) - truth) ** 2 / (true_variance / SPP)))
     p = normal_p((ratio - 1.0) / math.sqrt(2.0 / truth.size))
-    hold(
-        "RND-1",
-        "squared error / (variance / n)",
-        p >= SIGNIFICANCE,
-        "1",
-        f"{ratio:.3f}",
-        "not a mean of n samples",
-    )
+    what, text = "squared error / (variance / n)", "not a mean of n samples"
+    hold("RND-1", what, p >= SIGNIFICANCE, "1", f"{ratio:.3f}", text)
 
 
 def bright(student: Any) -> None:
@@ -245,15 +215,8 @@ def needed(student: Any) -> None:
         (np.array([64.0, 1.0, 4.0, 21.0]), "the variance is squared already"),
         (np.array([8.0, 1.0, 4.0, 6.0]), "variance / error^2: the variance has no root here"),
     ]
-    expect(
-        "RND-4",
-        "samples for an error of 0.5",
-        found,
-        np.array([16.0, 1.0, 4.0, 9.0]),
-        0.0,
-        likely,
-        "variance / error^2",
-    )
+    wanted, text = np.array([16.0, 1.0, 4.0, 9.0]), "variance / error^2"
+    expect("RND-4", "samples for an error of 0.5", found, wanted, 0.0, likely, text)
     found = student.samples_needed(np.array([1.1]), 0.5)
     large = student.samples_needed(np.array([2.0**24 + 1.0]), 1.0)
     text = "single precision: float32 does not hold 2^24 + 1"
@@ -304,18 +267,11 @@ def errors(student: Any) -> None:
     vectors("metric.mse", answer, likely="single precision: convert to float64 before subtracting")
 
 
-def _agree(mean: Any, other: Any) -> bool:
-    """Tell whether two pictures are alike."""
-    return alike(mean, other, 1e-12)
-
-
 def no_memory(student: Any) -> None:
     """Twice the same picture: nothing is kept between calls."""
     first, second = taken(student)[0], taken(student)[0]
-    if not _agree(first, second):
-        raise Wrong(
-            "RND-3", "the same picture again", "the same numbers", "others", "a sum that outlives the call"
-        )
+    same, text = alike(first, second, 1e-12), "a sum that outlives the call"
+    hold("RND-3", "the same picture again", same, "the same numbers", "others", text)
 
 
 CHECKS = (

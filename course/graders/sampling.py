@@ -18,6 +18,7 @@ from ..frame import (
     hold,
     kind_of_number,
     numbers_of,
+    results,
     still,
     uniforms,
 )
@@ -87,8 +88,7 @@ def mixing(student: Any) -> None:
     """Words of 1000 blocks."""
     given = _four(*still(*(rng.counter(np.arange(1000) * k + k) for k in (1, 7, 31, 1009))))
     found = student.mix(*given)
-    four = isinstance(found, (tuple, list)) and len(found) == 4
-    hold("RNG-2", "the result of mix", four, "four arrays", str(type(found)), "return v0, v1, v2, v3")
+    results("RNG-2", "the result of mix", found, 4, "four arrays", "return v0, v1, v2, v3")
     wanted = rng.pcg4d(*given)
     for number, (word, right) in enumerate(zip(found, wanted, strict=True)):
         kind_of_number("RNG-2", f"word {number}", word, np.uint32)
@@ -129,32 +129,33 @@ def drawn(student: Any) -> tuple[Any, Any]:
     return u, wi
 
 
-def directions(student: Any) -> None:
-    """Unit vectors above the horizon."""
-    _, wi = drawn(student)
-    length = np.sqrt(np.sum(wi * wi, axis=-1))
-    off = float(np.abs(length - 1.0).max())
+def upwards(clause: str, wi: Any, likely: str) -> None:
+    """Refuse directions (N, 3) that are not unit vectors above the horizon."""
+    off = float(np.abs(np.sqrt(np.sum(wi * wi, axis=-1)) - 1.0).max())
     text = "x, y and z do not belong together: z = sqrt(1 - x^2 - y^2)"
     text = SINGLE if off < 1e-6 else text
     # Squares, sums and a root: a few roundings of float64.
-    hold("SMP-2", "the largest deviation of a length from 1", off <= 1e-12, "at most 1e-12", off, text)
+    hold(clause, "the largest deviation of a length from 1", off <= 1e-12, "at most 1e-12", off, text)
     least = float(wi[:, 2].min())
-    hold(
-        "SMP-2",
-        "the least z",
-        least >= 0.0,
-        "at least 0",
-        least,
-        "the whole sphere, or z with the other sign",
-    )
+    hold(clause, "the least z", least >= 0.0, "at least 0", least, likely)
+
+
+def directions(student: Any) -> None:
+    """Unit vectors above the horizon."""
+    upwards("SMP-2", drawn(student)[1], "the whole sphere, or z with the other sign")
+
+
+def sectors(wi: Any) -> Any:
+    """Return the numbers (N,) of the SECTORS around z in which directions (N, 3) are."""
+    turn = np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) + 0.5
+    return np.minimum((SECTORS * turn).astype(int), SECTORS - 1)
 
 
 def distribution(student: Any) -> None:
     """Rings of equal probability under cos / pi, by sectors: a chi-square test."""
     _, wi = drawn(student)
     ring = np.minimum((RINGS * (1.0 - wi[:, 2] ** 2)).astype(int), RINGS - 1)
-    turn = np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) + 0.5
-    sector = np.minimum((SECTORS * turn).astype(int), SECTORS - 1)
+    sector = sectors(wi)
     cells = RINGS * SECTORS
     tests = (
         (cells, chi_square_p(np.bincount(SECTORS * ring + sector, minlength=cells), COUNT / cells)),
@@ -166,12 +167,12 @@ def distribution(student: Any) -> None:
     if p >= SIGNIFICANCE / len(tests):
         return
     rings = np.bincount(ring, minlength=RINGS) / COUNT
-    sectors = np.bincount(sector, minlength=SECTORS) / COUNT
+    shares = np.bincount(sector, minlength=SECTORS) / COUNT
     edges = np.arange(RINGS + 1) / RINGS
     uniform = np.diff(-np.sqrt(1.0 - edges))
     text = "u0 and u1 do not become a point that is uniform in the disk: radius sqrt(u0), angle 2 pi u1"
     # Shares of some 20,000 directions each vary by 0.7 %; shares of known mistakes differ by more.
-    if np.abs(sectors * SECTORS - 1.0).max() > 0.2:
+    if np.abs(shares * SECTORS - 1.0).max() > 0.2:
         text = "the azimuth does not go around: the angle is 2 pi u1"
     elif np.abs(rings - uniform).max() < 0.01:
         text = "uniform over the hemisphere (z = 1 - u0): more directions belong where the cosine is large"
@@ -211,8 +212,7 @@ def way_back(student: Any) -> None:
     """At the horizon z is a root of a difference; it is not needed for the way back along the disk."""
     u, wi = drawn(student)
     found = student.invert_hemisphere_sample(*still(wi))
-    pair = isinstance(found, (tuple, list)) and len(found) == 2
-    hold("SMP-2", "the way back", pair, "a pair", str(type(found)), "return u0, u1")
+    results("SMP-2", "the way back", found, 2, "a pair", "return u0, u1")
     found = [numbers_of("SMP-2", f"u{i}", value, (COUNT,)) for i, value in enumerate(found)]
     text = "it inverts another map than sample_hemisphere's"
     if alike(found[0], u[1], 1e-7) and alike(found[1], u[0], 1e-7):

@@ -11,6 +11,7 @@ from ..frame import (
     Check,
     Likely,
     Wrong,
+    asked,
     expect,
     hold,
     kind_of_number,
@@ -18,7 +19,6 @@ from ..frame import (
     numbers_of,
     spread,
     still,
-    vectors,
 )
 
 CENTER, RADIUS = np.array([0.25, -0.5, 0.125]), 0.75
@@ -176,14 +176,10 @@ def many(student: Any) -> None:
     expect("ISC-6", "the distances of two rays from one origin", found, (3.0, 1e30), BOUND, (), text)
 
 
-def the_vectors(student: Any) -> None:
-    """The cases intersection.sphere."""
-
-    def answer(given: Any) -> Any:
-        found = student.meet_sphere(CENTER, np.float64(RADIUS), given["origin"], given["direction"])
-        return {"t": numbers_of("ISC-6", "the distance of one ray", found, ())}
-
-    vectors("intersection.sphere", answer, likely="rays that begin on the sphere, or look away from it")
+def answer(student: Any, given: Any) -> Any:
+    """Return the student's answer to a case of intersection.sphere."""
+    found = student.meet_sphere(CENTER, np.float64(RADIUS), given["origin"], given["direction"])
+    return {"t": numbers_of("ISC-6", "the distance of one ray", found, ())}
 
 
 def random_rays(student: Any) -> None:
@@ -196,14 +192,8 @@ def random_rays(student: Any) -> None:
     away = np.linalg.norm(origin + np.where(hit, t, 0.0)[:, None] * direction - CENTER, axis=-1)
     # Some ten operations on numbers below 10, in float64; tangents lose half of the digits.
     off = float(np.abs(away - RADIUS)[hit].max(initial=0.0))
-    hold(
-        "ISC-6",
-        "hits' distance from the sphere",
-        off <= 1e-6,
-        "at most 1e-6",
-        off,
-        "not a root of the equation",
-    )
+    text = "not a root of the equation"
+    hold("ISC-6", "hits' distance from the sphere", off <= 1e-6, "at most 1e-6", off, text)
     hold("ISC-2", "the least distance", np.all(t > 0.0), "above 0", t.min(), NEAR_ROOT)
     inside = np.linalg.norm(origin - CENTER, axis=-1) < RADIUS
     missed = int(np.count_nonzero(inside & ~hit))
@@ -243,7 +233,10 @@ CHECKS = (
     Check("rays at the edge", grazing),
     Check("rays that begin close by", close),
     Check("arrays of rays", many),
-    Check("the spec's vectors", the_vectors),
+    Check(
+        "the spec's vectors",
+        asked("intersection.sphere", answer, "rays that begin on the sphere, or look away from it"),
+    ),
     Check("random rays", random_rays),
     Check("a small sphere far away in float32", far_away),
 )

@@ -24,7 +24,7 @@ from wamnet_verify import judgement, run
 from wamnet_verify.cases import questions
 from wamnet_verify.renderers import Own
 
-from ..frame import Check, Wrong, cases_of, hold
+from ..frame import Check, Wrong, cases_of, equal, hold
 
 SUITE = (
     *("vector", "camera.ray", "sampling.cosine_hemisphere", "intersection.sphere", "intersection.box"),
@@ -112,20 +112,10 @@ def break_sphere(student: Any) -> None:
     """ISC-6 is blamed, by at most four cases of the sphere."""
     with planted(sphere_distance, student.break_sphere):
         found = asked()
-    blamed(
-        found,
-        "ISC-6",
-        "another kind fails too, and it is more elementary: distances only, and of the right shape",
-    )
-    seen = failures(found, "intersection.sphere")
-    hold(
-        "CNF-3",
-        "cases of intersection.sphere that fail",
-        seen <= 4,
-        "at most 4",
-        seen,
-        "break less: one sort of ray",
-    )
+    text = "another kind fails too, and it is more elementary: distances only, and of the right shape"
+    blamed(found, "ISC-6", text)
+    seen, text = failures(found, "intersection.sphere"), "break less: one sort of ray"
+    hold("CNF-3", "cases of intersection.sphere that fail", seen <= 4, "at most 4", seen, text)
 
 
 def break_surface(student: Any) -> None:
@@ -138,9 +128,8 @@ def break_camera(student: Any) -> None:
     """Cases of the camera fail, and VEC-3 is blamed."""
     with planted(vectors.normalize, student.break_camera):
         found = asked()
-    blamed(
-        found, "VEC-3", "vectors of another length or direction: cases of the vectors have to see it as well"
-    )
+    text = "vectors of another length or direction: cases of the vectors have to see it as well"
+    blamed(found, "VEC-3", text)
     text = "the vectors that the camera makes are right: break all of them, not single ones"
     hold("CNF-11", "cases of camera.ray that fail", failures(found, "camera.ray") > 0, "some", "none", text)
 
@@ -166,7 +155,7 @@ def break_picture(student: Any) -> None:
     told = "none" if first is None else first.rule
     text = "a rule that comes before: where nothing is met depth is 0, and every number is finite"
     text = "the layer `depth` is as it was" if first is None else text
-    hold("CNF-13", "the rule that is blamed", told == "depth", "depth", told, text)
+    equal("CNF-13", "the rule that is blamed", told, "depth", text)
     for before, after in zip(right["layers-wall"], found["layers-wall"], strict=True):
         # One rounding of a quotient, in either float type.
         off = float(np.abs(after["depth"] * before["depth"] - 1.0).max())
@@ -179,14 +168,8 @@ def hides(student: Any) -> None:
     off = np.abs(student.hide(encoding.to_display, linear) - encoding.to_display(linear))
     count = int(np.count_nonzero(off >= LEAST_SEEN))
     what = f"values of {LEAST_OFF} that are off by {LEAST_SEEN}"
-    hold(
-        "CNF-3",
-        what,
-        count >= LEAST_SHARE,
-        f"at least {LEAST_SHARE}",
-        count,
-        "a wider range, or a larger fault",
-    )
+    text = "a wider range, or a larger fault"
+    hold("CNF-3", what, count >= LEAST_SHARE, f"at least {LEAST_SHARE}", count, text)
     with planted(encoding.to_display, student.hide):
         seen = [v.id for v in asked([DISPLAY], None) if v.failed]
     text = "look where no case is, in the folder of the vectors"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from wamnet.refimpl import rng
 
-from ..frame import Check, Wrong, hold, kind_of_number, number_text, spread
+from ..frame import Check, Wrong, equal, hold, kind_of_number, number_text, refuses, spread
 from ..wire import Expression, Node, Program
 
 COUNT = 50
@@ -43,14 +44,8 @@ def traced(student: Any, body: str, names: Sequence[str]) -> Any:
     program = student.trace(function_of(body, names), tuple(names))
     nodes: Any = getattr(program, "nodes", None)
     good = isinstance(nodes, (tuple, list)) and all(hasattr(n, "op") and hasattr(n, "args") for n in nodes)
-    hold(
-        "IR-1",
-        "the result of trace",
-        good,
-        "a Program of Nodes",
-        type(program).__name__,
-        "Program(tuple(nodes), output)",
-    )
+    kind, text = type(program).__name__, "Program(tuple(nodes), output)"
+    hold("IR-1", "the result of trace", good, "a Program of Nodes", kind, text)
     index = program.output
     text = "the output is the index of a node, not a traced value"
     hold("IR-1", "the output", isinstance(index, (int, np.integer)), "an index", type(index).__name__, text)
@@ -59,24 +54,10 @@ def traced(student: Any, body: str, names: Sequence[str]) -> Any:
         whole = all(isinstance(arg, (int, np.integer)) for arg in node.args)
         told = "operands are indices of nodes: a traced value gives its own, a number that of its constant"
         hold("IR-2", f"the operands of node {number}", whole, "indices", repr(node.args), told)
-        early = all(0 <= arg < number for arg in node.args)
-        hold(
-            "IR-2",
-            f"the operands of node {number}",
-            early,
-            "earlier nodes",
-            repr(node.args),
-            "append operands first",
-        )
-        known = node.op in (*OPS, "input", "const")
-        hold(
-            "IR-3",
-            f"the operation of node {number}",
-            known,
-            "one of OPS",
-            repr(node.op),
-            "np.where is called `select`",
-        )
+        early, first = all(0 <= arg < number for arg in node.args), "append operands first"
+        hold("IR-2", f"the operands of node {number}", early, "earlier nodes", repr(node.args), first)
+        known, told = node.op in (*OPS, "input", "const"), "np.where is called `select`"
+        hold("IR-3", f"the operation of node {number}", known, "one of OPS", repr(node.op), told)
     return program
 
 
@@ -89,23 +70,16 @@ def short(student: Any) -> None:
     if nodes == [*wanted[:2], ("add", (1, 0), None)]:
         text = "the operands are exchanged"
     hold("IR-1", "the program of a + b", nodes == wanted, "input a, input b, add (0, 1)", listed(found), text)
-    hold("IR-1", "the output of a + b", found.output == 2, "2", str(found.output), "the index of the result")
+    equal("IR-1", "the output of a + b", found.output, 2, "the index of the result")
     found = traced(student, "a", "ab")
     text = "the output is the index of what is returned, not the last node"
-    hold(
-        "IR-1", "the program of a function that returns a", found.output == 0, "output 0", listed(found), text
-    )
+    what = "the program of a function that returns a"
+    hold("IR-1", what, found.output == 0, "output 0", listed(found), text)
     found = traced(student, "3.0", "a")
     node = found.nodes[found.output]
     text = "a function may return a number: it is a constant then"
-    hold(
-        "IR-1",
-        "the output of a function that returns 3.0",
-        node.op == "const" and node.value == 3.0,
-        "const 3.0",
-        listed(found),
-        text,
-    )
+    good, what = node.op == "const" and node.value == 3.0, "the output of a function that returns 3.0"
+    hold("IR-1", what, good, "const 3.0", listed(found), text)
 
 
 def given() -> dict[str, Any]:
@@ -141,14 +115,7 @@ def numbers(student: Any) -> None:
     for name, (body, likely) in FUNCTIONS.items():
         program = traced(student, body, "abc")
         found, wanted = student.evaluate(program, inputs), function_of(body, "abc")(*inputs.values())
-        if np.shape(found) != np.shape(wanted):
-            raise Wrong(
-                "IR-3",
-                f"the shape of {name}",
-                str(np.shape(wanted)),
-                str(np.shape(found)),
-                "the output's value",
-            )
+        equal("IR-3", f"the shape of {name}", np.shape(found), np.shape(wanted), "the output's value")
         kind_of_number("IR-3", name, found, wanted.dtype)
         off = np.flatnonzero(np.asarray(found) != wanted)
         if off.size:
@@ -187,24 +154,11 @@ def once(student: Any) -> None:
         ("np.sin(a) + np.cos(a)", 5, "the operation belongs to what is compared"),
     ):
         found = traced(student, body, "ab")
-        hold(
-            "IR-1",
-            f"nodes of {body}",
-            len(found.nodes) == count,
-            str(count),
-            f"{len(found.nodes)}: {listed(found)}",
-            text,
-        )
+        number = len(found.nodes)
+        hold("IR-1", f"nodes of {body}", number == count, str(count), f"{number}: {listed(found)}", text)
     first, second = (traced(student, "np.sin(a) + 1.0", "a") for _ in range(2))
     text = "the list of nodes is one of the program, not one of the module"
-    hold(
-        "IR-1",
-        "nodes of a second program",
-        len(second.nodes) == len(first.nodes),
-        str(len(first.nodes)),
-        str(len(second.nodes)),
-        text,
-    )
+    equal("IR-1", "nodes of a second program", len(second.nodes), len(first.nodes), text)
 
 
 BRANCH = "`__bool__` has to raise TypeError: else an `if` takes one branch, silently"
@@ -221,17 +175,8 @@ def refusals(student: Any) -> None:
         ("1.0 if a > 0 else a", BRANCH),
         ("np.add(a, 1, where=False)", "a ufunc with options: TypeError"),
     ):
-        try:
-            found = student.trace(function_of(body, "a"), ("a",))
-        except TypeError:
-            continue
-        except NotImplementedError:
-            raise
-        except (ArithmeticError, LookupError, ValueError, AttributeError, RecursionError) as error:
-            raise Wrong(
-                "IR-3", f"tracing {body}", "TypeError", f"{type(error).__name__}: {error}", likely
-            ) from None
-        raise Wrong("IR-3", f"tracing {body}", "TypeError", listed(found), likely)
+        call = partial(student.trace, function_of(body, "a"), ("a",))
+        refuses("IR-3", f"tracing {body}", TypeError, call, likely, listed)
 
 
 def dead(student: Any) -> None:
@@ -258,14 +203,8 @@ def dead(student: Any) -> None:
     hold("IR-2", "the numbers afterwards", same, "the same", "others", text)
     before = listed(program)
     student.live(program)
-    hold(
-        "IR-2",
-        "the program that was given",
-        listed(program) == before,
-        "no change",
-        "a change",
-        "make new nodes",
-    )
+    same = listed(program) == before
+    hold("IR-2", "the program that was given", same, "no change", "a change", "make new nodes")
 
 
 def shown(student: Any) -> None:
@@ -298,15 +237,8 @@ def reference(student: Any) -> None:
         program = student.live(traced(student, body, "pqrs"))
         found = student.evaluate(program, words)
         wanted = rng.pcg4d(*words.values())[number]
-        same = np.array_equal(found, wanted)
-        hold(
-            "RNG-1",
-            f"word {number} of refimpl/rng.py: pcg4d",
-            same,
-            number_text(wanted),
-            number_text(found),
-            "words wrap: uint32 all the way",
-        )
+        what, text = f"word {number} of refimpl/rng.py: pcg4d", "words wrap: uint32 all the way"
+        hold("RNG-1", what, np.array_equal(found, wanted), number_text(wanted), found, text)
 
 
 CHECKS = (

@@ -51,25 +51,6 @@ LONGEST, MOST = 10_000, 100
 TARGETS = ("c", "opencl", "cuda", "wgsl")
 """The languages."""
 
-MEANING: dict[str, Callable[..., Any]] = {
-    "add": np.add,
-    "subtract": np.subtract,
-    "multiply": np.multiply,
-    "divide": np.divide,
-    "negative": np.negative,
-    "absolute": np.absolute,
-    "sqrt": np.sqrt,
-    "floor": np.floor,
-    "sin": np.sin,
-    "cos": np.cos,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "less": np.less,
-    "greater": np.greater,
-    "select": np.where,
-}
-"""The operations."""
-
 A, B = Node("input", (), "a"), Node("input", (), "b")
 """The inputs of the programs."""
 
@@ -83,56 +64,53 @@ def evaluated(program: Program, given: dict[str, Any]) -> Any:
         elif node.op == "const":
             values.append(np.float32(node.value))
         else:
-            values.append(MEANING[node.op](*(values[arg] for arg in node.args)))
+            operation = np.where if node.op == "select" else getattr(np, node.op)
+            values.append(operation(*(values[arg] for arg in node.args)))
     return np.broadcast_to(values[program.output], (*SIZE, 1))
 
 
-def one(op: str, *args: int) -> Program:
-    """Return the program of one operation on a and b."""
-    return Program((A, B, Node(op, args)), 2)
+def of(*lines: str, output: int | None = None) -> Program:
+    """Return the program of operations on nodes, 0 and 1 being a and b; the output is the last one."""
+    rows = [line.split() for line in lines]
+    nodes = (A, B, *(Node(op, tuple(map(int, args))) for op, *args in rows))
+    return Program(nodes, len(nodes) - 1 if output is None else output)
 
 
 SINGLE = {
-    "add": (one("add", 0, 1), "an input is an image of its own, image_ and node.value; a sum is {0} + {1}"),
-    "subtract": (one("subtract", 1, 0), "the order of the operands: node.args"),
-    "multiply": (one("multiply", 0, 1), "{0} * {1}"),
-    "divide": (one("divide", 0, 1), "{0} / {1}"),
-    "negative": (one("negative", 0), "-{0}"),
-    "absolute": (one("absolute", 0), "fabsf in C and CUDA, fabs in OpenCL, abs in WGSL"),
-    "sqrt": (
-        Program((A, B, Node("absolute", (0,)), Node("sqrt", (2,))), 3),
-        "sqrtf in C and CUDA, sqrt elsewhere",
-    ),
-    "floor": (one("floor", 0), "floorf in C and CUDA, floor elsewhere"),
-    "sin": (one("sin", 0), "sinf in C and CUDA, sin elsewhere"),
-    "cos": (one("cos", 0), "cosf in C and CUDA, cos elsewhere"),
+    "add": (of("add 0 1"), "an input is an image of its own, image_ and node.value; a sum is {0} + {1}"),
+    "subtract": (of("subtract 1 0"), "the order of the operands: node.args"),
+    "multiply": (of("multiply 0 1"), "{0} * {1}"),
+    "divide": (of("divide 0 1"), "{0} / {1}"),
+    "negative": (of("negative 0"), "-{0}"),
+    "absolute": (of("absolute 0"), "fabsf in C and CUDA, fabs in OpenCL, abs in WGSL"),
+    "sqrt": (of("absolute 0", "sqrt 2"), "sqrtf in C and CUDA, sqrt elsewhere"),
+    "floor": (of("floor 0"), "floorf in C and CUDA, floor elsewhere"),
+    "sin": (of("sin 0"), "sinf in C and CUDA, sin elsewhere"),
+    "cos": (of("cos 0"), "cosf in C and CUDA, cos elsewhere"),
     "minimum": (
-        one("minimum", 0, 1),
+        of("minimum 0 1"),
         "{1} < {0} ? {1} : {0} in C, which has no fast fminf; fminf in CUDA, fmin in OpenCL, min in WGSL",
     ),
     "maximum": (
-        one("maximum", 0, 1),
+        of("maximum 0 1"),
         "{1} > {0} ? {1} : {0} in C, which has no fast fmaxf; fmaxf in CUDA, fmax in OpenCL, max in WGSL",
     ),
     "select": (
-        Program((A, B, Node("less", (0, 1)), Node("select", (2, 0, 1))), 3),
+        of("less 0 1", "select 2 0 1"),
         "condition ? where true : where false; in WGSL select(where false, where true, condition)",
     ),
-    "greater": (
-        Program((A, B, Node("greater", (0, 1)), Node("select", (2, 0, 1))), 3),
-        "less is <, greater is >",
-    ),
-    "an input": (Program((A, B), 1), "the output may be an input: it is program.output"),
+    "greater": (of("greater 0 1", "select 2 0 1"), "less is <, greater is >"),
+    "an input": (of(), "the output may be an input: it is program.output"),
     "a nested product": (
-        Program((A, B, Node("subtract", (0, 1)), Node("subtract", (0, 2)), Node("multiply", (3, 2))), 4),
+        of("subtract 0 1", "subtract 0 2", "multiply 3 2"),
         "a statement a node, or parentheses: a - (a - b) is not a - a - b",
     ),
     "a negative twice": (
-        Program((A, B, Node("negative", (0,)), Node("negative", (2,)), Node("subtract", (1, 3))), 4),
+        of("negative 0", "negative 2", "subtract 1 3"),
         "two signs in a row are an operator of its own: --",
     ),
     "a node that is not last": (
-        Program((A, B, Node("add", (0, 1)), Node("multiply", (0, 1))), 2),
+        of("add 0 1", "multiply 0 1", output=2),
         "the result is node program.output, not the last one",
     ),
 }

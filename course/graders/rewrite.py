@@ -14,48 +14,35 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.core.verify import verify
 from wamnet.refimpl.errors import CompileError
 
-from ..frame import Check, Wrong
+from ..frame import Check, Wrong, equal
+from ..wire import Expression
 
-FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], list[str], str]] = {
-    "a + (-b)": (
-        lambda a, b: a + (-b),
-        ["subtract"],
-        "an addition whose operand is a negation becomes a subtraction",
-    ),
-    "(-a) + b": (lambda a, b: (-a) + b, ["subtract"], "the negation may be the first operand too: b - a"),
-    "a + b": (lambda a, b: a + b, ["add"], "only additions of a negation change"),
-    "a + a * b": (
-        lambda a, b: a + a * b,
-        ["add", "multiply"],
-        "only additions of a negation change",
-    ),
-    "a - (-b)": (lambda a, b: a - (-b), ["negative", "subtract"], "only additions change, not subtractions"),
-    "(-a) * b": (lambda a, b: (-a) * b, ["multiply", "negative"], "only additions change, not products"),
-    "(-b) * (a + (-b))": (
-        lambda a, b: (-b) * (a + (-b)),
-        ["multiply", "negative", "subtract"],
-        "a negation that another node reads stays",
-    ),
-    "(a - b) * (a + (-b)) + (-(a * b))": (
-        lambda a, b: (a - b) * (a + (-b)) + (-(a * b)),
-        ["multiply", "multiply", "subtract", "subtract"],
-        "operands are those in the new program: args, not node.args",
-    ),
-    "(a + (-b)) + (-(a * b))": (
-        lambda a, b: (a + (-b)) + (-(a * b)),
-        ["multiply", "subtract", "subtract"],
-        "operands are those in the new program: args, not node.args",
-    ),
+MORE = "only additions of a negation change"
+"""The explanation of a program that has changed more."""
+
+OLD = "operands are those in the new program: args, not node.args"
+"""The explanation of operands that are those of the old program."""
+
+FUNCTIONS = {
+    "a + (-b)": ("subtract", "an addition whose operand is a negation becomes a subtraction"),
+    "(-a) + b": ("subtract", "the negation may be the first operand too: b - a"),
+    "a + b": ("add", MORE),
+    "a + a * b": ("add, multiply", MORE),
+    "a - (-b)": ("negative, subtract", "only additions change, not subtractions"),
+    "(-a) * b": ("multiply, negative", "only additions change, not products"),
+    "(-b) * (a + (-b))": ("multiply, negative, subtract", "a negation that another node reads stays"),
+    "(a - b) * (a + (-b)) + (-(a * b))": ("multiply, multiply, subtract, subtract", OLD),
+    "(a + (-b)) + (-(a * b))": ("multiply, subtract, subtract", OLD),
 }
-"""Functions, the operations that are left of each, and the likeliest mistake."""
+"""Functions, the operations that are left of each in the order of their names, and the likeliest mistake."""
 
 
 def _check(text: str) -> Callable[[Any], None]:
     """Return the check of one function."""
-    function, wanted, likely = FUNCTIONS[text]
+    wanted, likely = FUNCTIONS[text]
 
     def run(student: Any) -> None:
-        program = trace(function, {"a": Type(), "b": Type()})
+        program = trace(Expression(f"lambda a, b: {text}"), {"a": Type(), "b": Type()})
         made = student.subtract(program)
         if not isinstance(made, Program):
             raise Wrong("IR-8", text, "a program", type(made).__name__, "return rewrite(program, rule)")
@@ -65,9 +52,8 @@ def _check(text: str) -> Callable[[Any], None]:
             raise Wrong(
                 "IR-2", text, "a program that is well formed", str(error), "args, not node.args"
             ) from None
-        ops = sorted(node.op for node in found.nodes if node.op != "input")
-        if ops != wanted:
-            raise Wrong("IR-8", f"what is left of {text}", ", ".join(wanted), ", ".join(ops), likely)
+        ops = ", ".join(sorted(node.op for node in found.nodes if node.op != "input"))
+        equal("IR-8", f"what is left of {text}", ops, wanted, likely)
         numbers = np.array([0.0, -0.0, 1.5, -2.25, 1e30, np.inf], np.float32)
         a, b = (part.ravel() for part in np.meshgrid(numbers, numbers))
         before, after = (interpret(p, {"a": a, "b": b}, np.float32)["color"] for p in (program, found))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -30,7 +30,7 @@ from .shapes import Light as Light
 from .shapes import Quad as Quad
 from .shapes import Sphere as Sphere
 from .shapes.box import IDENTITY as IDENTITY
-from .shapes.shape import BLACK, OMITTED, length, spans_area
+from .shapes.shape import BLACK, OMITTED, length, require, spans_area
 from .shapes.shape import Matrix as Matrix
 from .shapes.shape import Vector as Vector
 
@@ -174,24 +174,20 @@ def _material(value: Any, path: str) -> Material:
 # -----------------------------------------------------------------------------------------------------------
 # Rules
 
-Rule = Callable[[Any], bool]
-
 
 def validate(scene: Scene) -> Scene:
     """Return the scene itself, or raise InputError with the path of the first value that breaks a rule."""
     _check_camera(scene.camera)
-    rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
-    _check(scene.background, "scene.background", _is_finite, rule, "fix the number")
-    least = "must not be negative", "use 0 or more"
-    _check(scene.background, "scene.background", _not_negative, f"radiance {least[0]}", least[1])
+    _check_finite(scene.background, "scene.background")
+    _check_light(scene.background, "scene.background", "radiance")
     if scene.environment is not None:
         _check_sky(scene.environment, scene.background)
     for path, part in _parts(scene):
-        _check_finite(part, path)
+        _check_fields(part, path)
         if not isinstance(part, Light):
-            _check(part.emission, f"{path}.emission", _not_negative, f"emission {least[0]}", least[1])
+            _check_light(part.emission, f"{path}.emission", "emission")
         if isinstance(part, Shape):
-            _check(part.reflectance, f"{path}.reflectance", _is_share, *_SHARE_RULE)
+            _check_share(part.reflectance, f"{path}.reflectance")
             _check_material(part.material, f"{path}.material", has_inside=part.closed)
         if isinstance(part, Room):
             _check_room(part, path)
@@ -219,61 +215,60 @@ def _parts(scene: Scene) -> Iterable[tuple[str, Any]]:
             yield f"scene.{kind}[{i}]", part
 
 
-def _check(value: Any, path: str, rule: Rule, says: str, way_out: str) -> None:
-    """Raise InputError unless rule(value) holds."""
-    if not rule(value):
-        raise InputError(path, value, says, way_out)
-
-
-def _check_finite(part: Any, path: str) -> None:
+def _check_fields(part: Any, path: str) -> None:
     """Refuse NaN and infinities anywhere in a primitive."""
     for f in fields(part):
-        value = getattr(part, f.name)
-        rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
-        _check(value, f"{path}.{f.name}", _is_finite, rule, "fix the number")
+        _check_finite(getattr(part, f.name), f"{path}.{f.name}")
+
+
+def _check_finite(value: Any, path: str) -> None:
+    rule = f"all values must be finite and at most {LARGEST_NUMBER:g} in magnitude"
+    require(all(abs(x) <= LARGEST_NUMBER for x in _numbers(value)), value, path, rule, "fix the number")
+
+
+def _check_light(value: Vector, path: str, what: str) -> None:
+    require(min(value) >= 0.0, value, path, f"{what} must not be negative", "use 0 or more")
+
+
+def _check_share(value: Vector, path: str) -> None:
+    rule, way_out = "a reflectance must lie in [0, 1]", "energy cannot grow: scale it down"
+    require(min(value) >= 0.0 and max(value) <= 1.0, value, path, rule, way_out)
 
 
 def _check_camera(camera: Camera) -> None:
-    _check_finite(camera, "scene.camera")
-    path, fov = "scene.camera", camera.vertical_fov_deg
-    if not 0.0 < fov < 180.0:
-        raise InputError(f"{path}.vertical_fov_deg", fov, "must lie between 0 and 180", "40 is a usual angle")
-    x, y, z = (b - a for a, b in zip(camera.position, camera.look_at, strict=True))
+    path, fov, target = "scene.camera", camera.vertical_fov_deg, camera.look_at
+    _check_fields(camera, path)
+    rule, way_out = "must lie between 0 and 180", "40 is a usual angle"
+    require(0.0 < fov < 180.0, fov, f"{path}.vertical_fov_deg", rule, way_out)
+    x, y, z = (b - a for a, b in zip(camera.position, target, strict=True))
     forward = (x, y, z)
-    if length(forward) == 0.0:
-        raise InputError(f"{path}.look_at", camera.look_at, "must differ from position", "move one of them")
-    if not spans_area(forward, camera.up):
-        raise InputError(f"{path}.up", camera.up, "must not be parallel to the view", "choose another up")
+    require(
+        length(forward) != 0.0, target, f"{path}.look_at", "must differ from position", "move one of them"
+    )
+    rule, way_out = "must not be parallel to the view", "choose another up"
+    require(spans_area(forward, camera.up), camera.up, f"{path}.up", rule, way_out)
 
 
 def _check_sky(sky: Sky, background: Vector) -> None:
-    path = "scene.environment"
-    _check_finite(sky, path)
+    path, sun, narrow = "scene.environment", sky.sun_direction, sky.sun_concentration
+    _check_fields(sky, path)
     for name in ("zenith", "horizon", "ground", "sun_irradiance"):
-        _check(
-            getattr(sky, name), f"{path}.{name}", _not_negative, "light must not be negative", "use 0 or more"
-        )
-    if length(sky.sun_direction) == 0.0:
-        raise InputError(
-            f"{path}.sun_direction", sky.sun_direction, "must not be zero", "straight up is 0, 1, 0"
-        )
-    if not 0.0 <= sky.sun_concentration <= LARGEST_CONCENTRATION:
-        rule = f"must lie in [0, {LARGEST_CONCENTRATION:g}]"
-        raise InputError(f"{path}.sun_concentration", sky.sun_concentration, rule, "1000 is a sun in haze")
-    if max(background) > 0.0:
-        rule = "an environment takes the background's place"
-        raise InputError("scene.background", background, rule, "make it 0, or remove the environment")
+        _check_light(getattr(sky, name), f"{path}.{name}", "light")
+    require(length(sun) != 0.0, sun, f"{path}.sun_direction", "must not be zero", "straight up is 0, 1, 0")
+    rule, way_out = f"must lie in [0, {LARGEST_CONCENTRATION:g}]", "1000 is a sun in haze"
+    require(0.0 <= narrow <= LARGEST_CONCENTRATION, narrow, f"{path}.sun_concentration", rule, way_out)
+    rule, way_out = "an environment takes the background's place", "make it 0, or remove the environment"
+    require(max(background) <= 0.0, background, "scene.background", rule, way_out)
 
 
 def _check_room(room: Room, path: str) -> None:
     for i, (low, high) in enumerate(zip(room.low, room.high, strict=True)):
-        if not low < high:
-            raise InputError(f"{path}.high[{i}]", high, f"must exceed low[{i}] = {low}", "swap or move them")
+        require(low < high, high, f"{path}.high[{i}]", f"must exceed low[{i}] = {low}", "swap or move them")
     for i, reflectance in enumerate(room.reflectances):
-        _check(reflectance, f"{path}.reflectances[{i}]", _is_share, *_SHARE_RULE)
-    if len(room.materials) not in (0, len(WALLS)):
-        count = f"{len(room.materials)} entries"
-        raise InputError(f"{path}.materials", count, "must be six or none", "use null for matte walls")
+        _check_share(reflectance, f"{path}.reflectances[{i}]")
+    count, rule = len(room.materials), "must be six or none"
+    way_out = "use null for matte walls"
+    require(count in (0, len(WALLS)), f"{count} entries", f"{path}.materials", rule, way_out)
     for i, material in enumerate(room.materials):
         _check_material(material, f"{path}.materials[{i}]", has_inside=False)
 
@@ -281,15 +276,11 @@ def _check_room(room: Room, path: str) -> None:
 def _check_material(material: Material | None, path: str, has_inside: bool) -> None:
     if material is None:
         return
-    if material.transmits and not has_inside:
-        rule = "light passes only into closed bodies"
-        raise InputError(path, material.kind, rule, "give it to a box or a sphere; use a thin box for a pane")
-    _check_finite(material, path)
+    rule = "light passes only into closed bodies"
+    way_out = "give it to a box or a sphere; use a thin box for a pane"
+    require(has_inside or not material.transmits, material.kind, path, rule, way_out)
+    _check_fields(material, path)
     material.check(path)
-
-
-_SHARE_RULE = ("a reflectance must lie in [0, 1]", "energy cannot grow: scale it down")
-"""Rule and way out for values that are shares of the incoming energy."""
 
 
 def _numbers(value: Any) -> Iterable[float]:
@@ -299,15 +290,3 @@ def _numbers(value: Any) -> Iterable[float]:
             yield from _numbers(item)
     elif isinstance(value, (int, float)):
         yield value
-
-
-def _is_finite(value: Any) -> bool:
-    return all(abs(x) <= LARGEST_NUMBER for x in _numbers(value))
-
-
-def _not_negative(value: Vector) -> bool:
-    return min(value) >= 0.0
-
-
-def _is_share(value: Vector) -> bool:
-    return min(value) >= 0.0 and max(value) <= 1.0

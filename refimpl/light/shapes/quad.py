@@ -38,26 +38,37 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Quad(Shape):
-    """Parallelogram corner + a edge_u + b edge_v for a, b in [0, 1]; both sides reflect and emit alike."""
-
-    kind = "quads"
+class Parallelogram:
+    """Points corner + a edge_u + b edge_v for a, b in [0, 1]."""
 
     corner: Vector
     edge_u: Vector
     edge_v: Vector
-    reflectance: Vector
-    emission: Vector = BLACK
-    material: Material | None = field(default=None, metadata=OMITTED)
 
     def check(self, path: str) -> None:
         """Refuse edges that span no area."""
-        check_edges(self, path)
+        rule, way_out = "the edges must span an area", "make it not parallel to edge_u"
+        require(spans_area(self.edge_u, self.edge_v), self.edge_v, f"{path}.edge_v", rule, way_out)
 
     @property
     def extent(self) -> Extent:
-        """The corners' least and greatest coordinates."""
-        return quad_extent(self)
+        """The corners' least and greatest coordinates; a hit's error moves an edge by 1 / sine as much."""
+        corner, u, v = (np.array(numbers, np.float64) for numbers in (self.corner, self.edge_u, self.edge_v))
+        corners = np.array([corner, corner + u, corner + v, corner + u + v])
+        area = cross(self.edge_u, self.edge_v)
+        sine = length(area) / (length(self.edge_u) * length(self.edge_v))
+        return Extent(corners.min(axis=0), corners.max(axis=0), 1.0 + 2.0 / sine)
+
+
+@dataclass(frozen=True)
+class Quad(Parallelogram, Shape):
+    """Parallelogram both of whose sides reflect and emit alike."""
+
+    kind = "quads"
+
+    reflectance: Vector
+    emission: Vector = BLACK
+    material: Material | None = field(default=None, metadata=OMITTED)
 
     @staticmethod
     def distance(row: tuple[Any, ...], origin: Points, direction: Directions) -> Floats:
@@ -78,30 +89,22 @@ class Quad(Shape):
 
 
 @dataclass(frozen=True)
-class Light:
+class Light(Parallelogram):
     """Parallelogram that emits from the side of edge_u x edge_v, and reflects nothing.
 
     `power` (W) times `color` (relative, linear RGB) is the flux that leaves it, so its radiance per channel
     is power * color / (pi * area): a Lambertian emitter.
     """
 
-    corner: Vector
-    edge_u: Vector
-    edge_v: Vector
     color: Vector
     power: float
 
     def check(self, path: str) -> None:
         """Refuse edges that span no area, and negative light."""
-        check_edges(self, path)
+        super().check(path)
         light = "use 0 or more"
         require(min(self.color) >= 0.0, self.color, f"{path}.color", "a colour must not be negative", light)
         require(self.power >= 0.0, self.power, f"{path}.power", "power must not be negative", light)
-
-    @property
-    def extent(self) -> Extent:
-        """The corners' least and greatest coordinates."""
-        return quad_extent(self)
 
 
 @dataclass(frozen=True)
@@ -118,13 +121,7 @@ class QuadGroup(Rows):
         return facing(vectors.look_up_rows(met.fronts, met.surface), met.direction)
 
 
-def check_edges(quad: Quad | Light, path: str) -> None:
-    """Refuse edges that span no area."""
-    rule, way_out = "the edges must span an area", "make it not parallel to edge_u"
-    require(spans_area(quad.edge_u, quad.edge_v), quad.edge_v, f"{path}.edge_v", rule, way_out)
-
-
-def quad_row(quad: Quad | Light) -> tuple[Any, ...]:
+def quad_row(quad: Parallelogram) -> tuple[Any, ...]:
     """Return corner, dual edges and unit normal: (p - corner) . dual is p's coordinate along the edge."""
     u, v = np.array(quad.edge_u, np.float64), np.array(quad.edge_v, np.float64)
     normal = vectors.cross(u, v)
@@ -133,16 +130,7 @@ def quad_row(quad: Quad | Light) -> tuple[Any, ...]:
     return np.array(quad.corner, np.float64), dual_u, dual_v, normal / np.sqrt(square)
 
 
-def quad_extent(quad: Quad | Light) -> Extent:
-    """Return where a quad is; a hit's error across an edge moves its ends by 1 / sine as much."""
-    corner, u, v = (np.array(numbers, np.float64) for numbers in (quad.corner, quad.edge_u, quad.edge_v))
-    corners = np.array([corner, corner + u, corner + v, corner + u + v])
-    area = cross(quad.edge_u, quad.edge_v)
-    sine = length(area) / (length(quad.edge_u) * length(quad.edge_v))
-    return Extent(corners.min(axis=0), corners.max(axis=0), 1.0 + 2.0 / sine)
-
-
-def quad_area_pdf(quad: Quad | Light) -> float:
+def quad_area_pdf(quad: Parallelogram) -> float:
     """Return 1 / area of a quad."""
     normal = np.cross(np.array(quad.edge_u, np.float64), np.array(quad.edge_v, np.float64))
     return float(1.0 / np.sqrt(normal @ normal))

@@ -46,13 +46,11 @@ class Geometry:
 
     dtype: Any
     room: tuple[Any, Any] | None
-    room_id: int
     groups: tuple[Group, ...]
     reflectance: Any
     emission: Any
     one_sided: Any
     light: Any
-    background: Any
 
     @property
     def nothing(self) -> int:
@@ -105,13 +103,11 @@ def build(scene: Scene, dtype: DTypeLike = np.float32) -> Geometry:
     return Geometry(
         dtype=np.dtype(dtype),
         room=None if scene.room is None else (constant(scene.room.low), constant(scene.room.high)),
-        room_id=0,
         groups=tuple(groups),
         reflectance=constant([row.reflectance for row in rows]),
         emission=constant([row.emission for row in rows]),
         one_sided=np.array(light) >= 0,
         light=np.array(light, np.int32),
-        background=constant(scene.background),
     )
 
 
@@ -166,7 +162,7 @@ def closest_hit(geometry: Geometry, origin: Points, direction: Directions) -> Hi
     surface = np.full_like(direction[..., 0], geometry.nothing, dtype=np.int32)
     t, surface = fold_distances(geometry, origin, direction, nearer, (t, surface))
     if geometry.room is not None:
-        surface = np.where(surface == geometry.room_id, _wall(geometry, origin, direction), surface)
+        surface = np.where(surface == 0, _wall(geometry, origin, direction), surface)
     return Hit(t, surface)
 
 
@@ -201,7 +197,7 @@ def fold_distances(
     """
     if geometry.room is not None:
         t_room = room_distance(*_room_slabs(geometry, origin, direction))
-        values = take(values, t_room, np.int32(geometry.room_id))
+        values = take(values, t_room, np.int32(0))
     for group in geometry.groups:
         values = group.fold(origin, direction, take, values, reach)
     return values
@@ -220,8 +216,8 @@ def _wall(geometry: Geometry, origin: Points, direction: Directions) -> Ids:
     x_id, y_id, z_id = (
         np.where(
             direction[..., i] > 0.0,
-            np.int32(geometry.room_id + 2 * i + 1),
-            np.int32(geometry.room_id + 2 * i),
+            np.int32(2 * i + 1),
+            np.int32(2 * i),
         )
         for i in range(3)
     )

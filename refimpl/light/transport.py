@@ -198,10 +198,7 @@ def _build_lights(scene: Scene, dtype: DTypeLike, share: float) -> Lights:
     share is the probability that any of them is picked, and not the sky.
     """
     lights = scene.lights
-    edge_u, edge_v = (
-        np.array([light.edge_u for light in lights]),
-        np.array([light.edge_v for light in lights]),
-    )
+    edge_u, edge_v = (np.array([getattr(light, edge) for light in lights]) for edge in ("edge_u", "edge_v"))
     normal = vectors.normalize(vectors.cross(edge_u, edge_v))
     weight = np.array([light.power * sum(light.color) for light in lights], np.float64)
     cumulative = np.cumsum(weight) / np.sum(weight)
@@ -351,7 +348,6 @@ def unshadowed(world: World, surface: Surface) -> Radiance:
     if world.lights is None:
         return vectors.vector(black, black, black)
     lights = world.lights
-    middle = lights.corner + (lights.edge_u + lights.edge_v) / 2
 
     def add(
         values: tuple[Any, ...], middle: Points, normal: Normals, radiance: Radiance, area: Floats
@@ -360,7 +356,8 @@ def unshadowed(world: World, surface: Surface) -> Radiance:
         factor = _disk(world, surface, middle, normal, area)
         return tuple(value + factor * radiance[..., i] for i, value in enumerate(values))
 
-    tables = middle, lights.normal, lights.radiance, lights.area
+    _, middle, normal, area = _lamp_tables(lights)
+    tables = middle, normal, lights.radiance, area
     irradiance = vectors.fold_rows(add, tables, (black, black, black))
     light: Radiance = surface.reflectance * vectors.vector(*irradiance) * world.geometry.dtype.type(1 / np.pi)
     return light
@@ -494,11 +491,8 @@ def _towards(world: World, site: Site, origin: Points, u_pick: Floats, u0: Float
         return _towards_sky(world, site, u_pick, u0, u1)
     is_sky = u_pick < SKY_SHARE
     rest = np.where(is_sky, u_pick / SKY_SHARE, (u_pick - SKY_SHARE) / (1.0 - SKY_SHARE))
-    sky, light = (
-        _towards_sky(world, site, rest, u0, u1),
-        _towards_light(world, site, origin, rest, u0, u1),
-    )
-    return _either(is_sky, sky, light)
+    sky = _towards_sky(world, site, rest, u0, u1)
+    return _either(is_sky, sky, _towards_light(world, site, origin, rest, u0, u1))
 
 
 def _either(is_sky: Truths, sky: Towards, light: Towards) -> Towards:

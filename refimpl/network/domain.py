@@ -229,9 +229,8 @@ def from_json(text: str) -> Domain:
             rule = f"must have {len(STATISTICS)} rows of {channels} numbers"
             raise InputError(f"{DOMAIN}.{name}", rows, rule, WAY_OUT)
     least = min(number for row in domain.scale for number in row)
-    limits = {"scale": (least, 0.0), "threshold": (domain.threshold, 0.0), "rate": (domain.rate, 0.0)}
-    for name, (number, low) in limits.items():
-        if not low < number < math.inf:
+    for name, number in {"scale": least, "threshold": domain.threshold, "rate": domain.rate}.items():
+        if not 0.0 < number < math.inf:
             raise InputError(f"{DOMAIN}.{name}", number, "must be positive", WAY_OUT)
     return domain
 

@@ -35,9 +35,7 @@ from ...kernels.devices.kernel import Part
 from ...kernels.run.denoise_on import denoise_on
 from ...kernels.run.render_on import render_on
 from ...refimpl.errors import CompileError
-from ...refimpl.frame import LAYERS
 from ...refimpl.light import scene as scene_module
-from ...refimpl.light.render import Job
 from ...refimpl.light.transport import Settings
 from ...refimpl.network.whole import INPUT_LEVELS, Whole
 from ...refimpl.network.window import Window
@@ -48,6 +46,7 @@ from .kinds.files import model_from
 from .kinds.images import frame_of
 from .kinds.network import layers, network_from
 from .kinds.paths import VERTEX
+from .kinds.pictures import rendered
 from .numbers import from_json
 
 Own = Callable[[Mapping[str, Any]], Mapping[str, Any]]
@@ -61,7 +60,8 @@ class OnExecutor:
         self.executor = executor
         self._own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
         if language_named(executor.name).paths:
-            self._own |= {"path.whole": self._vertices, "picture.rendered": self._rendered}
+            how = partial(render_on, executor)
+            self._own |= {"path.whole": self._vertices, "picture.rendered": partial(rendered, how=how)}
         self.kinds = [*FUNCTIONS, *self._own]
         self._compiled, self._programs = cache(self._compile), cache(self._lowered)
         self._path_kernel = cache(self._compile_path)
@@ -117,10 +117,9 @@ class OnExecutor:
 
     def _denoised(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return a denoised picture."""
-        frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
         model = model_from(base64.b64decode(inputs["model"]))
         schedule = None if self.executor.name in DENOISERS else PLAIN
-        return {"picture": denoise_on(self.executor, model, frame, schedule).image}
+        return {"picture": denoise_on(self.executor, model, frame_of(inputs), schedule).image}
 
     def _whole(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return what each layer of a network of integers gives, from kernels of a window of one pixel."""
@@ -140,13 +139,6 @@ class OnExecutor:
                 picture = self.executor.run(self._kernel(program, self.executor.profile), pixel)
                 found.setdefault(name, []).extend(picture[0, 0].tolist())
         return {name: np.array(values) for name, values in found.items()}
-
-    def _rendered(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Return mean and variance of each pixel."""
-        width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
-        job = Job(width, height, spp, seed, Settings(**inputs["settings"]))
-        found = render_on(self.executor, scene_module.from_json(inputs["scene"]), job)
-        return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
     def _compile(self, kind: str, profile: str) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""

@@ -45,9 +45,9 @@ UNIT = 2.0**-53
 # ---- features ---------------------------------------------------------------------------------------------
 
 
-def frame_of(layers: Mapping[str, Any]) -> Frame:
-    """Return a frame from layers that came as JSON numbers."""
-    return Frame({name: np.asarray(values, np.float64) for name, values in layers.items()})
+def frame_of(inputs: Mapping[str, Any]) -> Frame:
+    """Return the frame of a case, whose layers came as JSON numbers."""
+    return Frame({name: np.asarray(inputs[name], np.float64) for name in LAYERS if name in inputs})
 
 
 def normalization_of(inputs: Mapping[str, Any]) -> Normalization:
@@ -61,7 +61,7 @@ def normalization_of(inputs: Mapping[str, Any]) -> Normalization:
 
 def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the feature image."""
-    frame = frame_of({name: inputs[name] for name in LAYERS if name in inputs})
+    frame = frame_of(inputs)
     validate(frame, finite=False)
     names = tuple(str(inputs["features"]).split(","))
     return {"image": dataset.feature_image(frame, names, normalization_of(inputs))}
@@ -72,10 +72,10 @@ def _features(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 def _smoothed(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return colour after some levels."""
-    layers = frame_of({name: inputs[name] for name in ("color", *smoothing.GUIDES, smoothing.DEPTH)}).layers
-    validate(Frame(layers), finite=False)
-    guides = {name: layer for name, layer in layers.items() if name != "color"}
-    return {"color": smoothing.smooth(layers["color"], guides, int(inputs["levels"]))}
+    frame = frame_of(inputs)
+    validate(frame, finite=False)
+    guides = {name: frame[name] for name in (*smoothing.GUIDES, smoothing.DEPTH)}
+    return {"color": smoothing.smooth(frame["color"], guides, int(inputs["levels"]))}
 
 
 def _bound_of(inputs: Mapping[str, Any], _value: Any) -> Any:

@@ -247,24 +247,20 @@ def _forward_whole(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _rounded(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a network in integers."""
-    return _in_order(whole.rounded(network_of(inputs), int(inputs["size"]), int(inputs["amplitude"])))
+    """Return a network in integers, which may be rounded on windows.
 
-
-def _in_order(network: Whole) -> dict[str, Any]:
-    """Return what a network holds: first what the weights depend on, and those of the first layer last."""
+    First is what the weights depend on, and those of the first layer are last.
+    """
+    siren, size, amplitude = network_of(inputs), int(inputs["size"]), int(inputs["amplitude"])
+    if "windows" in inputs:
+        network = whole.rounded_on(siren, np.asarray(inputs["windows"], np.float64), size, amplitude)
+    else:
+        network = whole.rounded(siren, size, amplitude)
     found: dict[str, Any] = {"fraction": network.fraction}
     for name, arrays in zip(PARTS, (network.weights, network.factors, network.biases), strict=True):
         found |= {f"{name}_{layer}": integers(array) for layer, array in enumerate(arrays)}
     order = sorted(found, key=lambda name: (name.startswith("weight_"), name == "weight_0"))
     return {name: found[name] for name in order}
-
-
-def _rounded_on(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a network in integers that was rounded on windows."""
-    windows = np.asarray(inputs["windows"], np.float64)
-    size, amplitude = int(inputs["size"]), int(inputs["amplitude"])
-    return _in_order(whole.rounded_on(network_of(inputs), windows, size, amplitude))
 
 
 KINDS = (
@@ -276,6 +272,6 @@ KINDS = (
     kind("whole.sine", _sine, exact(INTEGERS)),
     kind("whole.forward", _forward_whole, exact(INTEGERS)),
     kind("whole.rounded", _rounded, exact(INTEGERS)),
-    kind("whole.rounded_on", _rounded_on, exact(CHOSEN)),
+    kind("whole.rounded_on", _rounded, exact(CHOSEN)),
 )
 """The kinds of this module."""

@@ -11,7 +11,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,9 +22,10 @@ from ....compiler.core.lower import lower
 from ....compiler.core.profiles import EMITTED_SINE
 from ....compiler.plan import analysed
 from ....compiler.proof import bounds
-from ....refimpl.frame import LAYERS, Frame, validate
+from ....refimpl.frame import validate
 from ....refimpl.light import scene as scene_module
-from ....refimpl.light.render import Job, render
+from ....refimpl.light.render import Job, Render, render
+from ....refimpl.light.scene import Scene
 from ....refimpl.network import dataset, denoise
 from ....refimpl.network.window import all_windows, pad
 from ..case import Output, within
@@ -48,21 +51,16 @@ ROUNDED = 2.0**-22
 """What a mean may be off by for its sum and its rounding to float32, relative: few samples are added."""
 
 
-def _layers(inputs: Mapping[str, Any]) -> Frame:
-    """Return the frame of a case."""
-    return frame_of({name: inputs[name] for name in LAYERS if name in inputs})
-
-
 def _denoise(inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the denoised picture."""
-    frame = _layers(inputs)
+    frame = frame_of(inputs)
     validate(frame, finite=False)
     return {"picture": denoise.denoise(model_from(base64.b64decode(inputs["model"])), frame, np.float64)}
 
 
 def _of_denoised(inputs: Mapping[str, Any], picture: Any) -> Any:
     """Return the bound (H, W, 3) of a picture."""
-    model, frame = model_from(base64.b64decode(inputs["model"])), _layers(inputs)
+    model, frame = model_from(base64.b64decode(inputs["model"])), frame_of(inputs)
     program = analysed(lower(model))
     image = dataset.feature_image(frame, model.features, model.normalization).astype(np.float64)
     windows = all_windows(pad(image, model.window), model.window)
@@ -72,11 +70,11 @@ def _of_denoised(inputs: Mapping[str, Any], picture: Any) -> Any:
     return np.maximum(found.high - picture, picture - found.low) + found.read
 
 
-def _render(inputs: Mapping[str, Any], dtype: str = "float32") -> dict[str, Any]:
-    """Return mean and variance of each pixel."""
+def rendered(inputs: Mapping[str, Any], how: Callable[[Scene, Job], Render]) -> dict[str, Any]:
+    """Return mean and variance of each pixel of a case."""
     width, height, spp, seed = (int(inputs[name]) for name in ("width", "height", "spp", "seed"))
-    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]), dtype)
-    found = render(scene_module.from_json(inputs["scene"]), job)
+    job = Job(width, height, spp, seed, paths.settings_of(inputs["settings"]))
+    found = how(scene_module.from_json(inputs["scene"]), job)
     return {"mean": found.frame["color"], "variance": found.color_variance, "spp": job.spp}
 
 
@@ -84,7 +82,7 @@ def _of_rendered(inputs: Mapping[str, Any], wanted: Any, told: Mapping[str, Any]
     """Return the means of blocks, as large as the file says, and what the test needs."""
     block_px = int(told["mean"]["welch"]["block"])
     seed = REFERENCE_SEED + int(inputs["seed"])
-    found = _render({**inputs, "spp": REFERENCE_SPP, "seed": seed})
+    found = rendered({**inputs, "spp": REFERENCE_SPP, "seed": seed}, render)
     mean, variance = mean_and_variance(found["mean"].astype(np.float64), found["variance"], block_px)
     welch = {
         "variance": variance,
@@ -96,11 +94,6 @@ def _of_rendered(inputs: Mapping[str, Any], wanted: Any, told: Mapping[str, Any]
     }
     text = f"Welch's test of block means, significance {SIGNIFICANCE:g} in all"
     return {"mean": Output(mean, 0.0, text, (), welch)}
-
-
-def _exact(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return mean and variance of each pixel in float64."""
-    return _render(inputs, "float64")
 
 
 def _of_exact(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -> dict[str, Output]:
@@ -127,7 +120,11 @@ def _of_exact(inputs: Mapping[str, Any], wanted: Mapping[str, Any], told: Any) -
 
 KINDS = (
     kind("picture.denoised", _denoise, within(_of_denoised, AT_PIXELS)),
-    kind("picture.exact", _exact, _of_exact),
-    kind("picture.rendered", _render, _of_rendered),
+    kind(
+        "picture.exact",
+        partial(rendered, how=lambda scene, job: render(scene, replace(job, dtype="float64"))),
+        _of_exact,
+    ),
+    kind("picture.rendered", partial(rendered, how=render), _of_rendered),
 )
 """The kinds of this module."""

@@ -188,22 +188,11 @@ FIRST_HITS = _features(
 )
 """Features of colour and of the first hit; a new one is one line here and one `encode_*` function."""
 
+LIT_FORMULA = "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA
+"""The formula of direct light with shadows."""
+
 PAST = "past mirrors and glass: "
 """How the formulas of features begin that are of what is seen there."""
-
-PICTURES_BEFORE = _features(
-    {
-        "history": (
-            encode_color,
-            "mean with the pictures before, where each surface was: " + DISPLAY_FORMULA,
-        ),
-        "history_weight": (
-            encode_share,
-            "share of the pictures before in that mean, 1 - 1 / (number of its samples); 0 where it is new",
-        ),
-    }
-)
-"""Features of a picture that follows others (light/history.py)."""
 
 FEATURES: Mapping[str, Feature] = {
     **FIRST_HITS,
@@ -211,29 +200,32 @@ FEATURES: Mapping[str, Feature] = {
         seen: replace(FIRST_HITS[first], name=seen, layer=seen, formula=PAST + FIRST_HITS[first].formula)
         for seen, first in FIRST_HIT.items()
     },
-    **_features({"seen_emission": (encode_color, PAST + "emission, " + DISPLAY_FORMULA)}),
-    **PICTURES_BEFORE,
     **_features(
         {
-            f"{past}smoothed": (
+            "seen_emission": (encode_color, PAST + "emission, " + DISPLAY_FORMULA),
+            "history": (
                 encode_color,
-                f"color smoothed, guided by {', '.join(guides.values())} (spec/smoothing.md); "
-                + DISPLAY_FORMULA,
-                "color",
-                guides,
-            )
-            for past in ("", "seen_")
-            for guides in [{guide: past + guide for guide in (*GUIDES, DEPTH)}]
-        }
-    ),
-    **_features(
-        {
-            SUN: (encode_signed, "unit direction in world space towards the sun"),
-            DIRECT: (encode_color, "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA),
-            SEEN_DIRECT: (
-                encode_color,
-                PAST + "emission, and unshadowed with its shadows: " + DISPLAY_FORMULA,
+                "mean with the pictures before, where each surface was: " + DISPLAY_FORMULA,
             ),
+            "history_weight": (
+                encode_share,
+                "share of the pictures before in that mean, 1 - 1 / (number of its samples); "
+                "0 where it is new",
+            ),
+            **{
+                f"{past}smoothed": (
+                    encode_color,
+                    f"color smoothed, guided by {', '.join(guides.values())} (spec/smoothing.md); "
+                    + DISPLAY_FORMULA,
+                    "color",
+                    guides,
+                )
+                for past in ("", "seen_")
+                for guides in [{guide: past + guide for guide in (*GUIDES, DEPTH)}]
+            },
+            SUN: (encode_signed, "unit direction in world space towards the sun"),
+            DIRECT: (encode_color, LIT_FORMULA),
+            SEEN_DIRECT: (encode_color, PAST + LIT_FORMULA),
         }
     ),
 }

@@ -19,13 +19,12 @@ from wamnet.compiler.scenes.encode_kernel import (
     planes_of,
 )
 from wamnet.refimpl.errors import CompileError, InputError
-from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, PICTURES_BEFORE, Normalization, encode_sums
+from wamnet.refimpl.frame import HISTORY
+from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, Normalization, encode_sums
 
 SCALES = Normalization(0.5, 12.0, (0.1, -0.2, 0.3), 6.0)
 ALL = tuple(FIRST_HITS)
-OF_ONE_PICTURE = tuple(
-    f.name for f in FEATURES.values() if f.name not in (*PICTURES_BEFORE, "sun") and not f.guides
-)
+OF_ONE_PICTURE = tuple(f.name for f in FEATURES.values() if f.name not in (*HISTORY, "sun") and not f.guides)
 
 
 def sums_of(samples, seed=1):
@@ -149,7 +148,7 @@ def test_refusals():
         compile_encode(ALL, SCALES, "opencl", "fast")
 
 
-@pytest.mark.parametrize("name", PICTURES_BEFORE)
+@pytest.mark.parametrize("name", HISTORY)
 def test_features_of_pictures_before_are_refused(name):
     """HIS-7: a path kernel makes no history."""
     with pytest.raises(InputError, match=f"features '{name}': a path kernel computes layers of one frame"):

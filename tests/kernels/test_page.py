@@ -11,6 +11,7 @@ import pytest
 from wamnet.compiler.plan import Expected
 from wamnet.kernels.run import page as P
 from wamnet.refimpl.errors import CompileError, InputError
+from wamnet.refimpl.frame import HISTORY
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.scene import Sphere
 from wamnet.refimpl.light.transport import Settings
@@ -23,7 +24,7 @@ SETTINGS = Settings(max_depth=1)
 OF_ONE_PICTURE = tuple(
     name
     for name, feature in dataset.FEATURES.items()
-    if name not in (*dataset.PICTURES_BEFORE, "sun", "direct") and not feature.guides
+    if name not in (*HISTORY, "sun", "direct") and not feature.guides
 )
 SCALES = dataset.Normalization(0.0, 12.0, (0.0, 0.0, 0.0), 6.0)
 

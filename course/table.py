@@ -61,8 +61,7 @@ def findings(students: Sequence[Student]) -> str:
         for result in student.results:
             for name, wrong in result.checks:
                 if wrong is not None:
-                    told = (wrong.clause, wrong.what, wrong.expected, wrong.found, wrong.likely)
-                    rows.append([student.name, result.lab.name, name, *told])
+                    rows.append([student.name, result.lab.name, name, *wrong.args])
     return _csv(rows)
 
 

@@ -74,7 +74,7 @@ def write_together(contents: dict[Path, bytes]) -> None:
 
 
 @contextmanager
-def making_parents(folder: Path, mode: int = 0o777) -> Iterator[None]:
+def making_parents(folder: Path) -> Iterator[None]:
     """Make a folder and those above it; when the block fails, those go again that it has left empty."""
     made: list[Path] = []
     try:
@@ -83,7 +83,7 @@ def making_parents(folder: Path, mode: int = 0o777) -> Iterator[None]:
                 made.append(each)
                 # Another process may have made it meanwhile: then it is not ours to remove.
                 try:
-                    each.mkdir(mode)
+                    each.mkdir()
                 except FileExistsError:
                     made.pop()
                     if not each.is_dir():

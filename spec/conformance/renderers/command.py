@@ -123,13 +123,8 @@ def _write_scenes(folder: Path, form: str, questions: Sequence[Question]) -> Non
     check_new_folder(folder)
     answers = [
         {"name": q.name, "rule": q.rule, "scene": q.shot.name, "layer": q.layer, "block": q.block}
-        | {
-            "answer": expected(q, FORMATS[form].intents)[0],
-            "source": q.source,
-            "slack": q.slack * q.scale,
-            "size": q.shot.size,
-        }
-        | {"samples": q.shot.spp, "depth": q.shot.depth}
+        | {"answer": expected(q, FORMATS[form].intents)[0], "source": q.source, "slack": q.slack * q.scale}
+        | {"size": q.shot.size, "samples": q.shot.spp, "depth": q.shot.depth}
         for q in questions
     ]
     written, silent = 0, []

@@ -368,18 +368,8 @@ def forms() -> Any:
         trim_blocks=True,
         keep_trailing_newline=True,
     )
-    functions: list[Any] = [
-        parts_of,
-        meshes_of,
-        sky_of,
-        arrays_of,
-        frame_of,
-        axes_of,
-        matrix_of,
-        request_of,
-        levels_of,
-    ]
-    functions += [physical, refuse, math.radians, math.sqrt, tuple]
+    functions: list[Any] = [parts_of, meshes_of, sky_of, arrays_of, frame_of, axes_of, matrix_of, request_of]
+    functions += [levels_of, physical, refuse, math.radians, math.sqrt, tuple]
     found.globals |= {each.__name__: each for each in functions}
     found.policies["json.dumps_kwargs"] = {"allow_nan": False}
     found.filters |= {"numbers": text, "mirrored": mirrored, "any": any}

@@ -27,22 +27,9 @@ SCHEMA = "wamnet-verify-1"
 def entry(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict for JSON, but for numbers that it does not know."""
     question = verdict.question
-    return {
-        "name": question.name,
-        "rule": verdict.rule,
-        "layer": question.layer,
-        "source": question.source,
-        "shot": question.shot.name,
-        "state": verdict.state,
-        "mean": verdict.mean,
-        "answer": verdict.answer,
-        "half_width": verdict.half_width,
-        "p": verdict.p,
-        "detects": verdict.detects,
-        "note": verdict.note,
-        "profile": verdict.profile,
-        "confirmed": verdict.confirmed,
-    }
+    found = {name: value for name, value in vars(verdict).items() if name != "question"}
+    about = {"name": question.name, "rule": verdict.rule, "layer": question.layer, "source": question.source}
+    return {**about, "shot": question.shot.name, **found}
 
 
 def to_json(renderer: str, verdicts: Sequence[Verdict], about: Mapping[str, Any]) -> str:

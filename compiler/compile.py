@@ -27,7 +27,7 @@ from .core import ir
 from .core.enclosure import round_up as round_up
 from .core.ir import OUTPUT_ENCODING, Image, Program
 from .core.passes import pipeline
-from .core.profiles import Profile, SineContract
+from .core.profiles import SineContract
 from .core.sums import is_split
 from .languages.dialect import NOTHING, Dialect
 from .languages.listing import Listing, listed
@@ -69,7 +69,7 @@ CALLED = "arguments"
 
 def assemble(
     title: str,
-    profile: Profile,
+    language: Language,
     renderer: Renderer,
     programs_by_name: Sequence[tuple[str, Program]],
     entries: Sequence[Entry],
@@ -104,7 +104,7 @@ def assemble(
         "target": dialect.target,
         "language": dialect.language,
         "entry_point": entry,
-        "profile": {"name": profile.name, "text": profile.text},
+        "profile": language.profile.facts,
         "arguments": arguments,
         "bound": None,
         "files": {name: ir.sha256(data) for name, data in files.items()},
@@ -125,10 +125,10 @@ def header(title: str, dialect: Dialect, entries: Sequence[Entry]) -> list[str]:
 
 
 def compile_program(
-    program: Program, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
+    program: Program, language: Language | str, schedule: str = PLAIN, rank: int = 0
 ) -> Artifact:
     """Return the kernel of a program that reads a window and writes one output [`plan_program`]."""
-    return compile_plan(plan_program(program, language, profile, schedule, rank))
+    return compile_plan(plan_program(program, language, schedule, rank))
 
 
 def compile_plan(plan: Plan) -> Artifact:
@@ -201,7 +201,7 @@ def _of_one_pass(plan: Plan, bound: Bound, notes: Sequence[Entry] = (), part: st
     is_ordered = bound.output is not None and not bound.exact
     found = assemble(
         "denoiser",
-        plan.profile,
+        plan.target,
         schedule.renderer(emitted, is_ordered),
         [("", emitted)],
         [*_entries(plan, bound), *notes, ("weights", textwrap.wrap(places, WIDE))],
@@ -238,7 +238,7 @@ def _entries(plan: Plan, bound: Bound) -> list[Entry]:
         ("window", [f"{rows} x {columns} pixels, the pixel itself is tap {tap}"]),
         ("border", [gather.window.border]),
         ("output", [f"{channels} channels" + (f", {encoding}" if encoding else "")]),
-        ("profile", [f"{plan.profile.name}: {plan.profile.text}"]),
+        ("profile", [": ".join(plan.profile.facts.values())]),
         ("sine", [WHOLE_SINE if bound.exact else plan.sine.text]),
         ("bound", [_bound_text(bound, program)]),
         ("assumes", assumes),

@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..refimpl.errors import CompileError
-from .core import profiles
 from .core.interpret import interpret
 from .core.ir import Program
 from .core.passes import pipeline
@@ -86,7 +85,6 @@ class Plan:
 
     analysed: Program
     target: Language
-    profile: Profile
     asked: str = PLAIN
     cut: Cut | None = None
     proves: bool = True
@@ -106,10 +104,15 @@ class Plan:
         found: Model = self.varied.model
         return found
 
-    @cached_property
+    @property
+    def profile(self) -> Profile:
+        """Return the numerical profile."""
+        return self.target.profile
+
+    @property
     def sine(self) -> SineContract:
         """Return what is promised of a sine."""
-        return self.target.sine(self.profile)
+        return self.target.sine
 
     @cached_property
     def emitted(self) -> Program:
@@ -138,7 +141,7 @@ class Plan:
         if self.cut is None:
             return (self,)
         return tuple(
-            Plan(part, self.target, self.profile, self.asked, proves=self.proves)
+            Plan(part, self.target, self.asked, proves=self.proves)
             for part in (self.cut.horizontal, self.cut.vertical)
         )
 
@@ -249,19 +252,12 @@ def analysed(program: Program) -> Program:
     return pipeline.run(program, pipeline.COMMON)
 
 
-def sine_contract(profile: str, language: Language | str) -> SineContract:
-    """Return what is promised of a sine under this profile on this target."""
-    return language_named(language).sine(profiles.profile_named(profile))
-
-
-def plan_program(
-    program: Program, language: Language | str, profile: str = "ieee", schedule: str = PLAIN, rank: int = 0
-) -> Plan:
+def plan_program(program: Program, language: Language | str, schedule: str = PLAIN, rank: int = 0) -> Plan:
     """Return the plan of a program that reads a window and writes one output, or refuse it.
 
     With a `rank` the first layer is cut to it, and there are two kernels [factor.py].
     """
-    chosen, promised = language_named(language), profiles.profile_named(profile)
+    chosen = language_named(language)
     if kernel_gather(program).whole and rank:
         raise CompileError(f"rank {rank}: needs a float network, not an integer one (leave it out)")
     common = analysed(program)
@@ -273,7 +269,7 @@ def plan_program(
             "no such limit"
         )
     cut = factor(common, rank, dialect.channels_per_result) if rank else None
-    return Plan(common, chosen, promised, schedule, cut)
+    return Plan(common, chosen, schedule, cut)
 
 
 def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:

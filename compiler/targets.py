@@ -12,7 +12,7 @@ from typing import Any
 
 from ..refimpl.errors import CompileError, choice
 from .core.loops import USUAL, Forms
-from .core.profiles import Profile, SineContract
+from .core.profiles import IEEE, Profile, SineContract, profile_named
 from .kernel.interface import BLOCK, PATH, TABLE
 from .languages.c import C
 from .languages.cuda import CUDA
@@ -45,7 +45,7 @@ class Language:
     `paths` are the numbers of paths that path kernels follow at once, none where there are no path kernels,
     and `forms` says what becomes of a scene's primitives. `planes`: for how many pixels in a work item there
     are kernels of the edge-avoiding filter; with 1 there is a history. `runs`: whether an executor of the
-    registry runs them, and whether the demo shows it.
+    registry runs them, and whether the demo shows it. `profile`: the numerical profile of the kernels.
     """
 
     dialect: Dialect
@@ -54,6 +54,7 @@ class Language:
     planes: tuple[int, ...] = ()
     forms: Forms = USUAL
     runs: str = ""
+    profile: Profile = IEEE
 
     @property
     def name(self) -> str:
@@ -70,13 +71,23 @@ class Language:
         """Return whether there are kernels that encode features."""
         return PATH in self.dialect.entries
 
-    def sine(self, profile: Profile) -> SineContract:
-        """Return what is promised of a sine under a profile."""
-        return profile.sine or self.dialect.native_sine
+    @property
+    def sine(self) -> SineContract:
+        """Return what is promised of a sine."""
+        return self.profile.sine or self.dialect.native_sine
+
+    def under(self, name: str) -> Language:
+        """Return the language under another numerical profile."""
+        return self if name == self.profile.name else replace(self, profile=profile_named(name))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
-        return language_named, (self.name,)
+        return _under, (self.name, self.profile.name)
+
+
+def _under(name: str, profile_name: str) -> Language:
+    """Return the language of a target under a profile."""
+    return language_named(name).under(profile_name)
 
 
 TILES = {

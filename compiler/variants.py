@@ -44,7 +44,7 @@ from .proof import bounds
 from .proof.bounds import Enclosure
 from .schedules.common import kernel_gather
 from .schedules.schedules import PLAIN
-from .targets import Language
+from .targets import Language, language_named
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -466,7 +466,8 @@ def plan_model(
 ) -> Plan:
     """Return the plan of a model, or of a variant of it; `profile` may get the variant's sine."""
     varied = vary(parse(variant), model)
-    found = plan_program(lower(varied.model), language, varied.profile(profile), schedule, varied.rank)
+    chosen = language_named(language).under(varied.profile(profile))
+    found = plan_program(lower(varied.model), chosen, schedule, varied.rank)
     return replace(found, varied=varied)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .compiler import artifact as artifacts
 from .compiler.artifact import Artifact
 from .compiler.core import ir
-from .compiler.targets import ALIASES, LANGUAGES
+from .compiler.targets import ALIASES, LANGUAGES, language_named
 from .refimpl.errors import InputError, WamnetError, choice
 
 PLAIN = "plain"
@@ -127,4 +127,6 @@ class Function:
         """Compile to a kernel; `target`, `profile` and `schedule` are those of `wamnet.compile`."""
         from .compiler.compile import compile_program
 
-        return Kernel(compile_program(self.program, target_of(target), profile, schedule))
+        return Kernel(
+            compile_program(self.program, language_named(target_of(target)).under(profile), schedule)
+        )

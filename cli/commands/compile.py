@@ -52,7 +52,9 @@ class OfScene:
         if self.sampler is not None:
             settings = replace(settings, sampler=self.sampler)
         programs = lower_scene.lower_scene(scene, settings, language.forms)
-        return compile_path(programs, language, network.profile, 1 if self.lanes is None else self.lanes)
+        return compile_path(
+            programs, language.under(network.profile), 1 if self.lanes is None else self.lanes
+        )
 
 
 def compile_model(
@@ -172,15 +174,15 @@ def listing(
     """Print a kernel interleaved with the lines of the reference that it came from."""
     if output is not None:
         check_output(output, inputs=[Path(model)])
-    language = language_named(target)
+    language = language_named(target).under(profile)
     if is_scene(model):
         scene = load_scene(model, None, [])
         programs = lower_scene.lower_scene(scene, Settings(), language.forms, keep_places=True)
-        path_kernel = compile_path(programs, language, profile)
+        path_kernel = compile_path(programs, language)
         lines = lines_of(path_kernel.source, path_kernel.programs.parts)
     else:
         program = lower(load_model(Path(model), imported=True), keep_places=True)
-        kernel = compile_program(program, language, profile)
+        kernel = compile_program(program, language)
         lines = lines_of(kernel.source, {"": kernel.programs})
     text = as_text(lines, _reference)
     if output is not None:

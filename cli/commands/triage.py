@@ -28,6 +28,7 @@ from ...compiler.core import ir
 from ...compiler.core.lower import lower
 from ...compiler.core.profiles import profile_named
 from ...compiler.plan import Plan, analysed
+from ...compiler.targets import language_named
 from ...kernels.devices.kernel import Images
 from ...kernels.devices.registry import EXECUTORS, WAYS
 from ...kernels.judge.reduce import Box, Reduced, reduced
@@ -77,10 +78,12 @@ def triage(
     exr.need_layers(
         frame, noisy, network.features, "the model was trained with it", "render or export that layer too"
     )
-    kept = kept_kernel(chosen.kernel, network, chosen.profile) if chosen.kernel else None
+    kept = kept_kernel(chosen.kernel, chosen, network) if chosen.kernel else None
     task = Task(network, noisy, images_of(network, noisy), chosen.profile, chosen.schedules, kept)
     with ExitStack() as opened:
         runners = open_runners(chosen.executor or [], opened)
+        for runner in runners:
+            runner.language = runner.language.under(chosen.profile)
         verdicts = _judged(task, runners)
         _print(f"{model} on {frame}, {noisy.width}x{noisy.height}, profile {task.profile}", verdicts)
         found = _concluded(task, verdicts)
@@ -136,7 +139,7 @@ def _judged(task: Task, runners: Sequence[Apart]) -> list[Verdict]:
     program, size = lower(task.model), (task.frame.height, task.frame.width)
     # The schedule that an executor would pick is not that of the kept kernel.
     instead = {task.kept.kernel.target: task.kept.schedule} if task.kept else {}
-    kernels = kernels_of(runners, program, task.profile, size, task.schedules, task.compiled, instead)
+    kernels = kernels_of(runners, program, size, task.schedules, task.compiled, instead)
     if task.kept and not any(kernel.artifact is task.kept.kernel for kernel in kernels):
         # Nobody may take the verdicts of others for its own.
         target, schedule = task.kept.kernel.target, task.kept.schedule
@@ -299,7 +302,7 @@ class Kept:
         return self.kernel if same else made
 
 
-def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
+def kept_kernel(folder: Path, chosen: Chosen, model: Model) -> Kept:
     """Return the kernel whose manifest and files are in a folder.
 
     They may have been changed: neither their hashes nor their lengths are checked. The manifest says what
@@ -313,10 +316,10 @@ def kept_kernel(folder: Path, model: Model, profile: str) -> Kept:
         wanted, name = manifest["program"], str(manifest["profile"]["name"])
         target, schedule = str(manifest["target"]), str(manifest["schedule"]["name"])
     program = lower(model)
-    if wanted != ir.digest(analysed(program)) or name != profile:
+    if wanted != ir.digest(analysed(program)) or name != chosen.profile:
         rule = f"its kernel is of another model or profile ({name})"
         raise InputError("--kernel", str(folder), rule, "give the model and --profile that it was made with")
-    made = compiling.compile_program(program, target, profile, schedule)
+    made = compiling.compile_program(program, language_named(target).under(chosen.profile), schedule)
     if made.manifest["schedule"] != manifest["schedule"]:
         rule = f"the compiler makes no kernel of this model for {target} in schedule {schedule} any more"
         raise InputError("--kernel", str(folder), rule, "compile the model again")

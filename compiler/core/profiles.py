@@ -2,10 +2,10 @@
 
 1. Rounding: the relative error of each class of operations that targets may make [`RELATIVE_ERROR`].
 2. Sine: an absolute error on a domain, or no promise [`SineContract`]. Profile `ieee` emits its own sine;
-   `native` calls the target's, whose promise is in the target's dialect [`sine_contract`].
+   `native` calls the target's, whose promise is in the target's dialect [`Language.sine`].
 3. The passes that turn the program which bounds see into the one that is emitted [`Profile`].
 4. Profile `ieee` has its sine in other degrees too, under names of their own: a trade of speed for error
-   [`with_degree`].
+   [`Profile.with_degree`].
 
 Sources: OpenCL C 1.2 specification, section 7.4 (divide 2.5 ulp, sqrt 3 ulp, sin 4 ulp, exp2 and log2 3 ulp,
 full profile); GLSL 4.60 specification, section 4.7.1 (+ - * correctly rounded, a / b 2.5 ulp for 2**-126 <=
@@ -72,6 +72,19 @@ class Profile:
     sine: SineContract | None
     passes: tuple[str, ...]
 
+    @property
+    def facts(self) -> dict[str, str]:
+        """Return what manifests and headers say about it."""
+        return {"name": self.name, "text": self.text}
+
+    def with_degree(self, degree: int) -> Profile:
+        """Return it with an emitted sine of this degree: what it costs and how far it is off differ."""
+        if degree == sine.DEGREE:
+            return self
+        passes = tuple(f"{name}_{degree}" if name == EXPAND_SINE else name for name in self.passes)
+        name = f"{self.name}{DEGREE_WORD}{degree}"
+        return replace(self, name=name, sine=emitted_sine(degree), passes=passes)
+
 
 def emitted_sine(degree: int = sine.DEGREE) -> SineContract:
     """Return what a sine of compiler/core/sine.py promises."""
@@ -122,6 +135,9 @@ PROFILES: Mapping[str, Profile] = {
 }
 """All profiles, by name."""
 
+IEEE = PROFILES["ieee"]
+"""The profile of kernels for which none is named."""
+
 
 REMOVED = "exact"
 """A profile of earlier releases: naming it is an error that names its replacement, for one release."""
@@ -138,7 +154,7 @@ def profile_named(name: str) -> Profile:
         )
     base, _, degree = name.partition(DEGREE_WORD)
     if base in PROFILES and PROFILES[base].sine and degree in map(str, sine.POLYNOMIALS):
-        return with_degree(PROFILES[base], int(degree))
+        return PROFILES[base].with_degree(int(degree))
     others = [
         f"{profile.name}{DEGREE_WORD}{degree}"
         for profile in PROFILES.values()
@@ -146,16 +162,3 @@ def profile_named(name: str) -> Profile:
         if profile.sine and degree != sine.DEGREE
     ]
     raise CompileError(f"profile {name!r}: unknown ({choice(name, [*PROFILES, *others])})")
-
-
-def with_degree(profile: Profile, degree: int) -> Profile:
-    """Return the profile with an emitted sine of this degree: what it costs and how far it is off differ."""
-    if degree == sine.DEGREE:
-        return profile
-    expand = f"{EXPAND_SINE}_{degree}"
-    return replace(
-        profile,
-        name=f"{profile.name}{DEGREE_WORD}{degree}",
-        sine=emitted_sine(degree),
-        passes=tuple(expand if name == EXPAND_SINE else name for name in profile.passes),
-    )

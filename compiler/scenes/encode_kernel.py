@@ -31,10 +31,10 @@ from ...refimpl.network.dataset import (
 )
 from ...refimpl.network.denoise import Model, learned_feature_spp
 from ..artifact import Artifact
-from ..core import profiles
 from ..core.ir import Program
 from ..core.lower import images_of
 from ..core.passes import pipeline
+from ..core.profiles import IEEE
 from ..kernel.interface import ENCODE, IMAGE, INTEGERS, READ, WRITE, Array, Interface, image_of
 from ..kernel.interface import SUMS as SUMS_ARRAY
 from ..kernel.kernel import Body, Kernel, Let, Store, apply, const, load, name
@@ -122,7 +122,6 @@ def compile_encode(
     features: Sequence[str],
     normalization: Normalization,
     language: Language | str,
-    profile: str = "ieee",
     planes: Sequence[str] | None = None,
     whole: bool = False,
     rays: int = 0,
@@ -132,8 +131,8 @@ def compile_encode(
     `planes` name those of the sums, in order; by default they are what the features need. `whole`: the
     images are those of a network of integers. `rays`: those of features [lower_encode].
     """
-    chosen, promised = language_named(language), profiles.profile_named(profile)
-    encoding = encoding_of(features, normalization, profile, whole, rays)
+    chosen = language_named(language)
+    encoding = encoding_of(features, normalization, chosen.profile.passes, whole, rays)
     program, images = encoding.program, encoding.images
     planes = tuple(planes or planes_of(features))
     lacking = set(planes_of(features)) - set(planes)
@@ -153,7 +152,7 @@ def compile_encode(
         )
     facts = {
         "schema": SCHEMA,
-        "passes": [*PASSES, *promised.passes],
+        "passes": [*PASSES, *chosen.profile.passes],
         "planes": list(planes),
         "images": [image.facts for image in images],
     }
@@ -165,7 +164,7 @@ def compile_encode(
         "at given sums: see the rules for each operation",
         {SUMS_ARRAY: planes},
         {"row_stride": "floats from row to row of a plane", "plane_stride": "and from plane to plane"},
-        (chosen, promised),
+        chosen,
         program,
         images,
     )
@@ -193,12 +192,11 @@ def encode_kernel(encoding: Encoding, planes: Sequence[str]) -> Kernel:
 def encoding_of(
     features: Sequence[str],
     normalization: Normalization,
-    profile: str = "ieee",
+    passes: Sequence[str] = IEEE.passes,
     whole: bool = False,
     rays: int = 0,
 ) -> Encoding:
     """Return the encoding of features after the passes of a profile, and the images that it makes."""
-    passes = profiles.profile_named(profile).passes
     program = pipeline.run(lower_encode(features, normalization, whole, rays), passes)
     return Encoding(program, images_of(features, normalization, whole))
 

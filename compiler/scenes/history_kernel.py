@@ -26,7 +26,6 @@ from ...refimpl.light import history
 from ...refimpl.light.camera import CameraBasis
 from ...refimpl.light.history import First, Moved, Sums
 from ..artifact import Artifact
-from ..core import profiles
 from ..core.ir import Image, Program
 from ..core.passes import pipeline
 from ..kernel import interface
@@ -203,13 +202,13 @@ def _sums(given: Given) -> Sums:
 
 
 @lru_cache
-def compile_history(language: Language | str, profile: str = "ieee") -> Artifact:
+def compile_history(language: Language | str) -> Artifact:
     """Return the kernel that adds a picture to a history."""
-    chosen, promised = language_named(language), profiles.profile_named(profile)
+    chosen = language_named(language)
     check_lanes(chosen, 1, "the history", "follow pictures by refimpl/light/history.py")
-    programs = pipeline.run_each(lower_history(), promised.passes)
+    programs = pipeline.run_each(lower_history(), chosen.profile.passes)
     lists = {"first": FIRST, "past": PAST, "motion": MOTION, "cameras": CAMERAS}
-    facts = {"schema": SCHEMA, "passes": [*PASSES, *promised.passes]}
+    facts = {"schema": SCHEMA, "passes": [*PASSES, *chosen.profile.passes]}
     return compiled(
         "history: one picture more",
         history_kernel(programs),
@@ -224,7 +223,7 @@ def compile_history(language: Language | str, profile: str = "ieee") -> Artifact
             interface.CAMERAS: CAMERAS,
         },
         NOTES,
-        (chosen, promised),
+        chosen,
         programs,
     )
 

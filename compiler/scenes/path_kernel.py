@@ -23,9 +23,8 @@ from ...refimpl.light.scene import Scene
 from ...refimpl.network.dataset import Normalization
 from ..artifact import Artifact
 from ..compile import CALLED, Entry, asdict_finite, assemble
-from ..core import ir, profiles
+from ..core import ir
 from ..core.passes import pipeline
-from ..core.profiles import Profile
 from ..kernel import interface
 from ..kernel.kernel import Kernel
 from ..languages.dialect import Dialect
@@ -71,7 +70,6 @@ def can_move(language: Language | str, scene: Scene, tables: Tables, inputs: Sce
 def compile_path(
     programs: PathPrograms,
     language: Language | str,
-    profile: str = "ieee",
     lanes: int = 1,
     groups: Sequence[str] = emit_path.FRAME_GROUPS,
     encoding: Encoding | None = None,
@@ -80,14 +78,14 @@ def compile_path(
 
     With an encoding of these planes it writes its images, at their places in the whole picture.
     """
-    chosen, promised = language_named(language), profiles.profile_named(profile)
+    chosen = language_named(language)
     if not chosen.paths:
         raise CompileError(f"target {chosen.name} has no path kernels: use one that has them, such as opencl")
     if lanes not in chosen.paths:
         known = ", ".join(map(str, chosen.paths))
         raise CompileError(f"target {chosen.name} cannot trace {lanes} paths at once (choose one of {known})")
     programs = emit_path.asked(programs, groups)
-    passed = {name: pipeline.run(part, promised.passes) for name, part in programs.parts.items()}
+    passed = {name: pipeline.run(part, chosen.profile.passes) for name, part in programs.parts.items()}
     emitted, dialect = replace(programs, parts=passed), chosen.dialect
     planes, images = emit_path.planes(groups), encoding.images if encoding else ()
     renderer = renderer_of(emitted, dialect, groups, lanes, encoding)
@@ -95,12 +93,12 @@ def compile_path(
     means = (SUMS[0], "encoded features, means over the samples of one launch:", *described)
     written = (*(means if images else SUMS), *_notes(programs, bool(images)))
     at_once = dialect.at_once or f"{lanes} {'path' if lanes == 1 else 'paths'}"
-    entries = _entries(programs, promised, at_once, written)
+    entries = _entries(programs, chosen, at_once, written)
     facts = {
         "schema": SCHEMA,
         "lanes": lanes,
-        "sine": asdict_finite(chosen.sine(promised)),
-        "passes": [*PASSES, *promised.passes],
+        "sine": asdict_finite(chosen.sine),
+        "passes": [*PASSES, *chosen.profile.passes],
         **({"images": [image.facts for image in images]} if images else {"planes": list(planes)}),
         "sums": "; ".join(written),
         "scene": {"name": programs.scene, "digest": programs.scene_digest},
@@ -112,7 +110,7 @@ def compile_path(
     }
     return assemble(
         "path tracer",
-        promised,
+        chosen,
         renderer,
         list(passed.items()),
         [*entries, *([] if isinstance(dialect, Listing) else [(CALLED, ())])],
@@ -172,7 +170,7 @@ def _notes(programs: PathPrograms, encoded: bool) -> Iterator[str]:
         yield f"features are of {rays}, whatever the number of samples: of one launch"
 
 
-def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Sequence[str]) -> list[Entry]:
+def _entries(programs: PathPrograms, language: Language, at_once: str, written: Sequence[str]) -> list[Entry]:
     """Return the entries of the header, up to the arguments.
 
     `written` says what the numbers mean that are the result.
@@ -189,7 +187,7 @@ def _entries(programs: PathPrograms, profile: Profile, at_once: str, written: Se
         ("scene", [f"{scene}, digest {programs.scene_digest[:32]}"]),
         ("paths", [", ".join(settings)]),
         ("schedule", [f"{at_once} at once"]),
-        ("profile", [f"{profile.name}: {profile.text}"]),
+        ("profile", [": ".join(language.profile.facts.values())]),
         ("bound", ["none: a path's decisions may fall differently near an edge"]),
         ("fixed", [fixed]),
         ("sums", written),

@@ -18,13 +18,11 @@ from ..artifact import Artifact
 from ..compile import CALLED, assemble
 from ..core import ir
 from ..core.ir import Image, Program
-from ..core.profiles import Profile
 from ..kernel.interface import ENCODE
 from ..kernel.kernel import Expr, Kernel, Let
 from ..languages.renderer import Renderer
-from ..plan import sine_contract
 from ..proof.bounds import Enclosure, enclose
-from ..targets import Language
+from ..targets import Language, language_named
 
 
 def reads(names: Sequence[str], element: Callable[[int], Expr], prefix: str = "") -> list[Let]:
@@ -50,17 +48,16 @@ def compiled(
     bound: str,
     lists: Mapping[str, Sequence[str]],
     notes: Mapping[str, str],
-    how: tuple[Language, Profile],
+    language: Language,
     programs: Any,
     images: Sequence[Image] = (),
 ) -> Artifact:
-    """Return a kernel of programs with its source and its manifest, for a target and a profile.
+    """Return a kernel of programs with its source and its manifest, for a language.
 
     `lists` says what the planes or columns of arrays are, `notes` what else callers must know of arrays and
     integers; `programs` are kept for an interpreter.
     """
-    dialect, profile = how[0].dialect, how[1]
-    renderer = Renderer(dialect, kernel, profile.sine is not None)
+    renderer = Renderer(language.dialect, kernel, language.profile.sine is not None)
     kernel, digests, role = renderer.kernel, [ir.digest(each) for each in used], kernel.interface.role
     entries = [
         *(("program", [digest[:32]]) for digest in digests),
@@ -72,7 +69,7 @@ def compiled(
     own = {"program": digests[0]} if role == ENCODE else several
     return assemble(
         title,
-        profile,
+        language,
         renderer,
         [("", each) for each in used],
         entries,
@@ -93,6 +90,6 @@ def exactly(values: NDArray[Any]) -> Enclosure:
 def enclosed(kernel: Artifact, program: Program, given: Mapping[str, Enclosure]) -> dict[str, Enclosure]:
     """Return the enclosures of the outputs of a kernel's program, of inputs that have errors."""
     known = {i: given[str(node["name"])] for i, node in enumerate(program.nodes) if node.op == "input"}
-    contract = sine_contract(kernel.profile, kernel.target)
+    contract = language_named(kernel.target).under(kernel.profile).sine
     found = enclose(program, {}, contract, known=known, local=False)
     return {name: found[index] for name, index in program.outputs}

@@ -28,7 +28,6 @@ from ...refimpl.frame import LAYERS
 from ...refimpl.network import smoothing
 from ...refimpl.network.dataset import Normalization, check_normalization
 from ..artifact import Artifact, SmoothKernels
-from ..core import profiles
 from ..core.ir import Image, Program
 from ..core.passes import pipeline
 from ..kernel.interface import (
@@ -163,15 +162,15 @@ def _tap(factors: Sequence[str | float], given: Given) -> Given:
 
 
 def compile_smoothing(
-    normalization: Normalization, language: Language | str, profile: str = "ieee", lanes: int = 1
+    normalization: Normalization, language: Language | str, lanes: int = 1
 ) -> SmoothKernels:
     """Return the kernels that make the smoothed features of frames; `lanes` pixels in a work item."""
-    chosen, promised = language_named(language), profiles.profile_named(profile)
+    chosen = language_named(language)
     check_lanes(chosen, lanes, "the filter", "smooth by refimpl/network/smoothing.py")
-    programs = pipeline.run_each(lower_smooth(normalization), promised.passes)
+    programs = pipeline.run_each(lower_smooth(normalization), chosen.profile.passes)
     facts = {
         "schema": SCHEMA,
-        "passes": [*PASSES, *promised.passes],
+        "passes": [*PASSES, *chosen.profile.passes],
         "layers": [layer.name for layer in LAYERS_READ],
         "guides": list(programs.guides),
         "light": list(LIGHT_PLANES),
@@ -184,11 +183,11 @@ def compile_smoothing(
     def made(kernel: Kernel, *used: Program) -> Artifact:
         title = f"edge-avoiding filter: {TITLES[kernel.interface.role]}"
         bound = "at given layers: see the rules for each operation"
-        return compiled(title, kernel, used, facts, bound, lists, notes, (chosen, promised), programs)
+        return compiled(title, kernel, used, facts, bound, lists, notes, chosen, programs)
 
     guide = made(guide_kernel(programs), programs.guide)
     smooth = made(smooth_kernel(programs, lanes), programs.tap, programs.mean)
-    encode = compile_encode((FEATURE,), normalization, chosen, profile, LIGHT_PLANES)
+    encode = compile_encode((FEATURE,), normalization, chosen, LIGHT_PLANES)
     return SmoothKernels(guide, smooth, encode)
 
 

@@ -40,7 +40,7 @@ from ..core.ir import Node
 from ..core.ops import OPS
 from ..core.passes import pipeline
 from ..core.passes.gradient import TRANSPOSED, Sum
-from ..core.profiles import PROFILES
+from ..core.profiles import IEEE
 from ..kernel.interface import BOTH, INTEGERS, READ, TRAIN, Interface
 from ..kernel.interface import Array as Memory
 from ..kernel.kernel import (
@@ -124,17 +124,17 @@ def compile_step(
 
 def compile_lowered(step: Step, size: int) -> Artifact:
     """Return the kernel of a step; its window has `size` runs. Its `programs` are the step, analysed."""
-    dialect, profile, digest = language_named("opencl").dialect, PROFILES["ieee"], ir.digest(step.program)
-    renderer = Renderer(dialect, step_kernel(step, size), False)
+    language, digest = language_named("opencl"), ir.digest(step.program)
+    renderer = Renderer(language.dialect, step_kernel(step, size), False)
     return assemble(
         "training step",
-        profile,
+        language,
         renderer,
         [("", step.program)],
         [("program", [digest[:32]])],
         {
             "program": digest,
-            "passes": profile.passes,
+            "passes": language.profile.passes,
             "arguments": "by the launches of the kernel: see spec/train_kernel.md",
         },
         step,
@@ -143,7 +143,7 @@ def compile_lowered(step: Step, size: int) -> Artifact:
 
 def step_kernel(step: Step, size: int) -> Kernel:
     """Return the kernel of a step; its window has `size` runs."""
-    first = Derivatives(replace(step, program=pipeline.run(step.program, PROFILES["ieee"].passes)), size)
+    first = Derivatives(replace(step, program=pipeline.run(step.program, IEEE.passes)), size)
     copies = max((slot.end for slot in transposed_slots(step).values()), default=1)
     count, end = slots(step)[SQUARES].offset, slots(step)[SQUARES].end
     integers = {"BATCH": step.batch, "COUNT": count, "SUMS": end, "SCRATCH": first.vectors}

@@ -23,6 +23,7 @@ from wamnet.compiler.core.listing import Line, lines_of, within
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.light import transport
 from wamnet.refimpl.light.scene import Camera, Light, Quad, Scene, Sphere
 from wamnet.refimpl.light.shapes import sphere
@@ -45,7 +46,7 @@ def network_listing(target: str) -> list[Line]:
     """Return the kernel of a small denoiser: 2 x 2 pixels, four sines, the target's own sine."""
     network = siren.init([12, 4, 3], 2.0, 2.0, seed=5, dtype=np.float32)
     model = denoise.Model(network, ("color",), Window(2), Normalization())
-    kernel = compile_program(lower(model, keep_places=True), target, "native")
+    kernel = compile_program(lower(model, keep_places=True), language_named(target).under("native"))
     return lines_of(kernel.source, {"": kernel.programs})
 
 
@@ -59,7 +60,7 @@ def scene_listing(target: str) -> list[Line]:
         lights=(Light((-1.0, 4.0, -1.0), (2.0, 0.0, 0.0), (0.0, 0.0, 2.0), (1.0, 1.0, 1.0), 20.0),),
     )
     programs = lower_scene(scene, Settings(), keep_places=True)
-    kernel = compile_path(programs, target, "native", groups=("color",))
+    kernel = compile_path(programs, language_named(target).under("native"), groups=("color",))
     return lines_of(kernel.source, kernel.programs.parts)
 
 

@@ -31,7 +31,7 @@ from ...compiler.plan import Plan, plan_program
 from ...compiler.schedules.bytes import Dot
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import DENOISERS, TARGETS, Language, schedule_named
+from ...compiler.targets import DENOISERS, TARGETS, Language, language_named, schedule_named
 from ...compiler.variants import parse, vary
 from ...refimpl.errors import ExecutorUnavailable, InputError
 from ...refimpl.network.denoise import Model
@@ -77,7 +77,9 @@ class Variant:
 
     def plan(self, model: Model, language: Language | str, schedule: str = PLAIN) -> Plan:
         """Return the plan of the form when `model` is the benchmark's."""
-        return plan_program(lower(self.of(model)), language, self.profile, schedule, self.rank)
+        return plan_program(
+            lower(self.of(model)), language_named(language).under(self.profile), schedule, self.rank
+        )
 
     def facts(self, model: Model) -> dict[str, Any]:
         """Return profile, degree of the sine, rank, window, parameters and steps of training."""

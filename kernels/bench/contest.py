@@ -278,7 +278,8 @@ class Contest:
             executor, schedule, profile = split(name)
             pause_s = min(PROBE_PAUSE_S, self.request.pause_s)
             device = self.tools.executor(executor)
-            times, side = rates.probe_times(device, schedule, profile or IEEE, pause_s)
+            language = device.language.under(profile or IEEE)
+            times, side = rates.probe_times(device, language, schedule, pause_s)
             self.found_rates[name] = rates.rates_of(times, side * side, limits.bytes_per_s)
         return self.found_rates[name]
 

@@ -35,6 +35,7 @@ from ...compiler.compile import compile_program
 from ...compiler.core.ir import Gather, Image, Program, Type
 from ...compiler.core.trace import trace
 from ...compiler.schedules.common import kernel_gather, output_channels
+from ...compiler.targets import Language
 from ...refimpl import rng
 from ...refimpl.network.window import Window
 from ..devices.executor import Executor
@@ -148,17 +149,17 @@ def probes() -> Mapping[str, Program]:
 
 
 def probe_times(
-    executor: Executor, schedule: str, profile: str, pause_s: float
+    device: Executor, language: Language, schedule: str, pause_s: float
 ) -> tuple[dict[str, Times], int]:
     """Return the times of the small programs by name, and the size of the picture on which they ran."""
     programs = probes()
-    made = {name: compile_program(p, executor.language, profile, schedule) for name, p in programs.items()}
+    made = {name: compile_program(p, language, schedule) for name, p in programs.items()}
     for size in PROBE_PX:
         images = noise(programs["small"], (size, size))
         for artifact in made.values():
-            executor.build(artifact, (size, size))
+            device.build(artifact, (size, size))
         # Without copies, where the executor can tell.
-        alone = getattr(executor, "kernel_seconds", executor.run)
+        alone = getattr(device, "kernel_seconds", device.run)
         ways = {name: partial(alone, artifact, images) for name, artifact in made.items()}
         small = in_turns({"small": ways["small"]}, 2, warm=0, pause_s=0.0)["small"]
         if min(small.seconds) >= PROBE_S:

@@ -129,10 +129,10 @@ class Executor(Closing, ABC):
 
     @property
     def language(self) -> Language:
-        """Return the language of its kernels, with what there is for it."""
+        """Return the language of its kernels under its profile, with what there is for it."""
         from ...compiler.targets import language_named
 
-        return language_named(self.name)
+        return language_named(self.name).under(self.profile)
 
     @property
     def identity(self) -> list[Any]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from ...compiler.scenes.lower_scene import PathPrograms
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.schedules.common import kernel_gather
 from ...compiler.schedules.schedules import windows
+from ...compiler.targets import language_named
 from ...refimpl.network.dataset import FEATURES, encode_sums
 from ...refimpl.network.denoise import Model
 from ..devices.kernel import Part
@@ -143,7 +144,7 @@ def pair(
         images = _livelier(plan.analysed, size)
     else:
         groups = tuple(dict.fromkeys(layers_of(model.features)))
-        kernel = compile_path(programs, "numpy", plan.profile.name, groups=groups)
+        kernel = compile_path(programs, replace(language_named("numpy"), profile=plan.profile), groups=groups)
         with open_executor("numpy") as executor:
             part = Part(size[1], size[0], 0, size[0], 0, 1, SEED)
             sums, *others = (executor.trace(kernel, part, row) for row in (None, *rows))

@@ -405,7 +405,7 @@ def _of_scene(
     """Return the kernels of a scene: paths and encoding, or passes that write a feature each."""
     if request.scene is None or programs is None:
         return None, None, {}
-    model, language = request.varied.model, row.language
+    model, language = request.varied.model, row.language.under(request.profile)
     scales, whole = model.normalization, model.is_whole
     if row.single:
         name = "".join(letter if letter.isalnum() else "_" for letter in request.scene.name[:60])
@@ -415,7 +415,7 @@ def _of_scene(
         }
         return None, None, passes
     groups = tuple(dict.fromkeys(layers_of(model.features)))
-    path = compile_path(programs, language, request.profile, groups=groups)
+    path = compile_path(programs, language, groups=groups)
     rays = programs.rays.count if programs.rays else 0
-    encoder = compile_encode(model.features, scales, language, request.profile, path.planes, whole, rays)
+    encoder = compile_encode(model.features, scales, language, path.planes, whole, rays)
     return path, encoder, {}

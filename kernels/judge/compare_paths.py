@@ -156,7 +156,7 @@ class PathReport:
 
 def kernel_of_states(programs: PathPrograms, executor: Executor) -> Artifact:
     """Return the kernel that follows paths to the programs' depth and tells their state."""
-    return compile_path(programs, executor.language, "ieee", executor.lanes, tuple(END))
+    return compile_path(programs, executor.language, executor.lanes, tuple(END))
 
 
 def compare_paths(
@@ -414,7 +414,7 @@ def wrong_words(
     executor: Executor, given: Mapping[str, NDArray[Any]], max_depth: int, width: int, height: int
 ) -> int:
     """Return for how many paths (P,) of an image the executor's generator gives other words."""
-    kernel = compile_path(_programs(max_depth), executor.language, "ieee", executor.lanes, CARRIERS)
+    kernel = compile_path(_programs(max_depth), executor.language, executor.lanes, CARRIERS)
     sample, seed = (int(given[name][0]) for name in ("sample_number", "seed"))
     found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(
         len(kernel.planes), -1

@@ -21,7 +21,6 @@ from ...compiler.compile import compile_plan
 from ...compiler.core.ir import OUTPUT_ENCODING, Program, Type
 from ...compiler.core.lower import lower
 from ...compiler.core.trace import trace
-from ...compiler.targets import language_named
 from ...refimpl.network.activation import SINE, activation_named
 from ...refimpl.network.denoise import Model, as_dtype
 from ...refimpl.network.siren import Siren, forward
@@ -169,11 +168,10 @@ def first_stage(
 ) -> tuple[Stage, Verdict] | None:
     """Return the first stage whose kernel deviates on images (H, W, C), or None if none does by itself."""
     assert kernel.artifact is not None, "a kernel that deviates has run"
-    most = language_named(kernel.runner.target).dialect.max_output_channels
+    most = kernel.runner.language.dialect.max_output_channels
     size = next(iter(images.values())).shape[:2]
-    how = kernel.artifact.profile, size, kernel.schedule, compiled
     for stage in stages(model.siren, most):
-        kernels = kernels_of([kernel.runner], stage_program(model, stage), *how)
+        kernels = kernels_of([kernel.runner], stage_program(model, stage), size, kernel.schedule, compiled)
         (verdict,) = judged(kernels, images)
         if verdict.deviates:
             return stage, verdict

@@ -61,12 +61,13 @@ def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
 class Apart(Closing):
     """An executor in a process of its own, which tells failures in place of raising them.
 
-    `way` is its name in registry.WAYS; raises ExecutorUnavailable where it is missing.
+    `way` is its name in registry.WAYS; raises ExecutorUnavailable where it is missing. `language` is that of
+    its kernels.
     """
 
     def __init__(self, way: str) -> None:
         self.way, self.limit_s = way, LIMIT_S
-        self.target, _ = WAYS[way]
+        self.language = language_named(WAYS[way][0])
         self._worker: Worker | None = None
         opened = self._asked(attrgetter("device"))
         if isinstance(opened, Outcome):
@@ -200,7 +201,6 @@ class Verdict:
 def kernels_of(
     runners: Sequence[Apart],
     program: Program,
-    profile: str,
     size: tuple[int, int],
     which: str = PICKED,
     compiled: Compile = compile_plan,
@@ -208,18 +208,19 @@ def kernels_of(
 ) -> list[Kernel]:
     """Return the kernels of a program for each runner, in the picked schedule or in `all` that hold it.
 
-    `instead`: schedules by target, instead of the picked ones.
+    `instead`: schedules by language, instead of the picked ones.
     """
     known: dict[tuple[str, str], Artifact | str] = {}
     kernels = []
     for runner in runners:
-        every = [schedule.name for schedule in language_named(runner.target).schedules]
-        named = which if which != PICKED else instead.get(runner.target) or runner.picked(size)
+        language = runner.language
+        every = [schedule.name for schedule in language.schedules]
+        named = which if which != PICKED else instead.get(language.name) or runner.picked(size)
         for schedule in every if which == EVERY else [named]:
-            key = (runner.target, schedule)
+            key = (language.name, schedule)
             if key not in known:
                 try:
-                    known[key] = compiled(plan_program(program, runner.target, profile, schedule))
+                    known[key] = compiled(plan_program(program, language, schedule))
                 except CompileError as error:
                     known[key] = str(error)
             found = known[key]

@@ -99,17 +99,19 @@ def _image(model: Model, frame: Frame, name: str) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=16)
-def _filter(
-    normalization: Normalization, language: str, profile: str, lanes: int, keeps: bool
-) -> SmoothKernels:
-    """Return the kernels of the filter, which all models with these scales share."""
+def _filter(normalization: Normalization, how: tuple[str, str, int], keeps: bool) -> SmoothKernels:
+    """Return the kernels of the filter, which all models with these scales share.
+
+    `how`: the names of language and profile, and the pixels of a work item.
+    """
 
     def compiled() -> SmoothKernels:
         from ...compiler.scenes.smooth_kernel import compile_smoothing
+        from ...compiler.targets import language_named
 
-        return compile_smoothing(normalization, language, profile, lanes)
+        return compile_smoothing(normalization, language_named(how[0]).under(how[1]), how[2])
 
-    key = asdict(normalization), language, profile, lanes
+    key = asdict(normalization), *how
     return SmoothKernels(*(kept_kernels("filter", key, compiled) if keeps else compiled()))
 
 
@@ -191,8 +193,8 @@ class Denoiser:
             return None
         if not all(layer in frame and frame[layer].dtype == np.float32 for layer in layers):
             return None
-        kernels = _filter(model.normalization, executor.name, executor.profile, executor.lanes, self.keeps)
-        return Filter(executor, kernels)
+        how = executor.name, executor.profile, executor.lanes
+        return Filter(executor, _filter(model.normalization, how, self.keeps))
 
     def images(self, frame: Frame) -> Images:
         """Return the images of [`images_of`], smoothed ones by the device where it does that: up to SMO-5."""

@@ -282,7 +282,7 @@ def encoders(features: Sequence[str], levels: int, model: Model, path: Artifact)
     """Return the encoding as passes of at most as many features as there are colour buffers."""
     rays = path.programs.rays
     parts = [features[first : first + MOST_BUFFERS] for first in range(0, len(features), MOST_BUFFERS)]
-    given = (model.normalization, TARGET, "ieee", path.planes, levels > 1, rays.count if rays else 0)
+    given = (model.normalization, TARGET, path.planes, levels > 1, rays.count if rays else 0)
     found = [compile_encode(part, *given) for part in parts]
     return [{"source": one.source, "images": [image.facts for image in one.images]} for one in found]
 
@@ -316,7 +316,7 @@ def variant(
     """
     model, rank = network.model, network.rank
     program = lower(model)
-    plan = plan_program(program, network.target, "ieee", network.schedule, rank)
+    plan = plan_program(program, network.target, network.schedule, rank)
     artifact = compile_plan(plan)
     packed = None if network.target == TARGET else compile_plan(plan_program(program, TARGET, schedule=MANY))
     mine = {name: round_image(images[name]) if model.is_whole else images[name] for name in model.features}

@@ -118,18 +118,20 @@ class Pipeline(Closing):
             raise InputError("whole", whole, rule, "render references with a separate kernel")
         self._in_integers = integers = model.is_whole
         features, scales = self._features, model.normalization
-        language, profile = executor.language, executor.profile
+        language = executor.language
         count = self._rays.count if self._rays else 0
         # A kernel of whole frames leaves sums, which are read in another way too.
         painted = executor.paints and not whole and not sums
-        encoding = encoding_of(features, scales, profile, integers, count) if painted else None
+        encoding = (
+            encoding_of(features, scales, language.profile.passes, integers, count) if painted else None
+        )
         groups = layers_of(self._features)
         groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
         more = {"seen": sees(self._features), "rays": self._rays, "shadow_rays": shadow_rays}
         self._paths = MovingPaths(executor, self._settings, groups, more, encoding, moving)
         self.set_scene(scene)
         planned = planes(groups)
-        self.encode = compile_encode(features, scales, language, profile, planned, integers, count)
+        self.encode = compile_encode(features, scales, language, planned, integers, count)
         schedule, _ = Tuning(executor, Subject.of(plan), size).picked(pictures)
         self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False

@@ -262,7 +262,7 @@ class MovingPaths:
         """Return the kernel of a scene, some of whose numbers are inputs."""
         language, lanes = self.executor.language, self.executor.lanes
         programs = lower_scene(scene, self.settings, language.forms, inputs, **self.more)
-        return compile_path(programs, language, self.executor.profile, lanes, self.groups, self.encoding)
+        return compile_path(programs, language, lanes, self.groups, self.encoding)
 
     def _find(self, scenes: Sequence[Scene]) -> None:
         """Make a family for each layout of some scenes, with the numbers in which they differ as inputs."""

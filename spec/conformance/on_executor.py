@@ -29,7 +29,7 @@ from ...compiler.scenes.lower_scene import PATH, SURFACE, PathPrograms, lower_sc
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.scenes.values import apart, joined, names
 from ...compiler.schedules.schedules import PLAIN
-from ...compiler.targets import DENOISERS, language_named
+from ...compiler.targets import DENOISERS, Language
 from ...kernels.devices.executor import Executor
 from ...kernels.devices.kernel import Part
 from ...kernels.run.denoise_on import denoise_on
@@ -59,7 +59,7 @@ class OnExecutor:
     def __init__(self, executor: Executor) -> None:
         self.executor = executor
         self._own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
-        if language_named(executor.name).paths:
+        if executor.language.paths:
             how = partial(render_on, executor)
             self._own |= {"path.whole": self._vertices, "picture.rendered": partial(rendered, how=how)}
         self.kinds = [*FUNCTIONS, *self._own]
@@ -79,7 +79,7 @@ class OnExecutor:
 
     def _answer(self, kind: str, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the outputs of a function of numbers."""
-        function, kernels = FUNCTIONS[kind], self._compiled(kind, self.executor.profile)
+        function, kernels = FUNCTIONS[kind], self._compiled(kind, self.executor.language)
         fields = {name: np.asarray(from_json(inputs[name], name), np.float32) for name in function.inputs}
         parts = apart(values_of(function.inputs), fields)
         images = {part: np.full((1, 1, 1), value, np.float32) for part, value in parts.items()}
@@ -96,7 +96,7 @@ class OnExecutor:
         rows: list[dict[str, Any]] = []
         for depth in range(inputs["settings"]["max_depth"] + 1):
             settings = json.dumps({**inputs["settings"], "max_depth": depth})
-            kernel = self._path_kernel(inputs["scene"], settings, self.executor.profile)
+            kernel = self._path_kernel(inputs["scene"], settings, self.executor.language)
             planes = self.executor.trace(kernel, part)[:, 0, x]
             state = dict(zip(kernel.planes, planes, strict=True))
             # A path that ended at the surface before has no vertex here.
@@ -105,15 +105,15 @@ class OnExecutor:
             rows.append(state)
         return {name: np.array([_joined(row, name) for row in rows]) for name in VERTEX}
 
-    def _compile_path(self, scene: str, settings: str, profile: str) -> Artifact:
+    def _compile_path(self, scene: str, settings: str, language: Language) -> Artifact:
         """Return the kernel that reports the last vertex of paths."""
         stopped = Settings(**json.loads(settings))
         programs = replace(self._programs(scene, replace(stopped, max_depth=0)), settings=stopped)
-        return compile_path(programs, self.executor.name, profile, self.executor.lanes, tuple(END))
+        return compile_path(programs, language, self.executor.lanes, tuple(END))
 
     def _lowered(self, scene: str, settings: Settings) -> PathPrograms:
         """Return the programs of a path, which do not depend on the depth."""
-        return lower_scene(scene_module.from_json(scene), settings, language_named(self.executor.name).forms)
+        return lower_scene(scene_module.from_json(scene), settings, self.executor.language.forms)
 
     def _denoised(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return a denoised picture."""
@@ -136,28 +136,28 @@ class OnExecutor:
             for first in range(0, width, 3):
                 wanted = range(first, min(first + 3, width))
                 program = trace(partial(_some, network, name, wanted), types, gather)
-                picture = self.executor.run(self._kernel(program, self.executor.profile), pixel)
+                picture = self.executor.run(self._kernel(program, self.executor.language), pixel)
                 found.setdefault(name, []).extend(picture[0, 0].tolist())
         return {name: np.array(values) for name, values in found.items()}
 
-    def _compile(self, kind: str, profile: str) -> list[Artifact]:
+    def _compile(self, kind: str, language: Language) -> list[Artifact]:
         """Return the kernels of a function: outputs three at a time, since a picture has few channels."""
         function = FUNCTIONS[kind]
         total = len(names(values_of(function.outputs)))
         threes = [list(range(first, min(first + 3, total))) for first in range(0, total, 3)]
-        return [self._kernel(_program(function, wanted), profile) for wanted in threes]
+        return [self._kernel(_program(function, wanted), language) for wanted in threes]
 
-    def _kernel(self, program: Program, profile: str) -> Artifact:
+    def _kernel(self, program: Program, language: Language) -> Artifact:
         """Return the kernel of a program.
 
         Where the ranges of the inputs leave the argument of a sine without bound, as a division does, there
         is no bound over all inputs: sines are expanded before anything asks for one. Each case has its own.
         """
         try:
-            return compile_program(program, self.executor.name, profile)
+            return compile_program(program, language)
         except CompileError:
-            expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), profile_named(profile).passes)
-            return compile_program(expanded, self.executor.name, profile)
+            expanded = pipeline.run(pipeline.run(program, pipeline.COMMON), language.profile.passes)
+            return compile_program(expanded, language)
 
 
 def _joined(state: Mapping[str, Any], name: str) -> Any:

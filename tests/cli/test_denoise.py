@@ -105,7 +105,7 @@ def test_compile_writes_a_scene_s_kernel(wamnet, here, target, source) -> None:
     assert why.startswith("no certificate: path kernels have none")
     programs = lower_scene(canonical("minicubes", time=1.5), Settings(max_depth=2))
     executor = {"opencl": "opencl", "glsl": "opengl"}[target]
-    kernel = compile_path(programs, executor, "ieee", 16 if lanes else 1)
+    kernel = compile_path(programs, executor, 16 if lanes else 1)
     assert (here / "a" / source).read_text() == kernel.source
     assert json.loads((here / "a/manifest.json").read_text()) == json.loads(json.dumps(kernel.manifest))
     assert wamnet("compile", "minicubes", *options, "--sampler", "sobol", "-o", "sobol").status == 0

@@ -161,7 +161,7 @@ def test_the_pictures_keep_their_bound(still, model, data, number):
     network = P.networks_of(model, rank=4, processor=True)[number]
     draw(still, frame=FRAME, seed=SEED, variant=network.name)
     images = {name: read(still, name)[..., :3].copy() for name in FEATURES}
-    plan = P.plan_program(P.lower(model), network.target, "ieee", network.schedule, network.rank)
+    plan = P.plan_program(P.lower(model), network.target, network.schedule, network.rank)
     held = plan.expected(images)
     value, bound = held.value, held.bound
     found = read(still, "picture")[..., :3].astype(np.float64)

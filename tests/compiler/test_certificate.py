@@ -17,6 +17,7 @@ from wamnet.compiler.core.ir import Type, sha256
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.proof import checker, evidence, scaled, sine_checker, spectra_checker
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import InputError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.dataset import Normalization
@@ -107,7 +108,7 @@ def test_certificates_of_all_schedules_hold(tmp_path, target, schedule):
 )
 def test_certificates_of_all_profiles_hold(tmp_path, target, profile):
     """The checker knows every sine of which something is promised."""
-    artifact.write(compile_program(lower(model()), target, profile), tmp_path)
+    artifact.write(compile_program(lower(model()), language_named(target).under(profile)), tmp_path)
     held = checker.check(tmp_path / NAME)
     assert held["profile"] == profile
     assert target != "opencl" or held["sine"]["domain"] is None
@@ -484,7 +485,7 @@ def test_the_checker_shares_no_code_with_the_compiler_and_is_short():
 def test_kernels_without_a_proof_have_no_certificate(tmp_path):
     """GLSL promises nothing of its own sine; a kernel in two passes is not covered."""
     for kernel in (
-        compile_program(lower(model()), "opengl", "native"),
+        compile_program(lower(model()), language_named("opengl").under("native")),
         compile_program(lower(model()), "opencl", rank=2),
     ):
         assert kernel.certificate is None

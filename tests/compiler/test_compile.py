@@ -24,7 +24,7 @@ from wamnet.compiler.core.trace import trace
 from wamnet.compiler.languages.glsl_es import ShadertoyDenoise
 from wamnet.compiler.plan import analysed
 from wamnet.compiler.schedules.plain import Packed
-from wamnet.compiler.targets import DENOISERS, schedule_named
+from wamnet.compiler.targets import DENOISERS, language_named, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model, denoise_pixel
@@ -53,7 +53,7 @@ def test_golden_program(golden):
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("target", DENOISERS)
 def test_golden_source(golden, target, profile):
-    artifact = compile_program(lower(model()), target, profile)
+    artifact = compile_program(lower(model()), language_named(target).under(profile))
     golden(f"{profile}.{artifact.source_name}", artifact.source)
 
 
@@ -114,7 +114,7 @@ def test_unknown_target_and_profile():
     ):
         compile_program(lower(model()), "abacus")
     with pytest.raises(CompileError, match=r"profile 'fast': unknown \(choose one of ieee, native"):
-        compile_program(lower(model()), "opencl", "fast")
+        language_named("opencl").under("fast")
 
 
 def test_sine_that_may_leave_its_domain_is_refused():
@@ -141,7 +141,12 @@ def test_sine_that_may_leave_its_domain_is_refused():
 def test_numbers_that_may_overflow_are_refused(target, function, message):
     with pytest.raises(CompileError, match=message):
         compile_program(gathered(function), target)
-    assert compile_program(gathered(function), target, "native").manifest["bound"]["output"] is None
+    assert (
+        compile_program(gathered(function), language_named(target).under("native")).manifest["bound"][
+            "output"
+        ]
+        is None
+    )
 
 
 def test_overflow_before_the_sine_leaves_no_bound_on_any_target():
@@ -158,13 +163,15 @@ def test_overflow_before_the_sine_leaves_no_bound_on_any_target():
         return np.matmul(np.sin(np.matmul(hidden, wide.T) * 2e-38), last.T) + 0.5
 
     program = gathered(network)
-    assert compile_program(program, "opencl", "native").manifest["bound"]["output"] is None
+    assert (
+        compile_program(program, language_named("opencl").under("native")).manifest["bound"]["output"] is None
+    )
     with pytest.raises(CompileError, match=r"affine \(layer 1, %\d+\) may reach 1.2e\+39"):
         compile_program(program, "opencl")
 
 
 def test_the_target_s_own_sine_has_no_domain():
-    artifact = compile_program(gathered(lambda x: np.sin(2e4 * x)), "opencl", "native")
+    artifact = compile_program(gathered(lambda x: np.sin(2e4 * x)), language_named("opencl").under("native"))
     assert artifact.manifest["sine_arguments"] == [[-20100.0, 20100.0]]  # widened a little, rounded up
     assert max(artifact.manifest["bound"]["output"]) < 1
 
@@ -179,7 +186,7 @@ def test_program_without_a_window_or_with_two_outputs_is_refused(target):
 
 def test_a_bound_needs_precise_and_no_bound_does_not():
     for profile, wanted in (("ieee", "#error the error bound needs"), ("native", "#define PRECISE\n")):
-        assert wanted in compile_program(lower(model()), "opengl", profile).source
+        assert wanted in compile_program(lower(model()), language_named("opengl").under(profile)).source
 
 
 def test_a_bound_says_what_it_assumes():
@@ -229,7 +236,7 @@ def test_division_by_what_may_be_zero_has_no_bound():
 
 
 def test_sine_of_anything_is_null_in_the_manifest():
-    artifact = compile_program(gathered(lambda x: np.sin(1.0 / x)), "opencl", "native")
+    artifact = compile_program(gathered(lambda x: np.sin(1.0 / x)), language_named("opencl").under("native"))
     assert artifact.manifest["sine_arguments"] == [[None, None]]
     assert artifact.manifest["bound"]["output"] is None
 

@@ -18,6 +18,7 @@ from wamnet.compiler.scenes.encode_kernel import (
     lower_encode,
     planes_of,
 )
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import CompileError, InputError
 from wamnet.refimpl.frame import HISTORY
 from wamnet.refimpl.network.dataset import FEATURES, FIRST_HITS, Normalization, encode_sums
@@ -132,7 +133,7 @@ def test_layers_follow_the_features():
 
 def test_a_bound_needs_operations_in_order():
     assert "#error" in compile_encode(ALL, SCALES, "opengl").source
-    assert "#error" not in compile_encode(ALL, SCALES, "opengl", "native").source
+    assert "#error" not in compile_encode(ALL, SCALES, language_named("opengl").under("native")).source
 
 
 def test_refusals():
@@ -144,8 +145,6 @@ def test_refusals():
         compile_encode(ALL, SCALES, "abacus")
     with pytest.raises(CompileError, match="sums have no planes normal_y, normal_z: the features normal are"):
         compile_encode(("normal",), SCALES, "opencl", planes=("normal_x",))
-    with pytest.raises(CompileError, match="profile 'fast': unknown"):
-        compile_encode(ALL, SCALES, "opencl", "fast")
 
 
 @pytest.mark.parametrize("name", HISTORY)

@@ -12,16 +12,17 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Type, text
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
 from wamnet.refimpl.network.window import BORDERS, Window, all_windows, pad
 
 SIZE, CHANNELS = 4, 3
-CONTRACT = sine_contract("ieee", "opencl")
+CONTRACT = language_named("opencl").sine
 
 
 def program(function=None, border="clamp"):
@@ -102,7 +103,7 @@ def test_rounding_is_that_of_both_passes() -> None:
 
 
 def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
-    found = compile_program(program(), "opencl", "ieee", "tile:8", rank=5)
+    found = compile_program(program(), "opencl", "tile:8", rank=5)
     names = [path.name for path in artifact.write(found, tmp_path)]
     assert names == [
         *("horizontal.denoise.cl", "horizontal.weights.bin", "denoise.cl", "weights.bin", "manifest.json")
@@ -122,12 +123,12 @@ def test_manifest_and_files_hold_both_passes(tmp_path) -> None:
     assert max(manifest["factored"]["rounding"]["output"]) < max(manifest["bound"]["output"])
     assert "pass      1 of 2: sums along the rows" in (tmp_path / "horizontal.denoise.cl").read_text()
     assert "bound is that of both passes, against program " in (tmp_path / "denoise.cl").read_text()
-    other = compile_program(program(), "opencl", "ieee", "tile:8", rank=4)
+    other = compile_program(program(), "opencl", "tile:8", rank=4)
     assert other.digest != found.digest
 
 
 def test_native_sines_promise_nothing_on_numpy() -> None:
-    found = compile_program(program(), "numpy", "native", rank=5).manifest
+    found = compile_program(program(), language_named("numpy").under("native"), rank=5).manifest
     assert found["bound"]["output"] is None
     assert found["factored"]["rounding"]["output"] is None
 

@@ -18,12 +18,12 @@ from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.languages.c import C
 from wamnet.compiler.languages.opencl import OpenCL
-from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds, spectra, spectra_checker
 from wamnet.compiler.schedules import fourier
 from wamnet.compiler.schedules.fft import Fourier, sizes_of
 from wamnet.compiler.schedules.schedules import LARGEST_PRIVATE
-from wamnet.compiler.targets import schedule_named
+from wamnet.compiler.targets import language_named, schedule_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.denoise import denoise_pixel
@@ -36,7 +36,7 @@ FFT32 = schedule_named("opencl", "fft:16")
 TURN, HALF_TURN = 2.8, 2.3
 """FOU-5: coefficients of a product with a factor, and with one of an eighth of a turn."""
 
-CONTRACT = sine_contract("ieee", "opencl")
+CONTRACT = language_named("opencl").sine
 
 
 def pairs_of(numbers):
@@ -257,7 +257,7 @@ def paper(channels=6, size=12, hidden=32):
 
 
 def test_the_manifest_states_the_bound_of_spectra() -> None:
-    found, tiled = (compile_program(paper(), "opencl", "ieee", name) for name in ("fft:16", "tile:16"))
+    found, tiled = (compile_program(paper(), "opencl", name) for name in ("fft:16", "tile:16"))
     assert found.manifest["schedule"]["name"] == "fft:16"
     assert (found.manifest["schedule"]["pixels"], found.manifest["schedule"]["rows"]) == (42, 21)
     assert found.certificate is not None
@@ -304,7 +304,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_it_does_not_hold_is_tiled_with_the_reason(case) -> None:
     make, instead, reason = REFUSED[case]
-    found = compile_program(make(), "opencl", "ieee", "fft:16").manifest["schedule"]
+    found = compile_program(make(), "opencl", "fft:16").manifest["schedule"]
     assert (found["name"], found["asked"]) == (instead, "fft:16")
     assert re.match(reason, found["reason"])
 
@@ -326,7 +326,7 @@ def test_two_readers_are_refused(function, reason) -> None:
 
 
 def test_windows_along_one_axis_are_refused() -> None:
-    found = compile_program(paper(), "opencl", "ieee", "fft:16", rank=4).manifest
+    found = compile_program(paper(), "opencl", "fft:16", rank=4).manifest
     assert found["schedule"]["reason"] == "a window of 12 x 1 pixels in a tile of 32"
     assert found["schedule"]["name"] == "tile:16"
 
@@ -340,7 +340,7 @@ def test_sums_that_may_overflow_are_refused() -> None:
     assert found[index].overflows
     assert np.isinf(found[index].error).all()
     with pytest.raises(CompileError, match=r"affine \(layer 0, %\d\) may reach"):
-        compile_program(traced, "opencl", "ieee", "fft:16")
+        compile_program(traced, "opencl", "fft:16")
 
 
 def emitted(program):

@@ -73,7 +73,7 @@ CASES = [
 @pytest.mark.parametrize(("target", "schedule"), CASES)
 def test_no_index_leaves_32_bits(target, schedule):
     try:
-        kernel = compile_program(lower(tiny_model()), target, "ieee", schedule)
+        kernel = compile_program(lower(tiny_model()), target, schedule)
     except CompileError as error:
         pytest.fail(f"the tiny model does not compile: {error}")
     found = {text: words for part in kernel.kernels for text, words in subscripts(part.source).items()}
@@ -96,4 +96,4 @@ def test_no_index_leaves_32_bits(target, schedule):
 
 
 def test_texts_say_the_limit():
-    assert "fewer than 2^31 floats an image" in compile_program(lower(tiny_model()), "c", "ieee").source
+    assert "fewer than 2^31 floats an image" in compile_program(lower(tiny_model()), "c").source

@@ -15,6 +15,7 @@ from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.light.shapes import quad
 from wamnet.refimpl.light.transport import Settings
@@ -35,7 +36,7 @@ def reference(place: str) -> str:
 
 
 def kernel_lines(profile: str, target: str = "opencl") -> list[Line]:
-    kernel = compile_program(lower(MODEL, keep_places=True), target, profile)
+    kernel = compile_program(lower(MODEL, keep_places=True), language_named(target).under(profile))
     return lines_of(kernel.source, {"": kernel.programs})
 
 
@@ -71,7 +72,7 @@ def test_every_operation_of_a_path_is_asked_for_by_the_reference():
         # The pixel's counter is computed by lower_scene.py itself.
         bare = [node.op for node in part.nodes if not node.places]
         assert set(bare) <= {"input", "constant", "multiply", "add", "convert"}, bare
-    kernel = compile_path(programs, "opencl", "native", groups=("color",))
+    kernel = compile_path(programs, language_named("opencl").under("native"), groups=("color",))
     lines = lines_of(kernel.source, kernel.programs.parts)
     source, first = inspect.getsourcelines(quad.quad_distance)
     own = [
@@ -91,7 +92,10 @@ def test_places_change_no_bit_of_a_kernel(profile):
     with_places, without = lower(MODEL, keep_places=True), lower(MODEL)
     assert ir.digest(with_places) == ir.digest(without)
     assert with_places.nodes == without.nodes
-    kernels = [compile_program(program, "opencl", profile) for program in (with_places, without)]
+    kernels = [
+        compile_program(program, language_named("opencl").under(profile))
+        for program in (with_places, without)
+    ]
     assert kernels[0].source == kernels[1].source
     assert kernels[0].manifest == kernels[1].manifest
 

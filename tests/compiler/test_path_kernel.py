@@ -20,7 +20,7 @@ from wamnet.compiler.scenes.encode_kernel import SAMPLES, encoding_of
 from wamnet.compiler.scenes.lower_scene import LIT, SEEN, SEEN_LIT, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.compiler.targets import LANGUAGES
+from wamnet.compiler.targets import LANGUAGES, language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl.errors import CompileError
@@ -42,7 +42,7 @@ ALL_GROUPS = tuple(group for group in GROUPS if group not in {*SEEN, *LIT, *SEEN
 
 def kernel(name="furnace", target="opencl", profile="ieee", lanes=16, settings=None, **options):
     programs = lower_scene(scenes.canonical(name), settings or Settings(max_depth=3))
-    return compile_path(programs, target, profile, lanes, **options)
+    return compile_path(programs, language_named(target).under(profile), lanes, **options)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_golden_source_of_a_loop(golden, target, lanes):
     spheres = tuple(Sphere((0.3 * i, 0.1, 0.2 - i), 0.1 + 0.1 * i, (0.2, 0.3 * i, 0.1)) for i in range(3))
     scene = replace(scenes.canonical("furnace"), name="spheres", spheres=spheres)
     programs = lower_scene(scene, Settings(max_depth=1), LISTS)
-    made = compile_path(programs, target, "native", lanes, groups=("color",))
+    made = compile_path(programs, language_named(target).under("native"), lanes, groups=("color",))
     golden(f"path.spheres.native.{lanes}.{made.source_name}", made.source)
 
 
@@ -74,7 +74,7 @@ def test_golden_source_of_a_loop(golden, target, lanes):
 def test_golden_source_of_rays(golden, target, lanes):
     """Normals of four rays that are spread: a loop of three after the samples."""
     programs = lower_scene(scenes.canonical("furnace"), Settings(max_depth=1), rays=FeatureRays(4, "net"))
-    made = compile_path(programs, target, "native", lanes, groups=("color", "normal"))
+    made = compile_path(programs, language_named(target).under("native"), lanes, groups=("color", "normal"))
     golden(f"path.rays.native.{lanes}.{made.source_name}", made.source)
 
 
@@ -128,7 +128,9 @@ def test_scene_parameters_and_images_of_a_kernel_in_numpy(lanes):
     moving = varying(shots, settings)
     kernel = path_kernel(lower_scene(shots[0], settings, moving=moving), lanes, ("color",), ENCODING)
     found = run_on(kernel, {SCENE_NUMBERS: moving.values(shots[1])}, given)["image_color"]
-    own = compile_path(lower_scene(shots[1], settings), "numpy", "native", groups=("color",))
+    own = compile_path(
+        lower_scene(shots[1], settings), language_named("numpy").under("native"), groups=("color",)
+    )
     sums = dict(zip(own.planes, NumpyExecutor().trace(own, Part(*given.values())), strict=True))
     encoded = interpret(ENCODING.program, {**sums, SAMPLES: np.full((9, 13), 2, np.float32)})
     expected = np.stack([encoded[f"color_{channel}"] for channel in range(3)], axis=-1)

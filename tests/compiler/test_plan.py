@@ -10,10 +10,10 @@ import pytest
 from wamnet.compiler import plan as module
 from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.plan import analysed, plan_program, sine_contract
+from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules.factor import product
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.kernels import open_executor
 from wamnet.refimpl.errors import CompileError
 
@@ -34,7 +34,7 @@ def test_it_is_the_interpreter_and_the_rules(kit, images, border):
     (value,) = interpret(program, windows, np.float64).values()
     for target in DENOISERS:
         found = plan_program(program, target).expected(images)
-        contract = sine_contract("ieee", target)
+        contract = language_named(target).sine
         (bound,) = bounds.at_inputs(analysed(program), windows, contract).values()
         assert found.value.shape == found.bound.shape == (9, 7, 3)
         # float64 adds up in another order
@@ -73,7 +73,9 @@ def test_one_number_and_constants(kit, images):
 
 def test_what_promises_nothing_has_no_bound(kit, images):
     program = kit.denoiser(kit.network([27, 5, 3], (3.0, 3.0)), CHANNELS, 3, "clamp")
-    assert np.isinf(plan_program(program, "opengl", "native").expected(images).bound).all()
+    assert np.isinf(
+        plan_program(program, language_named("opengl").under("native")).expected(images).bound
+    ).all()
 
 
 @pytest.mark.parametrize("border", ["clamp", "zero"])
@@ -129,6 +131,6 @@ def test_another_schedule_is_another_plan(kit):
     assert plan.schedule.name == "plain"
     assert plan.scheduled("tile:16").schedule.name == "tile:16"
     assert plan.schedule.name == "plain"
-    assert compile_program(program, "opencl", "ieee", "tile:16").plan.asked == "tile:16"
+    assert compile_program(program, "opencl", "tile:16").plan.asked == "tile:16"
     with pytest.raises(CompileError, match="schedule 'spiral': unknown to this target"):
         plan.scheduled("spiral").bound  # noqa: B018

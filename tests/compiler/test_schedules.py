@@ -58,7 +58,7 @@ SHARED = gathered(lambda x: np.sin(x @ W.T) @ W.T)
     ],
 )
 def test_golden_tiles(golden, target, profile, name, border):
-    found = compile_program(small(border), target, profile, name)
+    found = compile_program(small(border), language_named(target).under(profile), name)
     golden(f"{name.replace(':', '')}.{found.source_name}", found.source)
 
 
@@ -72,12 +72,12 @@ def test_golden_tiles(golden, target, profile, name, border):
     ],
 )
 def test_golden_groups(golden, target, name, border):
-    found = compile_program(small(border), target, "ieee", name)
+    found = compile_program(small(border), target, name)
     golden(f"{name.replace(':', '')}.{found.source_name}", found.source)
 
 
 def test_a_compute_shader_says_what_it_is():
-    found = compile_program(small(), "opengl", "ieee", "group:4")
+    found = compile_program(small(), "opengl", "group:4")
     assert found.source_name == "denoise.comp"
     assert found.manifest["language"] == "GLSL 4.30, compute shader"
     assert found.manifest["files"].keys() == {"denoise.comp", "weights.bin"}
@@ -104,7 +104,7 @@ def wide(hidden, channels=(3,), size=1):
     ],
 )
 def test_what_a_group_does_not_hold_is_plain_with_the_reason(program, reason):
-    found = compile_program(program, "opencl", "ieee", "group:4").manifest["schedule"]
+    found = compile_program(program, "opencl", "group:4").manifest["schedule"]
     assert found["name"] in ("plain", "group:1")
     assert found["asked"] == "group:4"
     assert re.match(reason, found["reason"])
@@ -140,11 +140,11 @@ def test_groups_find_every_weight(channels, size, hidden):
 
 
 def test_golden_inlined(golden):
-    golden("inlined.denoise.frag", compile_program(small(), "opengl", "ieee", "inlined").source)
+    golden("inlined.denoise.frag", compile_program(small(), "opengl", "inlined").source)
 
 
 def test_inlined_weights_are_in_the_source_alone():
-    found = compile_program(small(), "opengl", "ieee", "inlined")
+    found = compile_program(small(), "opengl", "inlined")
     assert found.weights.size == found.manifest["weights"]["count"] == 0
     assert found.manifest["weights"]["layout"] == []
     assert "weight_texture" not in found.source
@@ -153,13 +153,13 @@ def test_inlined_weights_are_in_the_source_alone():
 
 def test_too_many_weights_to_inline_are_plain():
     program = gathered(lambda x: np.sin(x @ rounded(16000, 3).T) @ rounded(2, 16000).T)
-    found = compile_program(program, "opengl", "ieee", "inlined").manifest["schedule"]
+    found = compile_program(program, "opengl", "inlined").manifest["schedule"]
     assert (found["name"], found["asked"]) == ("plain", "inlined")
     assert found["reason"].startswith(f"it has 80000 weights, of at most {LARGEST_WEIGHTS}:")
 
 
 def test_the_manifest_says_what_was_picked():
-    found = compile_program(small(), "opencl", "ieee", "tile:8").manifest
+    found = compile_program(small(), "opencl", "tile:8").manifest
     assert found["schedule"]["name"] == "tile:8"
     assert found["schedule"]["pixels"] == 6
     assert "block by block" in found["weights"]["order"]
@@ -228,7 +228,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_a_tile_does_not_hold_is_plain_with_the_reason(case, target):
     program, reason = REFUSED[case]
-    found, plain = (compile_program(program, target, "ieee", name) for name in ("tile:16", "plain"))
+    found, plain = (compile_program(program, target, name) for name in ("tile:16", "plain"))
     assert found.manifest["schedule"]["name"] == "plain"
     assert found.manifest["schedule"]["asked"] == "tile:16"
     assert re.match(reason, found.manifest["schedule"]["reason"])
@@ -280,7 +280,7 @@ def test_every_weight_lies_where_the_kernel_reads_it(schedule, channels, size, h
     ("target", "array"), [("opencl", r"float number|float16 v\d+"), ("c", r"float v\d+")]
 )
 def test_private_bytes_of_a_tile_are_those_of_its_arrays(target, array):
-    artifact = compile_program(small(), target, "ieee", "tile:16")
+    artifact = compile_program(small(), target, "tile:16")
     sizes = {"PIXELS": 14, "LANES": 16, "WINDOW_SIZE": 2, "PATCH_WIDTH": 15}
     arrays = re.findall(rf"(float patch_\w+|{array})\[([^]]+)\];", artifact.source)
     counts = [np.prod([sizes.get(word) or int(word) for word in text.split(" * ")]) for _, text in arrays]

@@ -15,6 +15,7 @@ from wamnet.compiler.scenes.lower_scene import SEEN, FeatureRays, lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
 from wamnet.compiler.scenes.values import names
+from wamnet.compiler.targets import language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.devices.numpy_executor import NumpyExecutor
 from wamnet.refimpl import rng
@@ -70,7 +71,7 @@ def test_all_programs_go_through_the_passes_of_the_profile(profile):
     """PTK-3: `see` and `ray` too."""
     rays = FeatureRays(4, "net")
     programs = lower_scene(scenes.canonical("glossy"), SETTINGS, seen=True, rays=rays)
-    made = compile_path(programs, "numpy", profile, groups=("color", *SEEN)).programs
+    made = compile_path(programs, language_named("numpy").under(profile), groups=("color", *SEEN)).programs
     passes = profile_named(profile).passes
     expected = {name: pipeline.run(part, passes) for name, part in programs.parts.items()}
     assert list(made.parts) == ["start", "arrive", "look", "scatter", "see", "ray"]

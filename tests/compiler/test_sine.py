@@ -19,7 +19,7 @@ from wamnet.compiler.core.ir import Type
 from wamnet.compiler.core.passes import pipeline
 from wamnet.compiler.core.profiles import emitted_cosine, emitted_sine, profile_named
 from wamnet.compiler.core.trace import trace
-from wamnet.compiler.plan import sine_contract
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import CompileError
 
 DEGREES = sorted(sine.POLYNOMIALS)
@@ -271,7 +271,7 @@ def test_profile_of_the_degree_in_use_is_the_plain_one():
 
 @pytest.mark.parametrize("degree", DEGREES)
 def test_contracts_are_those_of_the_degree(degree):
-    contract = sine_contract(f"ieee-sine{degree}", "opencl")
+    contract = language_named("opencl").under(f"ieee-sine{degree}").sine
     assert (contract.error, contract.domain) == (ERROR[degree], sine.DOMAIN)
     assert contract == emitted_sine(degree)
     assert f"degree {degree}" in contract.text

@@ -20,6 +20,7 @@ from wamnet.compiler.scenes.smooth_kernel import (
     error_at,
     lower_smooth,
 )
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.errors import CompileError
 from wamnet.refimpl.network import smoothing
 from wamnet.refimpl.network.dataset import Normalization
@@ -110,4 +111,4 @@ def test_manifests_name_what_was_made():
 )
 def test_what_has_no_kernel_is_refused(target, profile, lanes, match):
     with pytest.raises(CompileError, match=match):
-        compile_smoothing(SCALES, target, profile, lanes)
+        compile_smoothing(SCALES, language_named(target).under(profile), lanes)

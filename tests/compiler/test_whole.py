@@ -22,7 +22,7 @@ from wamnet.compiler.languages.wgsl import WGSL
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import whole
 from wamnet.compiler.schedules.bytes import Dot, GroupDot
-from wamnet.compiler.targets import LANGUAGES
+from wamnet.compiler.targets import LANGUAGES, language_named
 from wamnet.refimpl.network import siren
 from wamnet.refimpl.network.whole import SINES, Whole, forward_whole, rounded
 from wamnet.refimpl.network.window import Window
@@ -68,7 +68,9 @@ def test_every_kernel_states_the_bound_zero(target) -> None:
     found = LANGUAGES[target]
     traced = program(lambda window: forward_whole(net, window))
     for number, schedule in enumerate(found.schedules):
-        artifact = compile_program(traced, target, ("native", "ieee")[number % 2], schedule.name)
+        artifact = compile_program(
+            traced, language_named(target).under(("native", "ieee")[number % 2]), schedule.name
+        )
         assert artifact.manifest["bound"]["output"] == [0.0, 0.0, 0.0]
         assert "same bits" in artifact.source
         assert all(image["whole"] for image in artifact.manifest["images"])
@@ -151,7 +153,7 @@ def test_a_cut_or_another_arithmetic_is_not_whole() -> None:
     traced = program(lambda window: forward_whole(net, window))
     assert plan_program(traced, "opencl").is_whole
     fractions = program(lambda window: forward_whole(net, window), is_whole=False)
-    assert not plan_program(fractions, "opencl", "native").is_whole
+    assert not plan_program(fractions, language_named("opencl").under("native")).is_whole
 
 
 # ---- products of bytes -----------------------------------------------------------------------------------

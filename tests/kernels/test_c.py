@@ -14,6 +14,7 @@ from kit import pictures
 from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
+from wamnet.compiler.targets import language_named
 from wamnet.kernels.devices import c_executor
 from wamnet.refimpl.errors import CompileError, ExecutorUnavailable, InputError
 
@@ -59,7 +60,7 @@ def array(name, values):
 def built(folder: Path, case, profile, options, schedule="plain"):
     """Compile a program around the kernel with the compiler of the executor, and return what it prints."""
     program, images, expected = case
-    artifact = compile_program(program, "c", profile, schedule)
+    artifact = compile_program(program, language_named("c").under(profile), schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     (folder / artifact.source_name).write_text(artifact.source)
     data = array("numbers", artifact.weights) + "".join(array(f"in_{n}", x) for n, x in images.items())
@@ -252,7 +253,7 @@ def test_arrays_too_large_for_a_stack(executor_named, kit):
     with pytest.raises(
         CompileError, match=r"arrays take \d+ bytes per pixel; at most 1048576 fit a thread's stack"
     ):
-        executor_named("c").build(compile_program(program, "c", "native"))
+        executor_named("c").build(compile_program(program, language_named("c").under("native")))
 
 
 @pytest.mark.parametrize("name", ["c", "numpy"])
@@ -305,7 +306,7 @@ def test_a_plain_build_has_transforms_for_newer_processors(executor_named, kit, 
     (tmp_path / "other.h").write_text(undefined)
     options = ["-std=c99", "-O2", *WARNINGS, *other]
     found = built(tmp_path, (program, images, expected), "ieee", options, "fft:8")
-    bound = compile_program(program, "c", "ieee", "fft:8").manifest["bound"]["output"]
+    bound = compile_program(program, "c", "fft:8").manifest["bound"]["output"]
     assert np.all(np.abs(found - expected) <= bound)
     held = (tmp_path / "main").read_bytes()
     for name in ("forward", "backward", "pixel"):

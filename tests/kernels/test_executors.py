@@ -19,6 +19,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.lower import lower
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.targets import language_named
 from wamnet.kernels import denoise_on, open_executor
 from wamnet.kernels.devices import llvmpipe
 from wamnet.kernels.devices.kernel import black
@@ -93,14 +94,19 @@ def test_target_s_own_sine_on_opencl(executor_named, kit):
     executor = executor_named("opencl")
     program = kit.denoiser(kit.network([27, 8, 8, 3], (9.0, 9.0)), {"a": 3}, 3, "clamp")
     images = {"a": np.random.default_rng(6).uniform(-2, 2, (9, 9, 3)).astype(np.float32)}
-    assert kit.excess(executor, program, images, compile_program(program, "opencl", "native")) <= 1
+    assert (
+        kit.excess(
+            executor, program, images, compile_program(program, language_named("opencl").under("native"))
+        )
+        <= 1
+    )
 
 
 @pytest.mark.parametrize("name", ["numpy", "opengl-egl", "opengl-osmesa"])
 def test_target_s_own_sine_without_promise_runs_but_has_no_bound(executor_named, kit, name):
     executor = executor_named(name)
     program = kit.denoiser(kit.network([27, 8, 3], (9.0, 9.0)), {"a": 3}, 3, "clamp")
-    artifact = compile_program(program, executor.name, "native")
+    artifact = compile_program(program, language_named(executor.name).under("native"))
     found = executor.run(artifact, {"a": np.full((3, 4, 3), 0.5, np.float32)})
     assert ((found >= 0) & (found <= 1)).all()
     assert artifact.manifest["bound"]["output"] is None
@@ -349,7 +355,7 @@ def test_opengl_keeps_nothing_of_a_picture_s_size(kit):
     """Textures and framebuffers of thirty sizes are given back; what lives is the weights."""
     moderngl = pytest.importorskip("moderngl")
     program = kit.denoiser(kit.network([27, 4, 3], (2.0, 2.0)), {"a": 3}, 3, "clamp")
-    artifact = compile_program(program, "opengl", "native")
+    artifact = compile_program(program, language_named("opengl").under("native"))
 
     def living():
         kinds = (moderngl.Texture, moderngl.Framebuffer, moderngl.Buffer)

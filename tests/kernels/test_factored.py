@@ -12,12 +12,12 @@ from kit import COMPILED, networks, pictures, ways
 
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.interpret import interpret
-from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
 from wamnet.compiler.schedules.bytes import Dot, GroupDot
 from wamnet.compiler.schedules.fft import Transformed
-from wamnet.compiler.targets import DENOISERS
+from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.kernels import Pipeline, denoise_on
 from wamnet.kernels.devices import opencl_executor
 from wamnet.refimpl.errors import CompileError, InputError
@@ -40,7 +40,7 @@ code in a minute, so that the paper's network is left out."""
 def excess(kit, executor, artifact, program, images, of_cut):
     """Return the largest error / bound at these images, against the program, or against its cut's product."""
     rank = artifact.manifest["factored"]["rank"]
-    cut, contract = factor.factor(analysed(program), rank), sine_contract("ieee", artifact.target)
+    cut, contract = factor.factor(analysed(program), rank), language_named(artifact.target).sine
     found = factor.at_images(cut, contract, images, of_cut)
     (bound,) = bounds.output_errors(cut.whole, found).values()
     wanted = cut.whole if of_cut else factor.product(cut)
@@ -63,7 +63,7 @@ def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case
     images = pictures(case["channels"], case["shape"], case["seed"])
     most = factored.largest_rank(case["size"], *case["widths"][:2])
     rank = min(1 + round(share * (most - 1)), DENOISERS[target].dialect.max_output_channels)
-    artifact = compile_program(program, target, "ieee", schedule, rank)
+    artifact = compile_program(program, target, schedule, rank)
     for kernel in artifact.kernels:
         picked = kernel.manifest["schedule"]
         reason = picked.get("reason", "")
@@ -93,7 +93,7 @@ def paper_s(kit, border="clamp", rank=0):
 def test_the_paper_s_network_of_rank_16(executor_named, kit, target, schedule, border) -> None:
     """A model that was trained so loses nothing: its cut is as small as its own rounding to float32."""
     program = paper_s(kit, border, 16)
-    artifact = compile_program(program, target, "ieee", schedule, 16)
+    artifact = compile_program(program, target, schedule, 16)
     images = pictures({"color": 3, "normal": 3}, (13, 31))
     for of_cut in (False, True):
         assert excess(kit, executor_named(target), artifact, program, images, of_cut) <= 1
@@ -142,7 +142,7 @@ def test_passes_over_a_picture_hold_both_kernels(executor_named, kit, name) -> N
 def test_executors_draw_into_as_many_textures_as_ranks_fill(executor_named, kit, rank, schedule) -> None:
     """One, two, and the most that OpenGL 3.3 promises."""
     program = kit.denoiser(kit.network([216, 16, 3], (3.0, 3.0)), {"color": 3, "normal": 3}, 6, "zero")
-    artifact = compile_program(program, "opengl", "ieee", schedule, rank)
+    artifact = compile_program(program, "opengl", schedule, rank)
     first, second = artifact.kernels
     assert first.source.count("layout(location") == -(-rank // 4)
     assert [i.channels for i in second.programs.gather.images] == [4] * (rank // 4) + [1] * (rank % 4)

@@ -10,6 +10,7 @@ from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.core.ops import LOOPS, OPS
 from wamnet.compiler.core.profiles import EMITTED_COSINE
 from wamnet.compiler.proof.bounds import NO_BOUND
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl import rng
 
 W = np.array([[1.5, -2.0, 0.25, 3.0], [0.1, 0.2, -0.3, 0.7]], np.float32)
@@ -156,7 +157,7 @@ def test_cosine_without_a_bound_is_near(denoiser, kit, image):
     program = kit.program(lambda x: np.cos(1.5 * x), {"a": 4})
     exact = np.cos((np.float32(1.5) * image).astype(np.float64))
     for profile, error in (("ieee", EMITTED_COSINE.error), ("native", 2.0**-11)):
-        artifact = compile_program(program, denoiser.name, profile)
+        artifact = compile_program(program, language_named(denoiser.name).under(profile))
         assert artifact.manifest["bound"]["output"] is None
         assert np.max(np.abs(denoiser.run(artifact, {"a": image}) - exact)) <= error
 

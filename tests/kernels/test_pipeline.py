@@ -12,12 +12,13 @@ from kit import encoded
 from wamnet.compiler.compile import compile_plan
 from wamnet.compiler.core import ir
 from wamnet.compiler.core.lower import lower
-from wamnet.compiler.plan import analysed, sine_contract
+from wamnet.compiler.plan import analysed
 from wamnet.compiler.proof import bounds
 from wamnet.compiler.scenes.emit_path import GROUPS
 from wamnet.compiler.scenes.encode_kernel import compile_encode, encoding_of, error_at, layers_of
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import FULL, with_rank
 from wamnet.kernels import Pipeline, denoise_on, open_executor, render_on
 from wamnet.kernels.devices.kernel import Part
@@ -95,7 +96,7 @@ def difference_bound(model, executor, images, errors):
         moved = [images[name].astype(np.float64) + sign * errors[name] for name in model.features]
         joined = np.concatenate(moved, axis=-1)
         ends.append(all_windows(pad(joined, model.window), model.window))
-    found = bounds.enclose(program, {"window": tuple(ends)}, sine_contract("ieee", executor.name))
+    found = bounds.enclose(program, {"window": tuple(ends)}, language_named(executor.name).sine)
     (_, index) = program.outputs[0]
     return found[index].high - found[index].low + 2 * found[index].read
 
@@ -144,9 +145,7 @@ def test_images_at_the_end_of_paths_are_those_of_the_encoding(executor_named, la
         sums = executor.trace(sums_kernel, part)
         encode = compile_encode(features, SCALES, name, planes=sums_kernel.planes)
         wanted = encoded(executor, encode, sums, 2)
-        kernel = compile_path(
-            programs, name, "ieee", lanes, layers_of(features), encoding_of(features, SCALES)
-        )
+        kernel = compile_path(programs, name, lanes, layers_of(features), encoding_of(features, SCALES))
         found = executor.call(kernel, {}, part.integers)
         errors = error_at(encode, dict(zip(sums_kernel.planes, sums, strict=True)), 2)
         for feature in features:
@@ -221,7 +220,7 @@ def test_what_writes_encoded_images_is_refused_elsewhere():
     programs = lower_scene(scene("empty"), SETTINGS)
     given = layers_of(("color",)), encoding_of(("color",), SCALES)
     with pytest.raises(CompileError, match="write sums, not encoded images"):
-        compile_path(programs, "opengl", "ieee", 1, *given)
+        compile_path(programs, "opengl", 1, *given)
 
 
 # ---- what stays on the device --------------------------------------------------------------------------

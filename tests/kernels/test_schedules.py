@@ -76,7 +76,7 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
             patch.setattr(opencl_executor, name, group)
         if (target, schedule) in GROUPED:
             patch.setattr(GROUPED[target, schedule], "group", group)
-        artifact = compile_program(program, target, "ieee", schedule)
+        artifact = compile_program(program, target, schedule)
         assert artifact.manifest["schedule"]["name"] == schedule
         executor._built.clear()
         images = pictures(case["channels"], case["shape"], case["seed"])
@@ -88,7 +88,7 @@ def test_error_is_within_the_bound(executor_named, kit, target, schedule, data, 
 def test_pictures_of_more_tiles_than_one(executor_named, kit, target, schedule):
     """Tiles of 21 x 21 pixels, three below one another and two side by side; images of odd channels."""
     program = kit.denoiser(kit.network([1728, 32, 3], (3.0, 3.0)), {"a": 5, "b": 7}, 12, "zero")
-    artifact = compile_program(program, target, "ieee", schedule)
+    artifact = compile_program(program, target, schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     assert kit.excess(executor_named(target), program, pictures({"a": 5, "b": 7}, (43, 22), 2), artifact) <= 1
 
@@ -110,7 +110,7 @@ def elementwise(x):
 def test_every_operation_on_vectors(executor_named, kit, target, schedule):
     """Away from integers, where floor may fall to either side, the bound is finite."""
     program = kit.program(elementwise, {"a": 3}, 2)
-    artifact = compile_program(program, target, "ieee", schedule)
+    artifact = compile_program(program, target, schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     images = {"a": np.random.default_rng(3).uniform(-2, 2, (5, 19, 3)).astype(np.float32)}
     assert kit.excess(executor_of(executor_named, target), program, images, artifact) <= 1
@@ -119,7 +119,7 @@ def test_every_operation_on_vectors(executor_named, kit, target, schedule):
 def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
     executor = executor_named("opencl")
     artifact = compile_program(
-        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opencl", "ieee", "group:4"
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opencl", "group:4"
     )
     monkeypatch.setattr(opencl_executor, "STACK_BYTES", 1000)
     executor._built.clear()
@@ -142,7 +142,7 @@ def test_a_group_that_a_device_does_not_hold(executor_named, kit, monkeypatch):
 def test_no_compute_shader_before_opengl_4_3(executor_named, kit, monkeypatch):
     executor = executor_named("opengl-egl")
     artifact = compile_program(
-        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opengl", "ieee", "group:1"
+        kit.denoiser(kit.network([3, 2], (3.0, 3.0)), {"a": 3}, 1, "clamp"), "opengl", "group:1"
     )
     monkeypatch.setattr(opengl_executor, "SHADER_VERSION", 460)
     executor._built.clear()
@@ -191,7 +191,7 @@ def test_the_device_s_schedule_is_taken_and_told(executor, kit):
     assert denoise_on(executor, model, noisy).schedule.startswith(f"{executor.schedule_for((3, 4))}: ")
     asked = denoise_on(executor, model, noisy, schedule="plain")
     assert asked.schedule.startswith("plain: one ")
-    artifact = compile_program(lower(model), executor.name, "ieee", executor.schedule)
+    artifact = compile_program(lower(model), executor.name, executor.schedule)
     assert artifact.manifest["schedule"]["name"] == executor.schedule == executor.schedule_for((2000, 2000))
     if executor.schedule_pixels:
         assert executor.schedule_for((1, executor.schedule_pixels - 1)) == "plain"
@@ -199,7 +199,7 @@ def test_the_device_s_schedule_is_taken_and_told(executor, kit):
 
 def test_pictures_of_a_size_share_what_launches_hand_on(executor_named, kit):
     program = kit.denoiser(kit.network([192, 8, 3], (3.0, 3.0)), {"a": 3}, 8, "clamp")
-    artifact = compile_program(program, "opengl", "ieee", "fftpasses:32")
+    artifact = compile_program(program, "opengl", "fftpasses:32")
     executor, held = executor_named("opengl-egl"), []
     for width in (40, 40, 900):
         images = {"a": np.random.default_rng(width).uniform(-2, 2, (9, width, 3)).astype(np.float32)}

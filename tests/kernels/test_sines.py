@@ -9,6 +9,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core import sine
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.network.window import Window
 
 DEGREES = sorted(sine.POLYNOMIALS)
@@ -24,7 +25,7 @@ def values(executor, kind, degree, x):
     function, domain, _ = KINDS[kind]
     gather = Gather(Window(1, "clamp"), (Image("a", 1, -domain, domain),))
     program = trace(lambda window: function(window), {"window": Type(shape=(1,))}, gather)
-    artifact = compile_program(program, executor.name, f"ieee-sine{degree}")
+    artifact = compile_program(program, language_named(executor.name).under(f"ieee-sine{degree}"))
     return unchecked(executor, artifact, np.asarray(x, np.float32).reshape(-1, 1, 1)).reshape(-1)
 
 
@@ -78,7 +79,7 @@ def test_beyond_the_domain_in_vectors(executor_named, kit, name):
     known = {"opencl": ("tile:16", "tile:8", "vector:16"), "opengl": ("inlined",), "c": ("tile:16", "tile:4")}
     schedules = known.get(executor.name, ())
     for schedule in ("plain", *schedules):
-        artifact = compile_program(program, executor.name, "ieee", schedule)
+        artifact = compile_program(program, executor.name, schedule)
         assert artifact.manifest["schedule"]["name"] == schedule
         found = unchecked(executor, artifact, image)
         assert abs(found[0, 0, 0] - np.sin(6000.0)) <= artifact.manifest["bound"]["output"][0]

@@ -47,8 +47,8 @@ def images():
 class Inside:
     """An executor in this process, as a runner."""
 
-    def __init__(self, way, executor):
-        self.way, self.target, self.device = way, executor.name, executor.device
+    def __init__(self, way, executor, profile="ieee"):
+        self.way, self.language, self.device = way, executor.language.under(profile), executor.device
         self._executor = executor
 
     def picked(self, size: tuple[int, int]) -> str:
@@ -60,13 +60,12 @@ class Inside:
         return attempt(self._executor, artifact, images)
 
 
-def runners(executor_named, *ways):
-    return [Inside(way, executor_named(way)) for way in dict.fromkeys(("numpy", *ways))]
+def runners(executor_named, *ways, profile="ieee"):
+    return [Inside(way, executor_named(way), profile) for way in dict.fromkeys(("numpy", *ways))]
 
 
-def verdicts_of(ways, model, images, profile="ieee", which="plain", compiled=compile_plan):
-    program = lower(model)
-    kernels = triage.kernels_of(ways, program, profile, SHAPE, which, compiled)
+def verdicts_of(ways, model, images, which="plain", compiled=compile_plan):
+    kernels = triage.kernels_of(ways, lower(model), SHAPE, which, compiled)
     return triage.judged(kernels, images)
 
 
@@ -109,7 +108,7 @@ def planted(kit, target, text):
 def test_executor_stage_and_neuron_are_named(executor_named, model, images, way):
     """A wrong weight of layer 1 in one executor, also in numpy: beside it opencl, or numpy."""
     ways = runners(executor_named, way, "opencl" if way == "numpy" else "numpy")
-    compiled = wrong_weight(ways[[r.way for r in ways].index(way)].target)
+    compiled = wrong_weight(ways[[r.way for r in ways].index(way)].language.name)
     found = verdicts_of(ways, model, images, compiled=compiled)
     (odd,) = triage.odd_ones(found)
     assert odd.kernel.runner.way == way
@@ -130,7 +129,7 @@ def test_executor_stage_and_neuron_are_named(executor_named, model, images, way)
 def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, images, way):
     """One number of one pixel: the part keeps what is above and left of it; no stage by itself has it."""
     ways = runners(executor_named, way)
-    compiled = planted(kit, ways[1].target, "if (y == 4 && x == 6) {{ {v}[1] += 0.01f; }}")
+    compiled = planted(kit, ways[1].language.name, "if (y == 4 && x == 6) {{ {v}[1] += 0.01f; }}")
     found = verdicts_of(ways, model, images, compiled=compiled)
     (odd,) = triage.odd_ones(found)
     assert (odd.kernel.runner.way, odd.pixel) == (way, (4, 6, 1))
@@ -148,9 +147,11 @@ def test_a_pixel_is_named_and_its_place_is_kept(executor_named, kit, model, imag
 @pytest.mark.parametrize("way", COMPILED)
 def test_what_is_no_number_deviates(executor_named, kit, model, images, way, profile):
     """Also where nothing is promised."""
-    ways = runners(executor_named, way)
-    compiled = planted(kit, ways[1].target, "if (y == 2) {{ {v}[2] = sqrt(-1.0f - {v}[2] * {v}[2]); }}")
-    found = verdicts_of(ways, model, images, profile, compiled=compiled)
+    ways = runners(executor_named, way, profile=profile)
+    compiled = planted(
+        kit, ways[1].language.name, "if (y == 2) {{ {v}[2] = sqrt(-1.0f - {v}[2] * {v}[2]); }}"
+    )
+    found = verdicts_of(ways, model, images, compiled=compiled)
     (odd,) = triage.odd_ones(found)
     assert (odd.kernel.runner.way, odd.pixel) == (way, (2, 0, 2))
     assert not np.isfinite(odd.found)
@@ -158,7 +159,7 @@ def test_what_is_no_number_deviates(executor_named, kit, model, images, way, pro
 
 
 def test_without_a_bound_finite_numbers_pass(executor_named, model, images):
-    found = verdicts_of(runners(executor_named, "opencl"), model, images, "native")
+    found = verdicts_of(runners(executor_named, "opencl", profile="native"), model, images)
     assert [v.state for v in found] == ["no bound", "within"]
     expected_text = "1 kernel within its bound, 1 kernel without a bound that wrote finite numbers"
     assert triage.conclusion(found) == expected_text
@@ -288,7 +289,7 @@ def test_stages_are_the_network(kit, model, images):
 
 def test_no_stage_deviates_in_a_right_kernel(executor, model, images):
     runner = Inside(executor.name, executor)
-    (kernel,) = triage.kernels_of([runner], lower(model), "ieee", SHAPE, "plain")
+    (kernel,) = triage.kernels_of([runner], lower(model), SHAPE, "plain")
     assert first_stage(kernel, model, images) is None
 
 
@@ -317,7 +318,7 @@ def test_a_failure_that_comes_once_is_told(executor_named, model, images):
     answers = iter([Outcome(picture + np.float32(0.25))])
     once = SimpleNamespace(
         way="numpy",
-        target="numpy",
+        language=runner.language,
         device="fake",
         picked=runner.picked,
         run=lambda artifact, images: next(answers, None) or runner.run(artifact, images),

@@ -12,6 +12,7 @@ from wamnet.compiler.languages.opencl import LANES, OpenCL
 from wamnet.compiler.languages.renderer import Renderer
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.light import scenes
 from wamnet.refimpl.light.transport import Settings
 
@@ -53,4 +54,4 @@ def test_a_kernel_calls_floor_where_its_program_has_it():
     """The sine's range reduction has it; native kernels call the device's sine."""
     scene = lower_scene(scenes.furnace(), Settings())
     assert " = FLOOR(" in compile_path(scene, "opencl", lanes=16).source
-    assert " = FLOOR(" not in compile_path(scene, "opencl", "native", lanes=16).source
+    assert " = FLOOR(" not in compile_path(scene, language_named("opencl").under("native"), lanes=16).source

@@ -12,6 +12,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.schedules.fft import Fourier
+from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.devices.c_executor import COMPILER_VARIABLE, CExecutor
 from wamnet.kernels.run.tune import Subject, Tuning
@@ -68,7 +69,7 @@ def test_every_schedule_gives_the_bits_of_the_reference(
     executor = executor_named({"opengl": "opengl-egl"}.get(target, target))
     case = data.draw(cases(schedule in SLOW))
     images = images_of(case)
-    artifact = compile_program(lowered(case), target, profile, schedule)
+    artifact = compile_program(lowered(case), language_named(target).under(profile), schedule)
     assert artifact.manifest["bound"]["output"] == [0.0] * artifact.manifest["output"]["channels"]
     found = executor.run(artifact, images)
     assert found.tobytes() == reference(case, images).astype(np.float32).tobytes()

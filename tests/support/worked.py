@@ -402,7 +402,7 @@ def denoise_bindings() -> list[str]:
     )
     lines: list[str] = []
     for target, schedule, language in kinds:
-        made = compile_program(program, target, "ieee", schedule)
+        made = compile_program(program, target, schedule)
         lines += ["", f"{made.manifest['language']}, `{schedule}`:", "", *signature(made.source, language)]
     return lines[1:]
 
@@ -413,7 +413,7 @@ def path_bindings() -> list[str]:
     programs = lower_scene(scenes.canonical("furnace"), transport.Settings(max_depth=3))
     lines: list[str] = []
     for target, language in (("opencl", "c"), ("opengl", "glsl")):
-        made = compile_path(programs, target, "ieee", 1)
+        made = compile_path(programs, target, 1)
         lines += ["", f"{made.manifest['language']}:", "", *signature(made.source, language)]
     planes = ", ".join(f"`{plane}`" for plane in made.planes)
     return [*lines[1:], "", f"Planes of a frame, in order: {planes}."]
@@ -443,7 +443,7 @@ def train_bindings() -> list[str]:
 @worked
 def denoise_manifest() -> list[str]:
     """A manifest, with hashes left out."""
-    made = compile_program(lower(_small_model()), "opencl", "ieee", "plain")
+    made = compile_program(lower(_small_model()), "opencl", "plain")
     text = json.dumps(made.manifest, indent=1, sort_keys=True)
     text = re.sub(r"[0-9a-f]{64}", "64 hexadecimal digits", text)
     for _ in range(2):  # Lists and objects of numbers and texts on one line.

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from wamnet.compiler.plan import sine_contract
+from wamnet.compiler.targets import language_named
 from wamnet.kernels.bench import contenders, contest, rates, workload
 from wamnet.kernels.bench.contenders import Contender, Opened, Tools, Variant
 from wamnet.kernels.bench.rates import Stage
@@ -202,7 +202,7 @@ def test_variants_are_within_their_bound(executor, model, variant) -> None:
     (row,) = found.values()
     rounding = row["rounding"]
     assert (row["profile"], row["executor"], row["schedule"]) == (variant.profile, executor.name, "plain")
-    if sine_contract(variant.profile, executor.name).error is None:
+    if language_named(executor.name).under(variant.profile).sine.error is None:
         assert (rounding["bound"], rounding["bound_all"], rounding["certified"]) == (None, None, False)
     else:
         assert rounding["max"] <= rounding["bound"] <= rounding["bound_all"]

@@ -64,6 +64,6 @@ def test_small_programs_run(monkeypatch, schedule) -> None:
     monkeypatch.setattr(rates, "PROBE_PX", (4, 8))
     monkeypatch.setattr(rates, "PROBE_S", math.inf)
     with open_executor("numpy") as executor:
-        found, size = rates.probe_times(executor, schedule, "ieee", 0.0)
+        found, size = rates.probe_times(executor, executor.language, schedule, 0.0)
     assert size == 8
     assert [len(times.seconds) for times in found.values()] == [3, 3, 3]

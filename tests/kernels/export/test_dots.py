@@ -11,6 +11,7 @@ from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
 from wamnet.compiler.kernel.instructions import PORTABLE
+from wamnet.compiler.targets import language_named
 from wamnet.kernels import open_executor
 from wamnet.kernels.export import tools
 from wamnet.kernels.export.wgpu_runner import vulkan_runner
@@ -36,7 +37,7 @@ def kernel(target):
     images = tuple(Image(name, n, -127.0, 127.0, whole=True) for name, n in (("a", 4), ("b", 1)))
     types = {"window": Type(shape=(45,))}
     program = trace(lambda window: forward_whole(NETWORK, window), types, Gather(WINDOW, images))
-    return compile_program(program, target, "native", "groupdot:4")
+    return compile_program(program, language_named(target).under("native"), "groupdot:4")
 
 
 def is_right(opened, artifact):

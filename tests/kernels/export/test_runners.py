@@ -20,7 +20,7 @@ from wamnet.compiler.scenes.encode_kernel import compile_encode, error_at, layer
 from wamnet.compiler.scenes.lower_scene import lower_scene
 from wamnet.compiler.scenes.path_kernel import compile_path
 from wamnet.compiler.scenes.scene_inputs import varying
-from wamnet.compiler.targets import LANGUAGES
+from wamnet.compiler.targets import LANGUAGES, language_named
 from wamnet.kernels.devices.kernel import Part
 from wamnet.kernels.export import check, targets, tools
 from wamnet.refimpl.errors import ExecutorUnavailable
@@ -85,7 +85,7 @@ def test_tiles_and_groups_keep_their_bound(runner, kit, schedule, border):
     if schedule not in {each.name for each in LANGUAGES[runner.name].schedules}:
         pytest.skip("its language has no such schedule")
     program = kit.denoiser(kit.network([45, 7, 5, 3], (3.0, 5.0)), {"a": 4, "b": 1}, 3, border)
-    artifact = compile_program(program, runner.name, "ieee", schedule)
+    artifact = compile_program(program, runner.name, schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     width, height = artifact.manifest["schedule"].get("group", (1, 1))
     random = np.random.default_rng(2)
@@ -117,7 +117,7 @@ def denoised(runner, schedule, network, window, channels, numbers):
     gather = Gather(window, images)
     types = {"window": Type(shape=(gather.n_inputs,))}
     program = trace(lambda window: forward_whole(network, window), types, gather)
-    artifact = compile_program(program, runner.name, "native", schedule)
+    artifact = compile_program(program, language_named(runner.name).under("native"), schedule)
     assert artifact.manifest["schedule"]["name"] == schedule
     pieces = np.split(numbers, np.cumsum(list(channels.values()))[:-1], axis=-1)
     found = runner.run(artifact, {name: piece.copy() for name, piece in zip(channels, pieces, strict=True)})

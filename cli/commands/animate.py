@@ -21,8 +21,8 @@ from typing import Any
 from ...compiler.scenes.encode_kernel import feature_rays, sees
 from ...compiler.variants import FULL, with_rank
 from ...kernels import Pipeline, open_executor, render_on
+from ...kernels.run import before as past
 from ...kernels.run import render_frame
-from ...kernels.run.before import wants
 from ...kernels.run.denoise_on import Denoiser
 from ...kernels.run.pipeline import Drawn
 from ...kernels.run.render_on import Frames
@@ -135,7 +135,7 @@ def _draw(
         denoiser = Denoiser(runner, network, variant=with_rank(FULL, rank), pictures=len(left))
         # One device does both, from what the paths of a pixel have seen.
         features, noisy = network.features, shots[0].noisy
-        beside = any(FEATURES[name].guides or name == SUN for name in features) or wants(features)
+        beside = any(FEATURES[name].guides or name == SUN for name in features) or past.wants(features)
         together = renderer == executor != "numpy" and not (beside or (noisy.seen and feature_job(noisy)))
         draw = draw_frames if together else partial(draw_apart, film=shots)
         for _ in draw(left, watch, denoiser, renderer):
@@ -216,12 +216,10 @@ def draw_apart(
 
     `film`: all pictures of the film, in order, of which they are some.
     """
-    from ...kernels.run.before import Film, wants
-
     film = film or shots
     frames, model, render = Frames([shot.scene for shot in film]), watch.model, render_frame.render_frame
     wanted = {shot.path for shot in shots}
-    before = Film(renderer, [shot.scene for shot in film]) if wants(model.features) else None
+    before = past.Film(renderer, [shot.scene for shot in film]) if past.wants(model.features) else None
     # The history of a missing picture is made of all pictures before it.
     count = max((number for number, shot in enumerate(film, 1) if shot.path in wanted), default=0)
     for shot in shots if before is None else film[:count]:
@@ -245,18 +243,14 @@ def draw_frames(shots: Sequence[Shot], watch: Watch, denoiser: Denoiser, rendere
     if not shots:
         return
     first, scenes, model = shots[0], [shot.scene for shot in shots], watch.model
-    # A reference is traced by the pipeline's kernel, unless that has rays of features too, or sees more.
-    apart = feature_job(first.noisy) is not None or first.noisy.seen or first.noisy.shadow_rays
-    frames = Frames(scenes) if apart else None
-    executor = denoiser.executor
+    device, frames = denoiser.executor, Frames(scenes)
     with Pipeline(
-        executor,
+        device,
         first.scene,
         model,
         (first.noisy.height, first.noisy.width),
         settings=first.noisy.settings,
         show=("color",),
-        whole=first.reference is not None and frames is None,
         variant=denoiser.variant,
         pictures=denoiser.pictures,
         moving=scenes,
@@ -268,8 +262,7 @@ def draw_frames(shots: Sequence[Shot], watch: Watch, denoiser: Denoiser, rendere
             pipeline.draw(shot.noisy.seed)
             drawn, frame = pipeline.later(*dict.fromkeys(("color", *watch.features))), None
             if shot.reference:
-                moment = pipeline.moment if frames is None else None
-                frame = render_on(executor, shot.scene, shot.reference, moment=moment, frames=frames).frame
+                frame = render_on(device, shot.scene, shot.reference, frames=frames).frame
             # The picture before is written while the device draws this one.
             if before is not None:
                 before()

@@ -134,13 +134,14 @@ def export(
 
 def _export(model: Path, target: str, host: str, shown: Shown, kernel: Kernel, measured: bool) -> Export:
     """Return the export that the options ask for; `measured`: it says how long it takes."""
-    if measured:
-        checking.check_measured(target)
     settings = replace(Settings(max_depth=shown.max_depth), sampler=shown.sampler)
     motion = shown.motion()
     scene = motion.scenes[0] if motion else shown.at(shown.time) if shown.scene else None
     how = (kernel.profile, kernel.weights or "", kernel.network(), settings, kernel.schedule or "")
-    made = exported(Request(load_model(model, imported=True), target, scene, *how, motion, host))
+    request = Request(load_model(model, imported=True), target, scene, *how, motion, host)
+    if measured:
+        checking.check_measured(request)
+    made = exported(request)
     return with_speed(made, checking.measure(made)) if measured else made
 
 

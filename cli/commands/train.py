@@ -109,8 +109,15 @@ def train(
             model_file.save_model(output, whole_of(load_model(begin), frames, recipe.whole, recipe.seed))
             say(f"{output}: {begin} in integers, rounded on {len(frames)} frames")
             return
-        state = _fit_to_the_end(recipe, frames, output, state, network, chosen(executor, trains=True))
-        say(f"{output}: {state.step} steps; checkpoint in {saved}")
+        by = chosen(executor, trains=True)
+        with hint_on_interrupt(
+            lambda: f"{saved}: --resume continues from it" if saved.exists() else "no step was done"
+        ):
+            trained, _ = fit(recipe, frames, output, state, network, by)
+        if state is not None and recipe.steps != state.recipe.steps:
+            before, now = state.recipe.steps, recipe.steps
+            say(f"run extended from {before} to {now} steps: the model differs from one of a {now}-step run")
+        say(f"{output}: {trained.step} steps; checkpoint in {saved}")
         say(f"{output}: {_said_of_domain(of_model(load_model(output)))}")
 
 
@@ -159,28 +166,6 @@ def varied(recipe: Recipe, model: Model, name: str) -> tuple[Recipe, Siren]:
     )
     check_recipe(found)
     return found, network
-
-
-def _fit_to_the_end(
-    recipe: Recipe,
-    pairs: Sequence[tuple[Frame, Frame]],
-    output: Path,
-    begin: TrainState | None,
-    network: Siren | None,
-    executor: str,
-) -> TrainState:
-    """Train, and say how to resume after an interrupt, and that a longer run is another one."""
-    saved = checkpoint_path(output)
-
-    def hint() -> str:
-        return f"{saved}: --resume continues from it" if saved.exists() else "no step was done"
-
-    with hint_on_interrupt(hint):
-        state, _ = fit(recipe, pairs, output, begin, network, executor)
-    if begin is not None and recipe.steps != begin.recipe.steps:
-        before, now = begin.recipe.steps, recipe.steps
-        say(f"run extended from {before} to {now} steps: the model differs from one of a {now}-step run")
-    return state
 
 
 def check_begin(saved: Path, preset: Preset | None, resume: bool, restart: bool) -> None:

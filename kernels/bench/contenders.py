@@ -202,20 +202,23 @@ QUICK = ("onnxruntime", "oidn:fast")
 """Peers of a quick run: those that have nothing to compile."""
 
 
-def kernel(executor: str, schedule: str, variant: Variant = FULL) -> Contender:
-    """Return the kernel of an executor with a schedule: of the whole network, or of a variant."""
-    name, text = f"{executor}:{schedule}", schedule_named(executor, schedule).idea
+def kernel(language: Language | str, schedule: str, variant: Variant = FULL) -> Contender:
+    """Return the kernel in an executor's language with a schedule: of the whole network, or of a variant."""
+    language = language_named(language)
+    name, text = f"{language.name}:{schedule}", schedule_named(language, schedule).idea
     if variant is not FULL:
         name, text = f"{name}:{variant.name}", variant.text
-    opens = partial(_opened, executor, schedule, variant)
-    caches = CACHES.get(executor, NO_CACHE)
-    return Contender(name, text, opens, variant, executor, schedule, caches=caches)
+    opens = partial(_opened, language, schedule, variant)
+    caches = CACHES.get(language.name, NO_CACHE)
+    return Contender(name, text, opens, variant, language.name, schedule, caches=caches)
 
 
-def _opened(executor: str, schedule: str, variant: Variant, tools: Tools, model: Model, size: int) -> Opened:
+def _opened(
+    language: Language, schedule: str, variant: Variant, tools: Tools, model: Model, size: int
+) -> Opened:
     """Compile the kernel and build it."""
-    runner = tools.executor(executor)
-    plan = variant.plan(model, executor, schedule)
+    runner = tools.executor(language.name)
+    plan = variant.plan(model, language, schedule)
     artifact = compile_plan(plan)
     runner.build(artifact, (size, size))
     alone = getattr(runner, "kernel_seconds", None)
@@ -226,7 +229,7 @@ def _opened(executor: str, schedule: str, variant: Variant, tools: Tools, model:
         device=runner.device,
         stages=fused(artifact, sines_of(plan.analysed)),
         source_bytes=sum(len(each.source.encode()) for each in artifact.kernels),
-        rates=f"{executor}:{picked}{profile}",
+        rates=f"{language.name}:{picked}{profile}",
         kernel_seconds=alone and (lambda given: alone(artifact, _read(artifact, given))),
         schedule=picked,
         bound=bound_of(artifact),
@@ -256,10 +259,10 @@ def of_machine(
         except ExecutorUnavailable:
             suits = target.schedules[0].name
         schedules = [suits] if quick else [schedule.name for schedule in target.schedules]
-        found += [kernel(name, schedule) for schedule in schedules]
+        found += [kernel(target, schedule) for schedule in schedules]
         varied = [*(VARIANTS[:1] if quick else VARIANTS), *forms] if name in TARGETS else []
         for form in [*varied, *([] if quick else [INTEGERS])] if name != "numpy" else []:
-            found += [kernel(name, each, form) for each in _schedules(target, suits, form)]
+            found += [kernel(target, each, form) for each in _schedules(target, suits, form)]
     return [*found, *(peer for peer in peers() if not quick or peer.name in QUICK)]
 
 

@@ -32,7 +32,7 @@ from ..measure import PAUSE_S, Clock, Entry, take_turns
 from . import onnx_export
 from .check_pair import PATHS_ALIKE, PATHS_WITHIN, SEED
 from .host_runner import HostRunner
-from .package import Export
+from .package import Export, Request
 from .targets import ONNX, TARGETS, Row, opened
 
 
@@ -207,7 +207,7 @@ def measure(
     the median of a program in C that is compiled with -O2 alone. Raises InputError for a target
     whose own kind of device nothing opens here, ExecutorUnavailable where it is missing on this machine.
     """
-    check_measured(export.target)
+    check_measured(export.request)
     native, *plain = TARGETS[export.target].timed or [()]
     found = _measured(export, size, rounds, clock, native)
     for options in plain:
@@ -247,10 +247,12 @@ def _unseen(denoiser: Artifact) -> Artifact:
     return replace(denoiser, source=f"{denoiser.source}\n/* {secrets.token_hex()} */\n", before=before)
 
 
-def check_measured(target: str) -> None:
+def check_measured(request: Request) -> None:
     """Refuse a target of which nothing here runs what its users would run."""
-    row = TARGETS.get(target)
+    row = TARGETS.get(request.target)
     if row is None or row.stands_in:
         rule = "does not run on real hardware here, so a time would be meaningless"
         known = ", ".join(name for name, each in TARGETS.items() if not each.stands_in)
-        raise InputError("--measure with target", target, rule, f"leave it out, or choose one of {known}")
+        raise InputError(
+            "--measure with target", request.target, rule, f"leave it out, or choose one of {known}"
+        )

@@ -59,7 +59,7 @@ class ImageReport:
 
 
 def compare_images(
-    executor: Executor,
+    device: Executor,
     scene: Scene,
     job: Job,
     *,
@@ -72,7 +72,7 @@ def compare_images(
     """
     check_samples(job)
     counts = (KERNEL_SAMPLES * job.spp, job.spp)
-    found = render_on(executor, scene, replace(job, spp=counts[0]))
+    found = render_on(device, scene, replace(job, spp=counts[0]))
     other = replace(job, seed=(job.seed + 1) % 2**32)
     expected = render.render(scene, other, on_progress=on_progress)
     means, variances = zip(*map(blocks, (found, expected)), strict=True)

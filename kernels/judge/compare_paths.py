@@ -84,6 +84,11 @@ class View:
         """Refuse sizes and counters as a render does."""
         Job(self.width, self.height, 1, self.seed, first_sample=self.sample)
 
+    @property
+    def part(self) -> Part:
+        """Return what a path kernel has to draw."""
+        return Part(self.width, self.height, 0, self.height, self.sample, 1, self.seed)
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -154,13 +159,13 @@ class PathReport:
 # ---- paths ------------------------------------------------------------------------------------------------
 
 
-def kernel_of_states(programs: PathPrograms, executor: Executor) -> Artifact:
+def kernel_of_states(programs: PathPrograms, device: Executor) -> Artifact:
     """Return the kernel that follows paths to the programs' depth and tells their state."""
-    return compile_path(programs, executor.language, executor.lanes, tuple(END))
+    return compile_path(programs, device.language, device.lanes, tuple(END))
 
 
 def compare_paths(
-    executor: Executor,
+    device: Executor,
     scene: Scene,
     settings: Settings,
     view: View,
@@ -173,13 +178,13 @@ def compare_paths(
 
     on_progress is called with 1 after each depth.
     """
-    programs = lower_scene(scene, settings, executor.language.forms)
+    programs = lower_scene(scene, settings, device.language.forms)
     given = _given(view)
     before: State | None = None
     together = np.ones(view.width * view.height, bool)
     depths, examples = [], list[Unexplained]()
     own = _Paths(open_executor("numpy"), programs, view, kernel_of_states).states()
-    for depth, after in enumerate(_Paths(executor, programs, view, build).states()):
+    for depth, after in enumerate(_Paths(device, programs, view, build).states()):
         step = _Step(programs, arithmetic, depth, given, before, after)
         verdict = _judge(step, view)
         examples += verdict.examples[: SHOWN - len(examples)]
@@ -199,8 +204,7 @@ def compare_paths(
         before = {**after, "alive": step.entered & after["alive"]}
         if on_progress is not None:
             on_progress(1)
-    wrong = wrong_words(executor, given, settings.max_depth, view.width, view.height)
-    return PathReport(view, tuple(depths), tuple(examples), wrong)
+    return PathReport(view, tuple(depths), tuple(examples), wrong_words(device, view, settings.max_depth))
 
 
 def _given(view: View) -> State:
@@ -228,13 +232,12 @@ class _Paths:
 
     def states(self) -> Iterator[State]:
         """Yield, for each depth, the state of all paths (P,) as the kernel has it."""
-        view, kind = self.view, {**kinds({**PATH, **SURFACE}), "alive": "bool"}
-        part = Part(view.width, view.height, 0, view.height, view.sample, 1, view.seed)
+        kind = {**kinds({**PATH, **SURFACE}), "alive": "bool"}
         for depth in range(self.programs.settings.max_depth + 1):
             # Paths end after so many scatterings and one more arrival.
             stopped = replace(self.programs, settings=replace(self.programs.settings, max_depth=depth))
             kernel = self.build(stopped, self.executor)
-            sums = self.executor.trace(kernel, part).reshape(len(kernel.planes), -1)
+            sums = self.executor.trace(kernel, self.view.part).reshape(len(kernel.planes), -1)
             yield {
                 plane.removeprefix("last_"): _as_kind(values, kind[plane.removeprefix("last_")])
                 for plane, values in zip(kernel.planes, sums, strict=True)
@@ -410,16 +413,11 @@ def words(given: Mapping[str, Any], max_depth: int) -> list[Any]:
     return [reduce(lambda a, b: a ^ b, same) for same in zip(*blocks, strict=True)]
 
 
-def wrong_words(
-    executor: Executor, given: Mapping[str, NDArray[Any]], max_depth: int, width: int, height: int
-) -> int:
-    """Return for how many paths (P,) of an image the executor's generator gives other words."""
-    kernel = compile_path(_programs(max_depth), executor.language, executor.lanes, CARRIERS)
-    sample, seed = (int(given[name][0]) for name in ("sample_number", "seed"))
-    found = executor.trace(kernel, Part(width, height, 0, height, sample, 1, seed)).reshape(
-        len(kernel.planes), -1
-    )
-    expected = [half.astype(np.float32) for word in words(given, max_depth) for half in _halves(word)]
+def wrong_words(device: Executor, view: View, max_depth: int) -> int:
+    """Return for how many paths of a view the device's generator gives other words."""
+    kernel = compile_path(_programs(max_depth), device.language, device.lanes, CARRIERS)
+    found = device.trace(kernel, view.part).reshape(len(kernel.planes), -1)
+    expected = [half.astype(np.float32) for word in words(_given(view), max_depth) for half in _halves(word)]
     return int(np.any(found[: len(expected)] != np.stack(expected), axis=0).sum())
 
 

@@ -48,10 +48,10 @@ class Outcome:
     failure: str = ""
 
 
-def attempt(executor: Executor, artifact: Artifact, images: Images) -> Outcome:
+def attempt(device: Executor, artifact: Artifact, images: Images) -> Outcome:
     """Run a kernel; an error in the house's words is a refusal, any other a failure."""
     try:
-        return Outcome(executor.run(artifact, images))
+        return Outcome(device.run(artifact, images))
     except WamnetError as error:
         return Outcome(refusal=_line(str(error)))
     except Exception as error:  # noqa: BLE001 - whatever it is, it is the result

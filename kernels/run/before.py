@@ -13,7 +13,7 @@ edge, or whose place lies between two pixels, by less than the rounding error; e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...compiler.kernel.interface import CAMERAS, FIRST, IMAGE, MOTIONS, PAST, RESULT
 from ...compiler.scenes.emit_path import planes
 from ...compiler.scenes.history_kernel import compile_history
-from ...models.data.frame_plan import Task, version
+from ...models.data.frame_plan import Picture, Task, version
 from ...refimpl import vectors
 from ...refimpl.errors import InputError
 from ...refimpl.frame import HISTORY, Floats, Frame
@@ -84,18 +84,13 @@ def jobs_before(job: Job, count: int) -> Iterator[Job]:
     return (replace(plain, first_sample=job.first_sample + job.spp * k) for k in range(count, 0, -1))
 
 
-def followed(
-    executor: str,
-    scene_at: Callable[[float], Scene],
-    job: Job,
-    count: int,
-    on_progress: Progress | None = None,
-) -> Frame:
-    """Return a job's frame with layers of history after `count` pictures, of a scene by its time from now."""
-    scenes = [scene_at((number - count) / PER_S) for number in range(count + 1)]
-    film = Film(executor, scenes)
+def followed(picture: Picture, on_progress: Progress | None = None) -> Frame:
+    """Return a picture's frame with layers of history, after the pictures before it."""
+    count, job = picture.before, picture.job
+    scenes = [picture.scene_at((number - count) / PER_S) for number in range(count + 1)]
+    film = Film(picture.request.executor, scenes)
     for each, now in zip([*jobs_before(job, count), job], scenes, strict=True):
-        rendered = render_frame(executor, now, each, on_progress=on_progress, frames=film.frames).frame
+        rendered = render_frame(film.executor, now, each, on_progress=on_progress, frames=film.frames).frame
         frame = film.add(now, each, rendered)
     return frame
 
@@ -106,9 +101,9 @@ def carry_out(task: Task, on_progress: Progress | None = None) -> Frame:
         rule = f"the data set is made by {task.version}, and every worker must have the same"
         raise InputError("version of wamnet on a worker", version(), rule, "install that version there")
     picture = task.picture
-    executor = picture.request.executor
     if picture.before:
-        return followed(executor, picture.scene_at, picture.job, picture.before, on_progress)
+        return followed(picture, on_progress)
+    executor = picture.request.executor
     return render_frame(executor, picture.scene, picture.job, rows=task.rows, on_progress=on_progress).frame
 
 
@@ -120,7 +115,7 @@ END = ("last_surface", "last_point", "last_normal", "last_direction")
 
 
 def follow_on(
-    executor: Executor,
+    device: Executor,
     past: History | None,
     scene: Scene,
     job: Job,
@@ -133,7 +128,7 @@ def follow_on(
     `frames` may have the kernel that traces the scene. Raises InputError as history.begin and follow do.
     """
     history.check_picture(job, color, past)
-    first = first_hits_on(executor, scene, job, frames)
+    first = first_hits_on(device, scene, job, frames)
     before = past
     if before is None:
         # A picture that knows nothing: all of it shows "nothing", of no samples.
@@ -150,19 +145,19 @@ def follow_on(
         MOTIONS: _motions(moves, limits),
         CAMERAS: np.concatenate(cameras, dtype=np.float32),
     }
-    kernel = compile_history(executor.language)
+    kernel = compile_history(device.language)
     integers = plane_integers(kernel, (job.height, job.width))
-    number, *normal, red, green, blue, count = executor.call(kernel, arrays, integers)[RESULT]
+    number, *normal, red, green, blue, count = device.call(kernel, arrays, integers)[RESULT]
     mean = np.stack([red, green, blue], axis=-1)
     return History(scene, number.astype(np.int32), np.stack(normal, axis=-1), mean, count)
 
 
-def first_hits_on(executor: Executor, scene: Scene, job: Job, frames: Frames | None = None) -> First:
+def first_hits_on(device: Executor, scene: Scene, job: Job, frames: Frames | None = None) -> First:
     """Return the first hits (H, W) of a job's first sample."""
     unscattered = replace(job.settings, max_depth=0)
     plain = replace(job, spp=1, feature_spp=0, feature_sampler="", seen=False)
     plain = replace(plain, shadow_rays=0, settings=unscattered)
-    moment = (frames or frames_of(scene)).of(executor, scene, plain, groups=END)
+    moment = (frames or frames_of(scene)).of(device, scene, plain, groups=END)
     found = dict(zip(planes(END), moment.totals(plain, (0, job.height)).planes, strict=True))
     point, normal, direction = (
         np.stack([found[f"last_{name}_{axis}"] for axis in "xyz"], axis=-1)

@@ -11,23 +11,27 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.artifact import Artifact, SmoothKernels, schedule_text
-from ...compiler.kernel.interface import FULL, PLAIN
+from ...compiler.artifact import Artifact, SmoothKernels, schedule_text, weight_bytes
+from ...compiler.core.ir import Image
+from ...compiler.kernel.interface import FULL, PLAIN, Array, Interface
 from ...models.model_file import model_bytes
 from ...refimpl.frame import Frame
 from ...refimpl.network.dataset import FEATURES, Normalization
 from ...refimpl.network.denoise import Model, input_image
+from .. import cache
 from ..devices.executor import Executor
 from ..devices.kernel import Images, Size
 from ..devices.passes import Filter
@@ -37,15 +41,6 @@ from .tune import Subject, Tuning
 if TYPE_CHECKING:
     from ...compiler.core.ir import Program
     from ...compiler.plan import Plan
-import base64
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from typing import Any
-
-from ...compiler.artifact import weight_bytes
-from ...compiler.core.ir import Image
-from ...compiler.kernel.interface import Array, Interface
-from .. import cache
 
 BLOCK_PIXELS = 2**14
 """Pixels of a block of rows that is encoded at once: some copies of it fit a processor's cache."""
@@ -232,7 +227,7 @@ class Denoiser:
 
 
 def denoise_on(
-    executor: Executor,
+    device: Executor,
     model: Model,
     frame: Frame,
     schedule: str | None = None,
@@ -246,7 +241,7 @@ def denoise_on(
     `variant`: with fewer operations [variants.py]. `images`: those of [`images_of`], for whoever compares
     with the reference's image; by default the device may make them [`Denoiser.images`].
     """
-    return Denoiser(executor, model, schedule, variant, pictures, keeps).run(frame, images)
+    return Denoiser(device, model, schedule, variant, pictures, keeps).run(frame, images)
 
 
 def products_of(program: Program) -> int:

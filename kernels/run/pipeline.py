@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...compiler.artifact import Artifact
 from ...compiler.compile import compile_plan
-from ...compiler.scenes.emit_path import FRAME_GROUPS, planes
+from ...compiler.scenes.emit_path import planes
 from ...compiler.scenes.encode_kernel import compile_encode, encoding_of, layers_of, sees
 from ...compiler.scenes.lower_scene import FeatureRays
 from ...compiler.scenes.scene_inputs import SceneInputs
@@ -52,7 +52,7 @@ class Drawn:
     images: Mapping[str, NDArray[np.float32]]
 
 
-def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
+def _rays_of(job: Job, seen: bool) -> FeatureRays | None:
     """Return the features' own rays of a job of one path, if there are any, or refuse them."""
     if feature_job(job) is None:
         return None
@@ -63,35 +63,30 @@ def _rays_of(job: Job, whole: bool, seen: bool) -> FeatureRays | None:
     if source not in (sampler, SPREAD[sampler]):
         rule = f"in a pipeline the first ray is that of the path, whose sampler is {sampler}"
         raise InputError("feature_sampler", source, rule, f"use {sampler} or {SPREAD[sampler]}")
-    if whole:
-        rule = "kernels of render_on trace no rays of features"
-        raise InputError("whole", whole, rule, "render references with a separate kernel")
     return FeatureRays(job.feature_spp, source)
 
 
 class Pipeline(Closing):
     """A scene and a model on an open executor, for pictures of one size; a context manager.
 
-    `show` names features that are to be readable in addition to the model's. With `whole`, paths are traced
-    by the kernel of render_on.py, which writes more than is needed: one to compile where both are used.
-    `moving` are scenes that [`set_scene`] will be given, or the numbers that are inputs: the path kernel is
-    then compiled once for all of them. A `variant` of the model has fewer operations [variants.py]. So many
-    `pictures` are to come: what compiles long may pay [tune.py]. The kernels are `path`, `encode` and
-    `denoise`; `moment` is the path kernel with the scene's numbers; `passes` runs them one by one.
-    `feature_spp` and `feature_sampler` are those of a Job, whose features the images then have; the paths'
-    first camera ray is one of these rays. With `sums` the encoding is a kernel of its own on all devices.
+    `show` names features that are to be readable in addition to the model's. `moving` are scenes that
+    [`set_scene`] will be given, or the numbers that are inputs: the path kernel is then compiled once for all
+    of them. A `variant` of the model has fewer operations [variants.py]. So many `pictures` are to come: what
+    compiles long may pay [tune.py]. The kernels are `path`, `encode` and `denoise`; `moment` is the path
+    kernel with the scene's numbers; `passes` runs them one by one. `feature_spp` and `feature_sampler` are
+    those of a Job, whose features the images then have; the paths' first camera ray is one of these rays.
+    With `sums` the encoding is a kernel of its own on all devices.
     """
 
     def __init__(
         self,
-        executor: Executor,
+        device: Executor,
         scene: Scene,
         model: Model,
         size: tuple[int, int],
         *,
         settings: Settings | None = None,
         show: Sequence[str] = (),
-        whole: bool = False,
         variant: str = FULL,
         pictures: int = 1,
         sums: bool = False,
@@ -102,7 +97,7 @@ class Pipeline(Closing):
         """Compile all kernels for pictures of `size` (height, width)."""
         check_model(model)
         # The first picture does not wait for a proof that nobody reads.
-        plan = replace(plan_model(model, executor.language, executor.profile, variant=variant), proves=False)
+        plan = replace(plan_model(model, device.language, device.profile, variant=variant), proves=False)
         model = plan.model
         self._height, self._width = size
         self._settings = settings or Settings()
@@ -112,30 +107,25 @@ class Pipeline(Closing):
         rays = {"feature_spp": feature_spp, "feature_sampler": feature_sampler}
         job = Job(self._width, self._height, settings=self._settings, **rays)  # type: ignore[arg-type]
         shadow_rays = learned_shadow_rays(replace(model, features=self._features))
-        self._rays = _rays_of(job, whole, sees(self._features))
-        if whole and sees(self._features):
-            rule = "a frame's kernel writes the first hits, and what is seen past them is of another one"
-            raise InputError("whole", whole, rule, "render references with a separate kernel")
+        self._rays = _rays_of(job, sees(self._features))
         self._in_integers = integers = model.is_whole
         features, scales = self._features, model.normalization
-        language = executor.language
+        language = device.language
         count = self._rays.count if self._rays else 0
-        # A kernel of whole frames leaves sums, which are read in another way too.
-        painted = executor.paints and not whole and not sums
+        painted = device.paints and not sums
         encoding = (
             encoding_of(features, scales, language.profile.passes, integers, count) if painted else None
         )
         groups = layers_of(self._features)
-        groups = tuple(dict.fromkeys((*FRAME_GROUPS, *groups))) if whole else groups
         more = {"seen": sees(self._features), "rays": self._rays, "shadow_rays": shadow_rays}
-        self._paths = MovingPaths(executor, self._settings, groups, more, encoding, moving)
+        self._paths = MovingPaths(device, self._settings, groups, more, encoding, moving)
         self.set_scene(scene)
         planned = planes(groups)
         self.encode = compile_encode(features, scales, language, planned, integers, count)
-        schedule, _ = Tuning(executor, Subject.of(plan), size).picked(pictures)
+        schedule, _ = Tuning(device, Subject.of(plan), size).picked(pictures)
         self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False
-        self.passes = Passes(executor, self.encode, self.denoise, size)
+        self.passes = Passes(device, self.encode, self.denoise, size)
 
     def set_scene(self, scene: Scene) -> None:
         """Continue with another scene, or another time of it.

@@ -30,7 +30,7 @@ from ...compiler.scenes.emit_path import FRAME_GROUPS, GROUPS, Encoding, planes
 from ...compiler.scenes.lower_scene import lower_scene
 from ...compiler.scenes.path_kernel import can_move, compile_path
 from ...compiler.scenes.scene_inputs import SceneInputs, Tables, layout_of, tables_of
-from ...refimpl.errors import NO_VALUE, InputError
+from ...refimpl.errors import InputError
 from ...refimpl.frame import LIT, SEEN, Frame
 from ...refimpl.light.render import (
     Job,
@@ -72,16 +72,16 @@ class Frames:
         self._scenes = tuple(scenes)
         self._paths: dict[tuple[object, ...], MovingPaths] = {}
 
-    def of(self, executor: Executor, scene: Scene, job: Job, groups: Sequence[str] = ()) -> Moment:
+    def of(self, device: Executor, scene: Scene, job: Job, groups: Sequence[str] = ()) -> Moment:
         """Return the kernel that renders a job's scene on an executor, and the scene's numbers.
 
         `groups` are those of its planes, by default what the job's frame is made of.
         """
         settings, groups = job.settings, tuple(groups) or groups_of(job)
-        key = (executor.name, executor.lanes, executor.profile, settings, groups, job.shadow_rays)
+        key = (device.name, device.lanes, device.profile, settings, groups, job.shadow_rays)
         if key not in self._paths:
             more = {"seen": job.seen, "shadow_rays": job.shadow_rays}
-            paths = MovingPaths(executor, settings, groups, more, moving=self._scenes)
+            paths = MovingPaths(device, settings, groups, more, moving=self._scenes)
             self._paths[key] = paths
         return self._paths[key].of(scene)
 
@@ -93,40 +93,36 @@ def frames_of(scene: Scene) -> Frames:
 
 
 def render_on(
-    executor: Executor,
+    device: Executor,
     scene: Scene,
     job: Job,
     *,
     rows: tuple[int, int] | None = None,
     on_progress: Callable[[int], None] | None = None,
-    moment: Moment | None = None,
     frames: Frames | None = None,
 ) -> Render:
     """Render the rows [first, last) of a scene on an executor, all by default, in float32.
 
-    on_progress is called with the number of samples that were just finished. `moment`: the scene's kernel
-    with all planes of a frame, and its numbers, or `frames` that have it; by default it is compiled.
+    on_progress is called with the number of samples that were just finished. `frames`: those that
+    have the scene's kernel; by default it is compiled.
     """
     if job.dtype != "float32":
         raise InputError("dtype", job.dtype, "kernels compute in float32", "render with --executor numpy")
     if feature_job(job) is not None:
-        again = partial(render_on, executor, scene, rows=rows, on_progress=on_progress, frames=frames)
+        again = partial(render_on, device, scene, rows=rows, on_progress=on_progress, frames=frames)
         return with_own_features(scene, job, again)
     first, last = checked_rows(job, rows)
-    if job.seen and len(planes(groups_of(job))) > executor.language.dialect.max_planes:
+    if job.seen and len(planes(groups_of(job))) > device.language.dialect.max_planes:
         # The same paths twice, for layers that no kernel of this device writes at once.
         settings = job.settings if job.color else feature_settings(job.settings, False)
         plain = replace(job, seen=False, settings=settings)
-        again = partial(render_on, executor, scene, rows=rows, frames=frames)
+        again = partial(render_on, device, scene, rows=rows, frames=frames)
         hits, past = again(plain, on_progress=on_progress), replace(job, color=False)
         names = [name for name in job.layers if name not in plain.layers]
-        moment = (frames or frames_of(scene)).of(executor, scene, past, names)
+        moment = (frames or frames_of(scene)).of(device, scene, past, names)
         seen = _render(moment.kernel, moment.totals(past, (first, last)), names, {})
         return joined(scene, job, hits, seen)
-    moment = moment or (frames or frames_of(scene)).of(executor, scene, job)
-    if moment.kernel.programs.rays:
-        rule = "has separate feature rays, and a render's kernel sums features over the samples"
-        raise InputError("kernel", NO_VALUE, rule, "render with frames=, or without either")
+    moment = (frames or frames_of(scene)).of(device, scene, job)
     totals = moment.totals(job, (first, last), on_progress)
     return _render(moment.kernel, totals, job.layers, render_info(scene, job))
 

@@ -127,7 +127,7 @@ class Run:
 
 
 def train_on(
-    executor: Executor,
+    device: Executor,
     recipe: Recipe,
     pairs: Sequence[tuple[Frame, Frame]],
     *,
@@ -149,7 +149,7 @@ def train_on(
     if state is None:
         state = train.start(recipe, normalization, data.digest, network=network)
     state = train.resumed(state, recipe, data.digest)
-    run = begin(executor, recipe, data, state)
+    run = begin(device, recipe, data, state)
     end = recipe.steps if until is None else min(until, recipe.steps)
     keep = on_checkpoint or (lambda state: None)
     stops = [recipe.log_every, *([checkpoint_every] if checkpoint_every else [])]
@@ -173,7 +173,7 @@ def train_on(
     return final
 
 
-def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) -> Run:
+def begin(device: Executor, recipe: Recipe, data: Dataset, state: TrainState) -> Run:
     """Compile the step, and put the state on the device."""
     if state.siren.dtype != np.float32:
         rule = "a device trains in float32"
@@ -182,9 +182,9 @@ def begin(executor: Executor, recipe: Recipe, data: Dataset, state: TrainState) 
     kernel = compile_step(
         recipe.layer_widths, omegas, recipe.batch, recipe.window.size, recipe.rank, recipe.activation
     )
-    device = executor.open_trainer(kernel, data.values, data.targets)
-    load(device, state)
-    return Run(device, recipe, data, state.step, state.step, state, dict(state.history))
+    trainer = device.open_trainer(kernel, data.values, data.targets)
+    load(trainer, state)
+    return Run(trainer, recipe, data, state.step, state.step, state, dict(state.history))
 
 
 def load(device: Any, state: TrainState) -> None:

@@ -56,11 +56,11 @@ Own = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 class OnExecutor:
     """Functions as kernels, compiled at their first use."""
 
-    def __init__(self, executor: Executor) -> None:
-        self.executor = executor
+    def __init__(self, device: Executor) -> None:
+        self.executor = device
         self._own: dict[str, Own] = {"picture.denoised": self._denoised, "whole.forward": self._whole}
-        if executor.language.paths:
-            how = partial(render_on, executor)
+        if device.language.paths:
+            how = partial(render_on, device)
             self._own |= {"path.whole": self._vertices, "picture.rendered": partial(rendered, how=how)}
         self.kinds = [*FUNCTIONS, *self._own]
         self._compiled, self._programs = cache(self._compile), cache(self._lowered)

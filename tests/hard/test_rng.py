@@ -20,15 +20,13 @@ LAST = 2**32 - 1
 )
 def test_last_counters(executor, view):
     """All words of 20 bounces at the last sample and seed: products wrap modulo 2^32, everywhere alike."""
-    given = compare_paths._given(view)
-    assert compare_paths.wrong_words(executor, given, 20, view.width, view.height) == 0
+    assert compare_paths.wrong_words(executor, view, 20) == 0
 
 
 def test_wide_pictures(executor):
     """Pixels of a row of 5,000 and of a column of 5,000: numbers beyond 16 bits are not cut."""
     for view in (View(5_000, 1), View(1, 5_000)):
-        given = compare_paths._given(view)
-        assert compare_paths.wrong_words(executor, given, 0, view.width, view.height) == 0
+        assert compare_paths.wrong_words(executor, view, 0) == 0
 
 
 def test_neighbouring_counters_at_the_wrap_are_unrelated():

@@ -124,8 +124,7 @@ def test_bounds_are_as_tight_as_rounding(executor_named):
 def test_random_numbers_are_the_reference_s_to_the_bit(executor):
     """All words of all blocks that a path of five bounces may use, for seeds and samples of 32 bits."""
     for view in (View(13, 7), View(5, 3, sample=2**32 - 1, seed=2**32 - 1)):
-        given = compare_paths._given(view)
-        assert compare_paths.wrong_words(executor, given, 5, view.width, view.height) == 0
+        assert compare_paths.wrong_words(executor, view, 5) == 0
 
 
 # ---- wrong kernels -----------------------------------------------------------------------------------------
@@ -274,8 +273,7 @@ def test_other_random_words_are_counted(executor_named):
             sums[0, 0, 0] += 1.0
             return sums
 
-    given = compare_paths._given(View(5, 4))
-    assert compare_paths.wrong_words(Broken(), given, 1, 5, 4) == 1
+    assert compare_paths.wrong_words(Broken(), View(5, 4), 1) == 1
 
 
 def test_views_outside_their_rules_are_refused():

@@ -275,13 +275,14 @@ from wamnet import kernels
 from wamnet.compiler.compile import compile_program
 from wamnet.compiler.core.ir import Gather, Image, Type
 from wamnet.compiler.core.trace import trace
+from wamnet.compiler.targets import language_named
 from wamnet.refimpl.network.window import Window
 
 gather = Gather(Window(1, "clamp"), (Image("a", 1, -1.0, 1.0),))
 program = trace(lambda x: np.sin(x), {"window": Type(shape=(1,))}, gather)
 image = {"a": np.ones((1, 1, 1), np.float32)}
 with kernels.open_executor("opengl", context="egl") as executor:
-    print(executor.run(compile_program(program, "opengl", "native"), image).item())
+    print(executor.run(compile_program(program, language_named("opengl").under("native")), image).item())
     try:
         executor.run(compile_program(program, "opengl"), image)
     except Exception as error:

@@ -199,15 +199,9 @@ def test_rays_of_features_that_mean_nothing_are_refused(executor_named, model_of
     given = (executor, scene("empty"), model, (2, 2))
     with pytest.raises(InputError, match="feature_sampler 'sobol': in a pipeline the first ray is that of"):
         Pipeline(*given, feature_spp=4, feature_sampler="sobol")
-    with pytest.raises(InputError, match="whole True: kernels of render_on trace no rays of features"):
-        Pipeline(*given, feature_spp=4, whole=True)
     with pytest.raises(InputError, match="feature_spp 4: in a pipeline the paths see through mirrors"):
         Pipeline(*given, feature_spp=4, show=("seen_albedo",))
-    with pytest.raises(InputError, match="whole True: a frame's kernel writes the first hits, and what is"):
-        Pipeline(*given, whole=True, show=("seen_albedo",))
     with Pipeline(*given, feature_spp=4) as pipeline:
-        with pytest.raises(InputError, match="kernel: has separate feature rays, and a render's kernel sums"):
-            render_on(executor, scene("empty"), Job(2, 2), moment=pipeline.moment)
         with pytest.raises(InputError, match="spp 4: features are of 4 camera rays: there must be fewer"):
             pipeline.draw(0, 4)
         with pytest.raises(InputError, match="first_sample 1: rays of net begin with the ray of sample 0"):

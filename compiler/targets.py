@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from ..refimpl.errors import CompileError, choice
@@ -78,11 +79,17 @@ class Language:
 
     def under(self, name: str) -> Language:
         """Return the language under another numerical profile."""
-        return self if name == self.profile.name else replace(self, profile=profile_named(name))
+        return self if name == self.profile.name else _with_profile(self, name)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes by name: schedules hold functions."""
         return _under, (self.name, self.profile.name)
+
+
+@cache  # what is compiled for a language is kept by the language
+def _with_profile(language: Language, name: str) -> Language:
+    """Return a language with another profile."""
+    return replace(language, profile=profile_named(name))
 
 
 def _under(name: str, profile_name: str) -> Language:

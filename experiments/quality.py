@@ -44,7 +44,7 @@ from wamnet.kernels import open_executor
 from wamnet.kernels.devices.executor import Executor
 from wamnet.kernels.measure import in_turns
 from wamnet.kernels.run.denoise_on import Denoiser, images_of
-from wamnet.kernels.run.tune import Subject, Tuning
+from wamnet.kernels.run.tune import Tuning
 from wamnet.models.data.frame_plan import OUTSIDE, TEST, TRAIN
 from wamnet.refimpl.encoding import to_display
 from wamnet.refimpl.errors import InputError
@@ -405,7 +405,7 @@ def timed(bench: Bench, kept: Results, rounds: int) -> None:
             model, _ = bench.model(ROWS[row], 0)
             size = (frame.height, frame.width)
             plan = plan_model(model, device.name)
-            plan = plan.scheduled(Tuning(device, Subject.of(plan), size).picked(rounds)[0])
+            plan = plan.scheduled(Tuning(device, plan.model, size, plan.varied.rank).picked(rounds)[0])
             kernel = compile_plan(plan)
             device.build(kernel, size)
             ways |= _ways(device, model, kernel, frame, row)

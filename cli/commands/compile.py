@@ -20,7 +20,7 @@ from ...compiler.scenes import lower_scene, path_kernel
 from ...compiler.scenes.path_kernel import compile_path
 from ...compiler.targets import Language, language_named
 from ...kernels import open_executor
-from ...kernels.run.tune import Subject, Tuning
+from ...kernels.run.tune import Tuning
 from ...refimpl.errors import NO_VALUE, InputError, choice
 from ...refimpl.light.scenes import CANONICAL
 from ...refimpl.light.transport import Settings
@@ -111,8 +111,9 @@ def _compiled_model(
         # For many of the paper's images.
         refuse(given(network, "schedule"), "--here chooses another", "leave one of them out")
         with open_executor(language.name) as runner:
+            runner.profile = network.profile
             plan = network.plan(model, language.name)
-            schedule, reason = Tuning(runner, Subject.of(plan), (1024, 1024)).picked(1000)
+            schedule, reason = Tuning(runner, plan.model, (1024, 1024), plan.varied.rank).picked(1000)
             say(f"schedule {schedule} for {runner.device}: {reason}")
         network = replace(network, schedule=schedule)
     return compile_plan(network.plan(model, language))

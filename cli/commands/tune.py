@@ -8,7 +8,7 @@ from ...compiler.variants import FULL, plan_model, with_rank
 from ...kernels import cache as cache_folders
 from ...kernels import open_executor
 from ...kernels.bench.workload import paper_model
-from ...kernels.run.tune import Subject, Table, Tuning
+from ...kernels.run.tune import Table, Tuning
 from ..common import options
 from ..common.inputs import load_model
 from ..common.options import ExecutorName
@@ -37,7 +37,7 @@ def tune(
     alone = alone_in(folder, "tuning", remedy) if folder and kept else nullcontext()
     with alone, open_executor(executor.value) as runner:
         plan = plan_model(network, runner.name, variant=with_rank(FULL, rank))
-        tuning = Tuning(runner, Subject.of(plan), square)
+        tuning = Tuning(runner, plan.model, square, plan.varied.rank)
         known = None if force else tuning.remembered()
         found = known or tuning.measured(plan)
         # A long compilation may pay for an animation.

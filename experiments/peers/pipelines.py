@@ -30,7 +30,7 @@ from wamnet.kernels.measure import Entry
 from wamnet.kernels.run.denoise_on import images_of
 from wamnet.kernels.run.pipeline import Pipeline
 from wamnet.kernels.run.render_on import render_on
-from wamnet.kernels.run.tune import Subject, Tuning
+from wamnet.kernels.run.tune import Tuning
 from wamnet.models.data.scene_source import scene_source
 from wamnet.refimpl.light.render import Job
 from wamnet.refimpl.light.scene import Scene
@@ -90,7 +90,7 @@ class Ours:
         shots, scene, size = moments(self.scene), scene_source(self.scene).at(), self.size
         job = Job(size, size, feature_spp=self.rays, shadow_rays=learned_shadow_rays(self.model))
         plan = plan_model(self.model, self.executor.name)
-        schedule, _ = Tuning(self.executor, Subject.of(plan), (size, size)).picked()
+        schedule, _ = Tuning(self.executor, plan.model, (size, size), plan.varied.rank).picked()
         denoiser = compile_plan(plan.scheduled(schedule))
 
         def separate() -> None:

@@ -41,7 +41,7 @@ from .. import cache
 from ..devices.executor import Executor
 from ..measure import in_turns
 from .denoise_on import images_of
-from .tune import TRIAL, Subject, Tuning, noise
+from .tune import TRIAL, Tuning, noise
 
 SCHEMA = "wamnet-curve-1"
 """Name and version of a curve's form; described in spec/variants.md."""
@@ -317,7 +317,7 @@ class Measurement:
         """Return the schedules under which the full network is fastest on a small picture, the best first."""
         plan = self._plan()
         found = (_compiled(plan.scheduled(schedule.name)) for schedule in plan.target.schedules)
-        small = Tuning(self.executor, Subject.of(plan), (TRIAL, TRIAL))
+        small = Tuning(self.executor, plan.model, (TRIAL, TRIAL), plan.varied.rank)
         trials = {artifact.plan.asked: small.trial(artifact) for artifact in found if artifact}
         return tuple(sorted(trials, key=trials.__getitem__)[:MOST_SCHEDULES])
 

@@ -36,7 +36,7 @@ from ..devices.executor import Executor
 from ..devices.kernel import Images, Size
 from ..devices.passes import Filter
 from ..memory import cores, keep_freed_memory
-from .tune import Subject, Tuning
+from .tune import Tuning
 
 if TYPE_CHECKING:
     from ...compiler.core.ir import Program
@@ -159,8 +159,8 @@ class Denoiser:
         """Return the kernel, not yet built, and why it has this schedule."""
         name, reason = self.schedule, "as asked"
         if name is None:
-            subject = Subject.of(self.plan) if self.plan else Subject(self.full, self.executor.profile)
-            name, reason = Tuning(self.executor, subject, size).picked(self.pictures)
+            rank = self.plan.varied.rank if self.plan else 0
+            name, reason = Tuning(self.executor, self.model, size, rank).picked(self.pictures)
         if not self.keeps:
             return self._compiled(name)[0], reason
         digest = hashlib.sha256(model_bytes(self.full)).hexdigest()

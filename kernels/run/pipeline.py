@@ -41,7 +41,7 @@ from ..devices.executor import Executor
 from ..devices.kernel import Closing, Part
 from ..devices.passes import PICTURE, Passes
 from .render_on import SAMPLES_AT_ONCE, MovingPaths
-from .tune import Subject, Tuning
+from .tune import Tuning
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Pipeline(Closing):
         self.set_scene(scene)
         planned = planes(groups)
         self.encode = compile_encode(features, scales, language, planned, integers, count)
-        schedule, _ = Tuning(device, Subject.of(plan), size).picked(pictures)
+        schedule, _ = Tuning(device, plan.model, size, plan.varied.rank).picked(pictures)
         self.denoise = compile_plan(plan.scheduled(schedule))
         self._drawn = self._closed = False
         self.passes = Passes(device, self.encode, self.denoise, size)

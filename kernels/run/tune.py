@@ -83,26 +83,16 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Subject:
-    """What a table is about: a network, the name of its profile, and the rank of its first layer or 0."""
-
-    model: Model
-    profile: str = "ieee"
-    rank: int = 0
-
-    @staticmethod
-    def of(plan: Plan) -> Subject:
-        """Return that of a plan."""
-        return Subject(plan.model, plan.profile.name, plan.cut.rank if plan.cut else 0)
-
-
-@dataclass(frozen=True)
 class Tuning:
-    """The schedules of a subject on an open device, for pictures of a size (height, width)."""
+    """The schedules of a network on an open device, for pictures of a size (height, width).
+
+    `rank`: that of its first layer, if it is cut to one.
+    """
 
     executor: Executor
-    subject: Subject
+    model: Model
     size: tuple[int, int]
+    rank: int = 0
 
     def picked(self, pictures: int = 1) -> tuple[str, str]:
         """Return the schedule for so many pictures, as measured here or built in, and why, without a plan."""
@@ -111,16 +101,16 @@ class Tuning:
             height, width = table.size
             text = f"tuned on this device on {table.day}: {best.ms:.3g} ms at {width}x{height}"
             return best.schedule, f"{text}, {best.again_s:.2g} s to build"
-        if self.subject.model.is_whole and (name := self.executor.byte_schedule):
+        if self.model.is_whole and (name := self.executor.byte_schedule):
             return name, "built-in choice for integers on devices that multiply bytes"
         return self.executor.schedule_for(self.size), self.executor.schedule_reason
 
     @property
     def entry(self) -> str:
         """Return the name of the cache's entry: a table of other kernels than today's is no use."""
-        model = self.subject.model
+        model = self.model
         network = [list(model.siren.widths), list(model.features), model.window.size, model.window.border]
-        how = [self.subject.profile, self.subject.rank, size_class(self.size), cache.program_version()]
+        how = [self.executor.profile, self.rank, size_class(self.size), cache.program_version()]
         return f"tuning-{cache.key(*self.executor.identity, network, *how)}"
 
     def remembered(self) -> Table | None:
@@ -130,7 +120,7 @@ class Tuning:
         return None
 
     def measured(self, plan: Plan, repeats: int = REPEATS) -> Table:
-        """Measure all schedules of a plan of the subject, keep the table, and return it."""
+        """Measure all schedules of a plan of the network, keep the table, and return it."""
         crop, images = noise(plan.analysed, CROP), noise(plan.analysed, self.size)
         rows: dict[str, Row] = {}
         ready: dict[str, Artifact] = {}

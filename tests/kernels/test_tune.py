@@ -13,7 +13,7 @@ from wamnet.compiler.targets import TARGETS
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels import Pipeline, cache, denoise_on
 from wamnet.kernels.run import tune
-from wamnet.kernels.run.tune import Row, Subject, Table, Tuning
+from wamnet.kernels.run.tune import Row, Table, Tuning
 from wamnet.refimpl import frame
 from wamnet.refimpl.light.scenes import canonical
 from wamnet.refimpl.network import dataset, denoise, siren
@@ -33,10 +33,6 @@ def model(hidden=(8,), window=3):
     return denoise.Model(network, ("color", "normal"), Window(window), dataset.Normalization())
 
 
-SUBJECT = Subject(model())
-"""What the tables are about: the usual network in profile ieee."""
-
-
 def planned(executor, network=None, **how):
     """Return the plan of a network, the usual one where none is given."""
     return plan_model(network or model(), executor.name, **how)
@@ -44,18 +40,18 @@ def planned(executor, network=None, **how):
 
 def choose(executor, plan, size, pictures=1):
     """Return the schedule of a plan and why."""
-    return Tuning(executor, Subject.of(plan), size).picked(pictures)
+    return Tuning(executor, plan.model, size, plan.varied.rank).picked(pictures)
 
 
 def measured(executor, plan):
     """Return the table of a plan."""
-    return Tuning(executor, Subject.of(plan), SIZE).measured(plan, repeats=1)
+    return Tuning(executor, plan.model, SIZE, plan.varied.rank).measured(plan, repeats=1)
 
 
 def keep(executor, table):
     """Put a table into the cache as if it had been measured."""
     found = {"device": "d", "network": "n", "size": list(SIZE), "day": "2026-01-02", "rows": table}
-    assert cache.write_json(Tuning(executor, SUBJECT, SIZE).entry, found)
+    assert cache.write_json(Tuning(executor, model(), SIZE).entry, found)
 
 
 def row(schedule, ms, again_s=0.1):
@@ -69,7 +65,7 @@ def test_every_schedule_is_checked_and_the_fastest_is_taken(executor_named):
     assert all((r.ms is None) == bool(r.note) for r in table.rows)
     assert all(r.again_s > 0 for r in table.rows if r.ms is not None)
     assert table.network == "54-8-3, color + normal, window 3 (clamp)"
-    assert Tuning(executor, SUBJECT, SIZE).remembered() == table
+    assert Tuning(executor, model(), SIZE).remembered() == table
     best = min((r for r in table.rows if r.ms is not None), key=lambda r: r.ms)
     schedule, reason = choose(executor, planned(executor), SIZE, pictures=10**9)
     assert schedule == best.schedule
@@ -133,7 +129,7 @@ def test_a_table_of_another_machine_is_not_taken(executor_named, monkeypatch, ch
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
 
 
-def test_a_table_of_another_network_or_size_is_not_taken(executor_named):
+def test_a_table_of_another_network_or_size_is_not_taken(executor_named, monkeypatch):
     executor = executor_named("opencl")
     keep(executor, [row("plain", 1.0)])
     assert choose(executor, planned(executor), (16, 16))[0] == "plain"  # 240 and 256 pixels: 2^7 to 2^8
@@ -142,7 +138,8 @@ def test_a_table_of_another_network_or_size_is_not_taken(executor_named):
     cases = [(model((9,)), SIZE), (zero, SIZE), (albedo, SIZE), (model(), (13, 20)), (model(), (12, 10))]
     for other, size in cases:
         assert choose(executor, planned(executor, other), size)[1].startswith("built-in")
-    assert choose(executor, planned(executor, profile="native"), SIZE)[1].startswith("built-in")
+    monkeypatch.setattr(executor, "profile", "native")
+    assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
 
 
 @given(height=st.integers(1, 5000), width=st.integers(1, 5000))
@@ -162,7 +159,7 @@ def test_size_classes_are_powers_of_two(height, width):
 )
 def test_an_entry_that_is_no_table_is_none(executor_named, data):
     executor = executor_named("opencl")
-    cache.write_json(Tuning(executor, SUBJECT, SIZE).entry, data)
+    cache.write_json(Tuning(executor, model(), SIZE).entry, data)
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
 
 
@@ -174,7 +171,7 @@ def test_a_damaged_table_is_measured_anew(executor_named, caplog):
     assert choose(executor, planned(executor), SIZE)[1].startswith("built-in")
     assert "is damaged, or no entry of wamnet: it is ignored" in caplog.text
     table = measured(executor, planned(executor))
-    assert Tuning(executor, SUBJECT, SIZE).remembered() == table
+    assert Tuning(executor, model(), SIZE).remembered() == table
 
 
 def test_pictures_are_made_with_the_schedule_of_the_table(executor_named):

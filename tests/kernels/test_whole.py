@@ -15,7 +15,7 @@ from wamnet.compiler.schedules.fft import Fourier
 from wamnet.compiler.targets import language_named
 from wamnet.compiler.variants import plan_model
 from wamnet.kernels.devices.c_executor import COMPILER_VARIABLE, CExecutor
-from wamnet.kernels.run.tune import Subject, Tuning
+from wamnet.kernels.run.tune import Tuning
 from wamnet.refimpl.errors import ExecutorUnavailable
 from wamnet.refimpl.network import dataset, siren
 from wamnet.refimpl.network.denoise import Model
@@ -84,7 +84,7 @@ def chosen(executor, whole):
     siren_or_whole = rounded(network, 12) if whole else network
     model = Model(siren_or_whole, ("color", "normal"), Window(12), dataset.Normalization())
     plan = plan_model(model, executor.name)
-    plan = plan.scheduled(Tuning(executor, Subject.of(plan), (64, 64)).picked()[0])
+    plan = plan.scheduled(Tuning(executor, plan.model, (64, 64), plan.varied.rank).picked()[0])
     return plan.schedule.name
 
 

@@ -34,13 +34,13 @@ from .proof import bounds, whole
 from .proof.bounds import Enclosure
 from .schedules import schedules
 from .schedules.common import kernel_gather, output_channels
-from .schedules.factor import Cut, at_images, factor, over_images, product
 from .schedules.schedules import ALL, PLAIN, Images, Schedule, pick
 from .targets import Language, language_named
 
 if TYPE_CHECKING:
     from ..refimpl.network.denoise import Model
     from .proof.certificate import Proof
+    from .schedules.factor import Cut
 
 BLOCK_NUMBERS = 2**20
 """Numbers in the windows of one block of rows: a bound holds some copies of them, 8 MiB each."""
@@ -155,9 +155,7 @@ class Plan:
         """
         if self.cut is None:
             return self.schedule.enclosures(self.analysed, self.sine, images, rows)
-        if images is None:
-            return over_images(self.cut, self.sine, of_cut)
-        return at_images(self.cut, self.sine, images, of_cut)
+        return self.cut.enclosures(self.sine, images, of_cut)
 
     @cached_property
     def bound(self) -> Bound:
@@ -222,7 +220,7 @@ class Plan:
     @property
     def reference(self) -> Program:
         """Return what a kernel computes up to rounding; a cut has the factors' product for weights."""
-        return product(self.cut) if self.cut else self.analysed
+        return self.cut.product if self.cut else self.analysed
 
     def expected(self, images: Images) -> Expected:
         """Return what a kernel may write for images (H, W, C); any number where a sine promises nothing.
@@ -268,8 +266,11 @@ def plan_program(program: Program, language: Language | str, schedule: str = PLA
             f"writes at most {dialect.max_output_channels}; use a smaller rank, or OpenCL or C, which have "
             "no such limit"
         )
-    cut = factor(common, rank, dialect.channels_per_result) if rank else None
-    return Plan(common, chosen, schedule, cut)
+    if not rank:
+        return Plan(common, chosen, schedule)
+    from .schedules.factor import factor
+
+    return Plan(common, chosen, schedule, factor(common, rank, dialect.channels_per_result))
 
 
 def _check_sizes(program: Program, found: Sequence[Enclosure]) -> None:

@@ -7,28 +7,25 @@
    neurons, and continues as the given program does. Both border rules hold for each axis by itself
    (spec/factored.md, FAC-2).
 3. The error of both together, against the given program, is that of its own values, the first affine map's
-   being [`enclose`]
+   being [`Cut.enclosures`]
 
        |V (H x)' - W x| <= |V (H x)' - V H x| + |W - V H| |x|
 
    where ' is what the kernels compute: the rules of bounds.py for both passes, and the cut. From there on the
    rules of bounds.py hold as they are. Without the last term it is the error of rounding only, against the
    network whose weights are the product V H.
-
-`x` is a box that holds all windows, or the windows of one picture [`over_images`, `at_images`].
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.errors import CompileError
 from ...refimpl.network import factored, window
+from ...refimpl.network.window import Window
 from ..core.ir import Gather, Image, Node, Program, Type, attributes
 from ..core.profiles import SineContract
 from ..core.trace import trace
@@ -45,9 +42,6 @@ HORIZONTAL = "horizontal"
 
 NO_SINE = SineContract("none: the first pass has no sine", None)
 """The contract of a program without sines."""
-
-Columns = Callable[[Enclosure], Enclosure]
-"""From the enclosure of numbers of the first pass to that of their columns of taps."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +65,38 @@ class Cut:
         vertical = _weight(self.vertical, self.layer)
         (layer,) = (index for index, node in enumerate(self.horizontal.nodes) if node.op == "affine")
         return factored.Factors(vertical.reshape(len(vertical), size, -1), _weight(self.horizontal, layer))
+
+    @property
+    def product(self) -> Program:
+        """Return the whole program with the weights V H, in float64: what both passes compute, unrounded."""
+        name = str(self.whole.nodes[self.layer]["weight"])
+        return replace(self.whole, parameters={**self.whole.parameters, name: factored.expand(self.factors)})
+
+    def enclosures(
+        self, contract: SineContract, images: Images | None = None, of_cut: bool = True
+    ) -> list[Enclosure]:
+        """Return the enclosure of every node of the whole program, the kernel being both passes.
+
+        For all images in their ranges, or for given ones (H, W, C). `of_cut`: against the given program, else
+        against the one with the weights V H.
+        """
+        gathers = kernel_gather(self.whole), kernel_gather(self.horizontal)
+        boxes = [bounds.window_box(g) if images is None else (windows(g, images),) * 2 for g in gathers]
+        (output,) = (index for _, index in self.horizontal.outputs)
+        h = bounds.enclose(self.horizontal, {"window": boxes[1]}, contract)[output]
+        read = self.whole.nodes[self.layer].args[0]
+        columns = _columns(h, gathers[0].window, images is not None)
+        until = replace(self.vertical, nodes=self.vertical.nodes[: self.layer + 1], outputs=())
+        second = bounds.enclose(until, {}, contract, known={read: columns})[self.layer]
+        until = replace(self.whole, nodes=self.whole.nodes[: self.layer + 1], outputs=())
+        wanted = bounds.enclose(until, {"window": boxes[0]}, contract)[self.layer]
+        left_out = np.maximum(*np.abs(boxes[0])) @ left(self).T
+        if of_cut:
+            low, high, error = wanted.low, wanted.high, second.error + left_out
+        else:
+            low, high, error = wanted.low - left_out, wanted.high + left_out, second.error
+        known = Enclosure(low, high, error * (1 + bounds.OUTWARD), second.size)
+        return bounds.enclose(self.whole, {"window": boxes[0]}, contract, known={self.layer: known})
 
 
 def factor(program: Program, rank: int, widest: int | None = None) -> Cut:
@@ -103,36 +129,6 @@ def between(rank: int, reach: tuple[float, float], widest: int | None) -> tuple[
     )
 
 
-def enclose(cut: Cut, contract: SineContract, x: Any, columns: Columns, of_cut: bool) -> list[Enclosure]:
-    """Return the enclosure of every node of the whole program, the kernel being both passes.
-
-    `x`: the windows' box (low, high), and that of the rows of taps; `columns`: from the enclosure of the
-    first pass's numbers to that of their columns of taps. `of_cut`: against the given program, else against
-    the one with the weights V H.
-    """
-    whole_box, row_box = x
-    (output,) = (index for _, index in cut.horizontal.outputs)
-    h = bounds.enclose(cut.horizontal, {"window": row_box}, contract)[output]
-    read = cut.whole.nodes[cut.layer].args[0]
-    until = replace(cut.vertical, nodes=cut.vertical.nodes[: cut.layer + 1], outputs=())
-    second = bounds.enclose(until, {}, contract, known={read: columns(h)})[cut.layer]
-    until = replace(cut.whole, nodes=cut.whole.nodes[: cut.layer + 1], outputs=())
-    wanted = bounds.enclose(until, {"window": whole_box}, contract)[cut.layer]
-    left_out = np.maximum(np.abs(whole_box[0]), np.abs(whole_box[1])) @ left(cut).T
-    if of_cut:
-        low, high, error = wanted.low, wanted.high, second.error + left_out
-    else:
-        low, high, error = wanted.low - left_out, wanted.high + left_out, second.error
-    known = Enclosure(low, high, error * (1 + bounds.OUTWARD), second.size)
-    return bounds.enclose(cut.whole, {"window": whole_box}, contract, known={cut.layer: known})
-
-
-def product(cut: Cut) -> Program:
-    """Return the whole program with the weights V H, in float64: what both passes compute, unrounded."""
-    name = str(cut.whole.nodes[cut.layer]["weight"])
-    return replace(cut.whole, parameters={**cut.whole.parameters, name: factored.expand(cut.factors)})
-
-
 def left(cut: Cut) -> Array:
     """Return |W - V H| (D_out, D_in), not less than it is: what the cut leaves out."""
     weight, factors = _weight(cut.whole, cut.layer), cut.factors
@@ -144,30 +140,17 @@ def left(cut: Cut) -> Array:
     return found
 
 
-def over_images(cut: Cut, contract: SineContract, of_cut: bool = True) -> list[Enclosure]:
-    """Return the enclosures for all images in their ranges: a-priori."""
-    size, zero = kernel_gather(cut.whole).window.size, kernel_gather(cut.whole).window.border == "zero"
+def _columns(h: Enclosure, of: Window, of_images: bool) -> Enclosure:
+    """Return the enclosure of columns of taps of the first pass's numbers: of images, or of all of them.
 
-    def columns(h: Enclosure) -> Enclosure:
-        """The same for each tap; beyond the border 0, without an error, where the rule says so."""
-        low, high = (np.minimum(h.low, 0.0), np.maximum(h.high, 0.0)) if zero else (h.low, h.high)
-        return Enclosure(np.tile(low, size), np.tile(high, size), np.tile(h.error, size))
-
-    boxes = tuple(bounds.window_box(kernel_gather(p)) for p in (cut.whole, cut.horizontal))
-    return enclose(cut, contract, boxes, columns, of_cut)
-
-
-def at_images(cut: Cut, contract: SineContract, images: Images, of_cut: bool = True) -> list[Enclosure]:
-    """Return the enclosures (H, W, ...) for given images (H, W, C): a-posteriori."""
-    of = kernel_gather(cut.whole).window
-
-    def columns(h: Enclosure) -> Enclosure:
-        """What the first pass leaves is the image of the second."""
+    Beyond the border they are 0, without an error, where the rule says so.
+    """
+    if of_images:
         padded = (window.pad(part, of, (0,)) for part in (h.low, h.high, h.error))
         return Enclosure(*(window.all_windows(part, of, (0,)) for part in padded))
-
-    x = tuple((windows(kernel_gather(each), images),) * 2 for each in (cut.whole, cut.horizontal))
-    return enclose(cut, contract, x, columns, of_cut)
+    zero = of.border == "zero"
+    low, high = (np.minimum(h.low, 0.0), np.maximum(h.high, 0.0)) if zero else (h.low, h.high)
+    return Enclosure(*(np.tile(part, of.size) for part in (low, high, h.error)))
 
 
 def _layer(program: Program) -> int:

@@ -44,9 +44,7 @@ def test_both_passes_are_the_network_of_the_product(rank, border) -> None:
     cut = factor.factor(program(border=border), rank)
     window = Window(SIZE, border)
     image = np.random.default_rng(1).uniform(-2, 2, (6, 9, CHANNELS))
-    (expected,) = interpret(
-        factor.product(cut), {"window": windows(image, window, (0, 1))}, np.float64
-    ).values()
+    (expected,) = interpret(cut.product, {"window": windows(image, window, (0, 1))}, np.float64).values()
     (h,) = interpret(cut.horizontal, {"window": windows(image, window, (1,))}, np.float64).values()
     (found,) = interpret(cut.vertical, {"window": windows(h, window, (0,))}, np.float64).values()
     assert h.shape == (6, 9, rank)
@@ -71,12 +69,12 @@ def test_the_cut_is_bounded_at_its_worst_window() -> None:
     whole = program()
     cut = factor.factor(whole, 2)
     weight = whole.parameters[str(whole.nodes[cut.layer]["weight"])].astype(np.float64)
-    difference = factor.product(cut).parameters[str(whole.nodes[cut.layer]["weight"])] - weight
+    difference = cut.product.parameters[str(whole.nodes[cut.layer]["weight"])] - weight
     row = int(np.abs(difference).sum(axis=1).argmax())
     worst = 2.0 * np.sign(difference[row])
     moved = abs(difference[row] @ worst)
-    layer = factor.over_images(cut, CONTRACT)[cut.layer].error[row]
-    alone = factor.over_images(cut, CONTRACT, of_cut=False)[cut.layer].error[row]
+    layer = cut.enclosures(CONTRACT)[cut.layer].error[row]
+    alone = cut.enclosures(CONTRACT, of_cut=False)[cut.layer].error[row]
     assert moved <= layer
     # Nothing else is in the bound but rounding; float64 adds up in another order.
     assert layer - alone <= (1 + 1e-5) * moved
@@ -90,11 +88,11 @@ def test_rounding_is_that_of_both_passes() -> None:
     cut = factor.factor(program(), 11)
     box, vertical = bounds.window_box(cut.horizontal.gather), np.abs(cut.factors.vertical).reshape(10, -1)
     h = bounds.enclose(cut.horizontal, {"window": box}, CONTRACT)[-1]
-    layer = factor.over_images(cut, CONTRACT, of_cut=False)[cut.layer]
+    layer = cut.enclosures(CONTRACT, of_cut=False)[cut.layer]
     passed_on, own = (np.tile(part, SIZE) @ vertical.T for part in (h.error, h.largest))
     assert (layer.error >= passed_on + 2.0**-24 * own).all()
     node = cut.whole.nodes[cut.layer]
-    reach = 2.0 * np.abs(factor.product(cut).parameters[str(node["weight"])]).sum(axis=1)
+    reach = 2.0 * np.abs(cut.product.parameters[str(node["weight"])]).sum(axis=1)
     assert (reach > 2.0 * np.abs(cut.whole.parameters[str(node["weight"])]).sum(axis=1)).any()
     bias = cut.whole.parameters[str(node["bias"])].astype(np.float64)
     # float64 adds 48 numbers up in another order.

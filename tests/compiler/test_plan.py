@@ -12,7 +12,6 @@ from wamnet.compiler.compile import compile_plan, compile_program
 from wamnet.compiler.core.interpret import interpret
 from wamnet.compiler.plan import analysed, plan_program
 from wamnet.compiler.proof import bounds
-from wamnet.compiler.schedules.factor import product
 from wamnet.compiler.targets import DENOISERS, language_named
 from wamnet.kernels import open_executor
 from wamnet.refimpl.errors import CompileError
@@ -85,7 +84,7 @@ def test_of_two_passes_rounding_is_bounded(kit, images, border):
     plan = plan_program(program, "numpy", rank=2)
     found = plan.expected(images)
     windows = {"window": kit.windows(program, images)}
-    (value,) = interpret(product(plan.cut), windows, np.float64).values()
+    (value,) = interpret(plan.cut.product, windows, np.float64).values()
     assert np.abs(found.value - value).max() <= 1e-13  # float64 adds up in another order
     with open_executor("numpy") as executor:
         (picture,) = [executor.run(compile_plan(plan), images).astype(np.float64)]

@@ -17,7 +17,7 @@ from wamnet.compiler.proof import bounds
 from wamnet.compiler.schedules import factor
 from wamnet.compiler.schedules.bytes import Dot, GroupDot
 from wamnet.compiler.schedules.fft import Transformed
-from wamnet.compiler.targets import DENOISERS, language_named
+from wamnet.compiler.targets import language_named
 from wamnet.kernels import Pipeline, denoise_on
 from wamnet.kernels.devices import opencl_executor
 from wamnet.refimpl.errors import CompileError, InputError
@@ -41,9 +41,9 @@ def excess(kit, executor, artifact, program, images, of_cut):
     """Return the largest error / bound at these images, against the program, or against its cut's product."""
     rank = artifact.manifest["factored"]["rank"]
     cut, contract = factor.factor(analysed(program), rank), language_named(artifact.target).sine
-    found = factor.at_images(cut, contract, images, of_cut)
+    found = cut.enclosures(contract, images, of_cut)
     (bound,) = bounds.output_errors(cut.whole, found).values()
-    wanted = cut.whole if of_cut else factor.product(cut)
+    wanted = cut.whole if of_cut else cut.product
     (expected,) = interpret(wanted, {"window": kit.windows(program, images)}, np.float64).values()
     assert np.isfinite(bound).all(), "a bound that is infinite holds for every kernel"
     difference = np.abs(executor.run(artifact, images).astype(np.float64) - expected)
@@ -62,7 +62,7 @@ def test_error_is_within_both_bounds(executor_named, kit, target, schedule, case
     )
     images = pictures(case["channels"], case["shape"], case["seed"])
     most = factored.largest_rank(case["size"], *case["widths"][:2])
-    rank = min(1 + round(share * (most - 1)), DENOISERS[target].dialect.max_output_channels)
+    rank = min(1 + round(share * (most - 1)), language_named(target).dialect.max_output_channels)
     artifact = compile_program(program, target, schedule, rank)
     for kernel in artifact.kernels:
         picked = kernel.manifest["schedule"]

@@ -273,15 +273,11 @@ class Verifier:
             self.check(statement.until, tree.BOOL, f"the condition of the loop over {name}")
         apart |= any(isinstance(each, tree.Break) for each in statement.body)
         self.branches += apart
-        self.turns(statement.body, depth + 1)
+        self.loops.append(depth + 1)
+        self.body(statement.body, depth + 1)
+        self.loops.pop()
         self.branches -= apart
         self.scopes.pop()
-
-    def turns(self, body: tree.Body, depth: int) -> None:
-        """Check the body of a loop."""
-        self.loops.append(depth)
-        self.body(body, depth)
-        self.loops.pop()
 
     def _check_break(self, statement: tree.Break, depth: int) -> None:
         """Check the condition that ends a loop."""
@@ -354,7 +350,9 @@ class Verifier:
             return
         if row and len(sizes) == 3 and kind.dtype == declared.type.dtype:
             return
-        if not whole and (len(index) != 1 or not reads_as(declared.type, kind) or len(sizes) != 1):
+        # Memory of one type is accessed as another by component, or several elements at once.
+        fits = declared.type.dtype == kind.dtype and 1 in (declared.type.lanes, kind.lanes)
+        if not whole and (len(index) != 1 or not fits or len(sizes) != 1):
             raise KernelError(f"{name} has elements of type {shown(declared.type)}, not {shown(kind)}")
         if len(index) != len(sizes):
             raise KernelError(f"{name} has {len(sizes)} indices, not {len(index)}")
@@ -482,8 +480,3 @@ def limit(size: int, declared: tree.Type, kind: tree.Type) -> int:
     Several elements at once begin at any one of them; else the index counts components.
     """
     return size - kind.lanes + 1 if declared.lanes == 1 else size * declared.lanes // kind.lanes
-
-
-def reads_as(declared: tree.Type, kind: tree.Type) -> bool:
-    """Return whether memory of one type may be accessed as another: by component, or several at once."""
-    return declared.dtype == kind.dtype and 1 in (declared.lanes, kind.lanes)

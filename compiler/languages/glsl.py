@@ -233,21 +233,29 @@ class GLSL(Dialect):
         return f"{name}{part}" if written else f"texelFetch({name}, ivec2({column}, {row}), 0){part}"
 
 
-class GLSLCompute(GLSL):
+class Groups(Dialect):
+    """The words of GLSL's compute shaders."""
+
+    staged = True
+    shared_array = "shared {kind} {name}[{count}];"
+    local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
+    group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
+    wait = "barrier();"
+    qualifiers = GLSL.qualifiers
+    table = GLSL.table
+    vector_kinds = GLSL.vector_kinds
+
+
+class GLSLCompute(Groups, GLSL):
     """GLSL 4.30 compute shaders on textures: the result is an image, the weights a buffer of `vec4`."""
 
     language = f"GLSL {SHADER_VERSION / 100:.2f}, compute shader"
     suffix = ".comp"
     group = (16, 8)
-    staged = True
-    wait = "barrier();"
     max_output_channels = 4
-    local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
-    group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
     pixel_begin = ("vec4 color = vec4(0.0, 0.0, 0.0, 1.0);",)
     pixel_end = ("imageStore(result, ivec2({column}, {row}), color);",)
     weight_vector = "w[{index}]"
-    shared_array = "shared {kind} {name}[{count}];"
     channels_per_result = None
     store = "color[{i}] = {value};"
     launches = (

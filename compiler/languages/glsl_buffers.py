@@ -24,7 +24,7 @@ from ..kernel.interface import (
 )
 from ..kernel.kernel import Kernel
 from .cuda import GROUPED
-from .glsl import GLSL
+from .glsl import Groups
 from .openings import Buffers
 
 LEAST_SHARED = 2**14
@@ -48,7 +48,8 @@ class Declared(Buffers):
     in a uniform block and any other; `accesses`: the words of one that is read, and of one that is written.
     """
 
-    numbered = declares_above = True
+    numbered = declares_above = one_type = True
+    wide = False
     group_size: Sequence[int | str] = GROUP
     integers_block: tuple[str, str, str]
     uniform: str
@@ -88,7 +89,7 @@ class Declared(Buffers):
         return [*above, *self.declared(kernel.interface), *self.group_memory(kernel), "", *words]
 
 
-class Vulkan(Declared):
+class Vulkan(Groups, Declared):
     """The dialect's table for Vulkan."""
 
     target = "glsl-vulkan"
@@ -98,8 +99,6 @@ class Vulkan(Declared):
     native_sine = SineContract(
         "sin() of Vulkan, which promises 2^-11 on [-pi, pi] alone, and that absolutely", None
     )
-    qualifiers = GLSL.qualifiers
-    table = GLSL.table
     integers_block = (
         "layout(local_size_x = {0}, local_size_y = {1}) in;\nlayout(std140, binding = 0) uniform Size {{",
         "    {0};",
@@ -109,20 +108,12 @@ class Vulkan(Declared):
     storage = "layout(std430, binding = {number}) restrict {access}buffer {block} {{ {kind} {name}[]; }};"
     accesses = ("readonly ", "")
     grouped = {"group_size": ("GROUP_WIDTH", "GROUP_HEIGHT")}
-    staged = True
     launching = {"group_size": (ITEMS, 1)}
-    shared_array = "shared {kind} {name}[{count}];"
-    local_place = ("gl_LocalInvocationID.x", "gl_LocalInvocationID.y")
-    group_place = ("gl_WorkGroupID.x", "gl_WorkGroupID.y")
-    wait = "barrier();"
-    wide = False
-    one_type = True
     words = (
         f"GL_EXT_integer_dot_product where the compiler knows it and {PORTABLE} is not defined, else shifts"
     )
     extensions = VULKAN_EXTENSION
     instructions = VULKAN_GROUP
-    vector_kinds = GLSL.vector_kinds
     item = ("gl_GlobalInvocationID.x", "gl_GlobalInvocationID.y")
 
     def head(self, kernel: Interface) -> list[str]:

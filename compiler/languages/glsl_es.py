@@ -95,7 +95,7 @@ class ShadertoyDenoise(GLSLES):
     )
 
 
-class GodotDenoise(GLSL):
+class GodotDenoise(GLSLES):
     """The dialect's table: a shader of a canvas item."""
 
     target = "godot"
@@ -103,9 +103,6 @@ class GodotDenoise(GLSL):
     suffix = ".gdshader"
     entries = {DENOISE: "fragment"}
     ends = {DENOISE: "    COLOR = result;\n}"}
-    native_sine = GLSLES.native_sine
-    assumes = ASSUMES
-    unordered = ("", "")
     qualifiers = {}
     max_output_channels = 4
     first = ("shader_type canvas_item;", "render_mode unshaded, blend_disabled;")
@@ -114,7 +111,6 @@ class GodotDenoise(GLSL):
     main = "void fragment()"
     fragment = ("int(UV.x * float(width))", "int(UV.y * float(height))")
     above = CHANNEL_OF
-    indexes_results = False
     pixel = "channel_of(texelFetch(image_{image}, ivec2({column}, {row}), 0), {c})"
     called = (
         "each image: a texture of 32-bit floats (Image.FORMAT_RGBF), row 0 the picture's top row;\n"

@@ -46,8 +46,6 @@ class WGSL(Declared):
     local_place = ("item_place.x", "item_place.y")
     group_place = ("group_place.x", "group_place.y")
     wait = "workgroupBarrier();"
-    wide = False
-    one_type = True
     words = "dot4I8Packed, of the language feature packed_4x8_integer_dot_product"
     extensions = ("requires packed_4x8_integer_dot_product;",)
     instructions = WGSL_GROUP

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...refimpl.network.window import Window
-from ..core.ir import Gather, Node, Program
+from ..core.ir import Gather, Program
 from ..core.ops import OPS
 from ..core.profiles import FLUSH, UNIT_ROUNDOFF, SineContract
 from ..proof import bounds, scaled, spectra
@@ -216,22 +216,15 @@ def enclose(
     exact = bounds.enclose(until, {"window": x}, sine)[index]
     matrix = program.parameters[str(node["weight"])].astype(np.float64)
     norm, whole = np.asarray(norm, np.float64)[..., None], float(np.linalg.norm(matrix))
+    held = program.parameters.get(str(node.get("bias")), np.zeros(node.type.shape[0])).astype(np.float64)
     error = spectra.alone(of, matrix, len(of.centres)) * norm
-    error = (
-        error + spectra.moved_bias(of, matrix, _bias(program, node)) + spectra.TINY * (1 + whole) * (1 + norm)
-    )
+    error = error + spectra.moved_bias(of, matrix, held) + spectra.TINY * (1 + whole) * (1 + norm)
     # The bias is added last, and rounded once more.
     largest = exact.largest + error
     error = error + UNIT_ROUNDOFF * largest + 4 * FLUSH
     size = 4 * np.maximum(of.points, whole) * norm * (1 + 2.0**-10) + 2 * largest
     known = bounds.held(exact.low, exact.high, error * (1 + bounds.OUTWARD), size)
     return bounds.enclose(program, {"window": x}, sine, known={index: known})
-
-
-def _bias(program: Program, node: Node) -> Array:
-    """Return a layer's bias (D_out,), zeros where it has none."""
-    held = node.get("bias")
-    return np.zeros(node.type.shape[0]) if held is None else program.parameters[str(held)].astype(np.float64)
 
 
 def radius(gather: Gather, centres: Array) -> Array:
